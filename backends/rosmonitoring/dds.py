@@ -17,7 +17,6 @@ from xml.sax.saxutils import quoteattr
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped
-from avow.ros.calls import is_part
 from avow.ros.definitions import Definitions
 
 from .dds_types import DIAGNOSTICS, NO_DDS, Types, dds_topic, dds_type, filled
@@ -70,9 +69,6 @@ class Dds:
         self._heard: dict[str, _Heard] = {}
         wrong: list[Diagnostic] = []
         for topic in topics:
-            if is_part(topic):
-                self.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
-                continue
             kind = kinds.get(topic.lstrip("/"), "")
             why = self._types.missing(kind) if kind else f"nothing says of which type {topic} is"
             if why:

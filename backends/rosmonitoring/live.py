@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.calls import is_part
 
 from .bags import Event
 from .coverage import coverage
@@ -142,15 +143,23 @@ class Board:
 
 def graph_of(text: str, running: Session, host: str, *, enforce: bool = False) -> Graph:
     """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. Raises Rejected."""
+    calls = [topic for topic in running.topics if is_part(topic)]
+    graph = _graph(text, [topic for topic in running.topics if topic not in calls], running, host, enforce=enforce)
+    for topic in calls:
+        graph.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
+    return graph
+
+
+def _graph(text: str, heard: list[str], running: Session, host: str, *, enforce: bool) -> Graph:
     kind, _, address = text.partition(":")
     topics = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
     if kind == "ros1":
-        return Ros1(master_of(text), running.topics, host, topics)
+        return Ros1(master_of(text), heard, host, topics)
     if enforce:
         raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
     if kind == "dds":
-        return Dds(domain_of(text), running.topics, running.kinds, running.known, host)
+        return Dds(domain_of(text), heard, running.kinds, running.known, host)
     if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
-        return Rosbridge(address, running.topics)
+        return Rosbridge(address, heard)
     hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"
     raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))

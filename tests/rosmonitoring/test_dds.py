@@ -24,6 +24,7 @@ from avow.base.diagnostics import Rejected
 from avow.system.plan import System
 
 from .processes import LONGEST, running, wait_for
+from .test_bags import write_bag
 
 needs_dds = pytest.mark.needs_dds
 HERE = Path(__file__).parent
@@ -121,6 +122,29 @@ def test_what_is_said_over_dds_is_judged_as_its_record_is(
     assert [(v.clause, v.index) for v in listening.found] == [("low", 3)]
     assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
     assert [(v.clause, v.index) for _, v in session(system).run(record)] == [("low", 3)]
+
+
+@pytest.mark.slow
+@needs_dds
+@pytest.mark.parametrize("form", ["sqlite3", "mcap"])
+def test_verdicts_are_those_of_a_bag(peer: Peer, make_system: Callable[..., System], tmp_path: Path, form: str) -> None:
+    """Numbers as they are: binary ones, those that are none, those at the bound."""
+    system = make_system(RCL.replace(" s matches", " v matches"), MAPPING)
+    said = [0.1, 120.0, 120.00000000000001, float("nan"), float("inf"), -0.0, 5e-324, 1e308, 119.99999999999999]
+    bag = write_bag(tmp_path / "bag", form, "std_msgs/msg/Float64", [{"data": one} for one in said])
+    peer.write("v")
+    with Listening(peer, system) as listening:
+        peer.heard("v")
+        peer.say("v", *said)
+        listening.until(lambda s: s.events == len(said))
+    recorded = session(system, (), bag)
+    found = [(v.fault, v.clause, v.index, v.values, v.explanation) for _, v in recorded.run(bag)]
+    assert [(v.fault, v.clause, v.index, v.values, v.explanation) for v in listening.found] == found
+    assert [v[2] for v in found] == [3, 4, 5, 8]
+    mine, its = listening.session.summary(), recorded.summary()
+    for summary in (mine, its):
+        summary["nodes"][0].pop("topics")
+    assert mine["nodes"] == its["nodes"]
 
 
 @pytest.mark.slow

@@ -291,9 +291,19 @@ def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
 
 
 @pytest.mark.parametrize("text", ["ros2", "rosbridge:http://x", "rosbridge", "zenoh"])
-def test_other_graphs_are_refused(text: str) -> None:
+def test_other_graphs_are_refused(make_system: Callable[..., System], text: str) -> None:
     with pytest.raises(Rejected, match="no graph that can be listened to"):
-        graph_of(text, (), "127.0.0.1")
+        graph_of(text, session(make_system(RCL, MAPPING)), "127.0.0.1")
+
+
+def test_calls_are_not_heard_on_a_running_graph(make_system: Callable[..., System]) -> None:
+    rcl = RCL.replace("std_msgs/Float64 r matches(in.r)", "std_srvs/SetBool_Request /grip matches(in.r)")
+    running = session(make_system(rcl.replace("r : REAL", "r : BOOL"), MAPPING))
+    for text in ("ros1:http://127.0.0.1:1", "rosbridge:ws://127.0.0.1:1"):
+        graph = graph_of(text, running, "127.0.0.1")
+        told = graph.inbox.get(0)
+        assert told is not None
+        assert told.trouble == "/grip/_request: calls of services and actions are not heard on a running graph"
 
 
 def test_no_rosbridge_is_told() -> None:
