@@ -103,4 +103,11 @@ ROS_CODES = register(
         "Under which name a node runs, and what remaps its topics, as the launch files say.",
         "Nothing is to be done where it is what is meant.",
     ),
+    declare(
+        "ROS126",
+        "topics not known",
+        "What a launch file remaps or names at a place that cannot be read may reach this node, so that no link of its "
+        "topics can be called agreed.",
+        "Say under `ros: {nodes: {NODE: {name: /…, remap: {…}}}}` how it runs.",
+    ),
 )

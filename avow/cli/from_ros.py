@@ -42,7 +42,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
             found = carried(bag, Origin(distro))
             known = Definitions({**known.messages, **found.known})
             seen, note = watch(known, found.types)
-            for event in islice(messages(bag, Origin(distro)), DRAFT_MESSAGES):
+            for event, _ in islice(messages(bag, Origin(distro)), DRAFT_MESSAGES):
                 note(event)
         except NoBag as no:
             raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None

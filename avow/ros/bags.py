@@ -64,7 +64,7 @@ def enveloped(message: Mapping[str, Any], topic: str, time: float, by: str = "")
     """A message as an event: its fields, its topic, when it came, and, if it is known, who published it. Fields that
     bear those two names are not lost."""
     event = {**message, "topic": topic, "time": time}
-    if any(name in message for name in ENVELOPE):
+    if "topic" in message or "time" in message:
         event[WHOLE] = message
     if by:
         event[PUBLISHER] = by
@@ -111,9 +111,10 @@ def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
 
 def messages(
     path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
-) -> Iterator[Event]:
-    """The messages as events, in the order in which they were recorded; of topics that are not wanted, only that there
-    was one. Of a topic whose parts are wanted (a call's request and response), the part. Raises NoBag."""
+) -> Iterator[tuple[Event, int]]:
+    """The messages as events, each with its size in bytes, in the order in which they were recorded; of topics that are
+    not wanted, only that there was one. Of a topic whose parts are wanted (a call's request and response), the part.
+    Raises NoBag."""
     calls = Calls()
     with _opened(path, origin) as reader:
         parted = {
@@ -122,7 +123,7 @@ def messages(
             if not wanted(c.topic) and any(map(wanted, parts_of(c.topic, canonical(c.msgtype))))
         }
         plain = plainer(reader.typestore.fielddefs)
-        kind = functools.cache(lambda said: as_message(said, "")[0])
+        kind, wanted = functools.cache(lambda said: as_message(said, "")[0]), functools.cache(wanted)
         for connection, time, raw in reader.messages():
             event: Mapping[str, Any] = {}
             topic = connection.topic
@@ -131,7 +132,7 @@ def messages(
                 event = found
             elif wanted(topic):
                 event = plain(reader.deserialize(raw, kind(connection.msgtype)))
-            yield enveloped(event, topic, time / 1e9, getattr(connection.ext, "callerid", None) or "")
+            yield enveloped(event, topic, time / 1e9, getattr(connection.ext, "callerid", None) or ""), len(raw)
 
 
 @contextmanager

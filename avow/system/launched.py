@@ -60,6 +60,7 @@ def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...
     for node in contract.nodes:
         mine = plan.ros.names.placed(node.name)
         launched = _launched(plan, node, mine, faults)
+        faults += _doubted(plan, node, mine, launched)
         if launched is not None:
             faults += _disagreements(node, mine, launched)
             remaps = (*launched.remaps, *(mine.remaps if launched.unread else ()))
@@ -137,6 +138,25 @@ def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) ->
 
 
 _NAME_IT = "ros: {nodes: {NODE: {name: /…}}}"
+
+
+def _doubted(plan: Plan, node: Node, mine: Placed, launched: Started | None) -> Iterator[Diagnostic]:
+    """An error where a node's topics hang on what cannot be read, and the plan does not say how it is called: no link
+    of them could be called agreed."""
+    assert plan.launched is not None
+    modelled = plan.model.data if isinstance(plan.model.data, dict) else {}
+    elsewhere = node.relay or node.name in {**modelled.get("compound", {}), **modelled.get("external", {})}
+    if mine.named or mine.remaps or elsewhere or not any(topic.port for topic in node.topics):
+        return
+    unread = [d for d in plan.launched.unread if not d.is_error]
+    doubts, span = (launched.unread, launched.span) if launched is not None else ((), None)
+    if launched is None and unread:
+        place = f" at {_at(unread[0].span)}" if unread[0].span else ""
+        doubts, span = (f"nothing that is read starts it, and not all is read{place}: {unread[0].message}",), node.span
+    if doubts:
+        message = f"how {node.name}'s topics are called when it runs is not known: {'; '.join(doubts)}"
+        hint = f"say it in the plan, then that is taken:  ros: {{nodes: {{{node.name}: {{name: /{node.name}}}}}}}"
+        yield Diagnostic("ROS126", message, span, hint=hint)
 
 
 def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diagnostic]:

@@ -22,7 +22,7 @@ def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
 
 def messages(
     path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
-) -> Iterator[Event]:
+) -> Iterator[tuple[Event, int]]:
     """As `avow.ros.bags.messages`. Raises Rejected."""
     with _told():
         yield from bags.messages(path, origin, wanted)

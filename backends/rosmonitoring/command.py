@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -276,6 +276,9 @@ def _violations(running: Session, trace: str, fast: bool) -> Iterator[tuple[int,
     what was found is asked for, not each judgement."""
     if trace != "-":
         yield from running.run(Path(trace)) if fast else running.one_by_one(Path(trace))
+        return
+    if fast:
+        yield from running.read(cast(io.BufferedReader, sys.stdin.buffer).read1, "<stdin>")
         return
     from avow.base.diagnostics import Diagnostic, Rejected
 

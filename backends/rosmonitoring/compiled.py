@@ -11,6 +11,7 @@ The code for each shape of line (`shapes`) is generated; it holds numbers, and n
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import re
 from bisect import bisect
@@ -21,6 +22,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 
+from .bags import Event
 from .engine import Monitor
 from .numbers import Decimal
 from .options import same_topic
@@ -30,7 +32,7 @@ from .rules import Path, Previous
 from .shapes import Shape, scanner, shape
 from .timed import Timed
 from .traces import event_of, not_text
-from .tuning import CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT
+from .tuning import BATCH, CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT, TEXT_BYTES
 from .watched import Fault, Violation, time_text
 
 Match = re.Match[bytes]
@@ -72,6 +74,8 @@ class Compiled:
         self._last = [b""]
         """The text of the latest event's time, where that was later than any before it."""
         self._scan, self._handlers = self._compile()
+        self._line = 0
+        """How many lines have been read."""
         self._counted = (b"", 0, 0)
         """What is being read, and how many lines of the trace end before a place in it."""
         for monitor in monitors:
@@ -80,31 +84,57 @@ class Compiled:
     # -- reading ---------------------------------------------------------------------------------------------------
 
     def run(self, path: File) -> Iterator[tuple[int, list[Violation]]]:
-        """Judge the lines of a file: the line, and what was found there; nothing of lines where all is well, but once
-        in each megabyte (so that whoever waits can look at the clock). Raises Rejected."""
-        line = 0
+        """Judge the lines of a file, as `lines` does. Raises Rejected."""
         try:
             with path.open("rb") as stream:
-                for chunk in _chunks(stream, str(path)):
-                    at = 0
-                    self._counted = (chunk, 0, line)
-                    while at < len(chunk):
-                        before, handlers = len(self._shapes), self._handlers
-                        done = line
-                        for line, match in enumerate(self._scan.finditer(chunk, at), done + 1):
-                            known = handlers[match.lastindex](match)
-                            if known is True:
-                                continue
-                            found = self._again(known, line) if known else self._slow(match, str(path), line)
-                            if found:
-                                yield line, found
-                            if len(self._shapes) != before:
-                                break
-                        at = match.end()
-                    self._flush()
-                    yield line, []
+                yield from self.lines(stream.read1, str(path))
         except OSError as error:
             raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
+
+    def lines(self, read: Callable[[int], bytes], name: str) -> Iterator[tuple[int, list[Violation]]]:
+        """Judge the lines of a stream, which `read` gives as they come (none at its end): the line, and what was found
+        there; nothing of lines where all is well, but once in each megabyte (so that whoever waits can look at the
+        clock). Raises Rejected, OSError."""
+        for chunk in _chunks(read, name):
+            yield from self._judged(chunk, name)
+
+    def events(self, events: Iterable[tuple[Event, int]]) -> Iterator[tuple[int, list[Violation]]]:
+        """Judge the messages of a bag, each with its size in bytes, as lines that would say the same; large ones by the
+        engine. Raises Rejected."""
+        pending = iter(events)
+        while several := list(itertools.islice(pending, BATCH)):
+            lines: list[str] = []
+            for event, size in several:
+                line = _line_of(event, size)
+                if line is not None:
+                    lines.append(line)
+                    continue
+                yield from self._judged("".join(lines).encode(), "")
+                lines.clear()
+                self._line += 1
+                yield self._line, self._engine(event, None, self._line)
+            yield from self._judged("".join(lines).encode(), "")
+
+    def _judged(self, chunk: bytes, name: str) -> Iterator[tuple[int, list[Violation]]]:
+        """Judge some whole lines, which come after those before."""
+        at, line = 0, self._line
+        self._counted = (chunk, 0, line)
+        while at < len(chunk):
+            before, handlers = len(self._shapes), self._handlers
+            done = line
+            for line, match in enumerate(self._scan.finditer(chunk, at), done + 1):
+                known = handlers[match.lastindex](match)
+                if known is True:
+                    continue
+                found = self._again(known, line) if known else self._slow(match, name, line)
+                if found:
+                    yield line, found
+                if len(self._shapes) != before:
+                    break
+            at = match.end()
+        self._line = line
+        self._flush()
+        yield line, []
 
     def _slow(self, match: Match, name: str, line: int) -> list[Violation]:
         """The engine judges, and what it finds is remembered."""
@@ -114,8 +144,10 @@ class Compiled:
         except UnicodeDecodeError:
             raise not_text(name) from None
         event = event_of(words, name, line)
-        if event is None:
-            return []
+        return [] if event is None else self._engine(event, text, line)
+
+    def _engine(self, event: Event, text: bytes | None, line: int) -> list[Violation]:
+        """The engine judges an event; what it finds is remembered for others with a text like its own."""
         self._flush()
         raw = event.get("topic")
         topic = raw if isinstance(raw, str) else ""
@@ -124,7 +156,7 @@ class Compiled:
         tallies = [[counts_of(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
         self._heard(topic, 1)
         found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
-        which, groups = self._shaped(text, topic) if raw is topic else (-1, None)
+        which, groups = self._shaped(text, topic) if raw is topic and text is not None else (-1, None)
         for watch, plan, old, tally in zip(self._watches, plans, before, tallies, strict=True):
             unreadable = {
                 v.clause for v in found if v.fault is Fault.MAPPING and v.node == watch.monitor.setup.node.name
@@ -182,7 +214,7 @@ class Compiled:
         waiting = [topic for _, topic, _ in last]
         if not waiting:
             return
-        events = [(event_of(m.group(0)[:-1].decode(), "", 0), self._line(m.start())) for _, _, m in last]
+        events = [(event_of(m.group(0)[:-1].decode(), "", 0), self._line_at(m.start())) for _, _, m in last]
         for watch in self._watches:
             for topic, (event, line) in zip(waiting, events, strict=True):
                 if event is not None and watch.plans.get(same_topic(topic.name)) is not None:
@@ -193,7 +225,7 @@ class Compiled:
         for topic in waiting:
             topic.last = None
 
-    def _line(self, place: int) -> int:
+    def _line_at(self, place: int) -> int:
         """The line that begins at a place of what is being read, which is none before those asked for."""
         chunk, known, lines = self._counted
         lines += chunk.count(b"\n", known, place)
@@ -355,20 +387,31 @@ class Compiled:
         return handle
 
 
-def _chunks(stream: Any, name: str) -> Iterator[bytes]:
-    """Whole lines, about a megabyte at a time, the last one ended."""
-    rest = b""
+def _line_of(event: Event, size: int) -> str | None:
+    """A message as the line that a trace would have of it; None of a large one."""
+    try:
+        return f"{json.dumps(event)}\n" if size < TEXT_BYTES else None
+    except (TypeError, ValueError):  # it holds what JSON cannot
+        return None
+
+
+def _chunks(more: Callable[[int], bytes], name: str) -> Iterator[bytes]:
+    """Whole lines, at most about a megabyte at a time, as they come; the last one ended."""
+    rest: list[bytes] = []
+    length = 0
     while True:
-        read = stream.read(CHUNK)
+        read = more(CHUNK)
         if not read:
             if rest:
-                yield rest + b"\n"
+                yield b"".join((*rest, b"\n"))
             return
         end = read.rfind(b"\n")
         if end < 0:
-            rest += read
-            if len(rest) > 4 * EVENT_CHARACTERS:
+            rest.append(read)
+            length += len(read)
+            if length > 4 * EVENT_CHARACTERS:
                 raise Rejected(Diagnostic("MON204", f"{name}: a line is longer than {EVENT_CHARACTERS} characters"))
             continue
-        yield rest + read[: end + 1]
-        rest = read[end + 1 :]
+        yield b"".join((*rest, read[: end + 1]))
+        rest = [read[end + 1 :]] if end + 1 < len(read) else []
+        length = len(read) - end - 1

@@ -13,7 +13,7 @@ from avow.ros.definitions import Definitions
 from avow.system.plan import System
 from avow.system.schema import suggest
 
-from .bags import Origin, is_bag
+from .bags import Origin, is_bag, messages
 from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
@@ -96,6 +96,15 @@ class Session:
         """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
         line = 0
         for line, found in judge(self.monitors, path, origin(self.system), self.told, self.heard):
+            for violation in found:
+                yield line, violation
+        for violation in self.finish():
+            yield line, violation
+
+    def read(self, read: Callable[[int], bytes], name: str) -> Iterator[tuple[int, Violation]]:
+        """Judge lines as they come, as `Compiled.lines`. Raises Rejected, OSError."""
+        line = 0
+        for line, found in Compiled(self.monitors, self.told, self.heard).lines(read, name):
             for violation in found:
                 yield line, violation
         for violation in self.finish():
@@ -215,12 +224,12 @@ def judge(
 ) -> Iterator[tuple[int, list[Violation]]]:
     """Feed a trace to some monitors: lines, and what was found there (often nothing). `told` and `heard` are those of
     `Compiled`. Raises Rejected."""
+    compiled = Compiled(monitors, told, heard)
     if not is_bag(path):
-        yield from Compiled(monitors, told, heard).run(path)
+        yield from compiled.run(path)
         return
-    for recorded in read_trace(path, where, lambda topic: any(monitor.listens(topic) for monitor in monitors)):
-        heard(str(recorded.event["topic"]), 1)
-        yield recorded.line, list(told([v for monitor in monitors for v in monitor.step(recorded.event)]))
+    for _, found in compiled.events(messages(path, where, lambda topic: any(m.listens(topic) for m in monitors))):
+        yield 0, found
 
 
 def _asked(kind: ClauseKind, tally: Tally) -> int:

@@ -103,7 +103,7 @@ def read_trace(
     """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag). `wanted`: the topics whose messages of a bag
     are of interest. Raises Rejected."""
     if is_bag(path):
-        for index, event in enumerate(messages(path, origin, wanted), start=1):
+        for index, (event, _) in enumerate(messages(path, origin, wanted), start=1):
             yield Recorded(index, 0, event)
         return
     try:

@@ -58,6 +58,12 @@ REMEMBERED = 65_536
 CHUNK = 1 << 20
 """Bytes of a trace that are read at a time."""
 
+BATCH = 256
+"""Messages of a bag that are judged at a time, as lines of text."""
+
+TEXT_BYTES = 2_048
+"""Bytes of a message of a bag above which writing it as text costs more than judging it by the engine."""
+
 RATE_MESSAGES = 10
 """Messages over which a rate is taken: one that comes a little late says nothing of the rate, and of ten it shows in a
 second at 10 Hz."""

@@ -167,3 +167,30 @@ def test_an_edit_of_a_launch_file_is_another_question(tmp_path: Path) -> None:
     assert before.digest != after.digest
     assert dataflow(before.system).edges
     assert not dataflow(after.system).edges
+
+
+UNREAD = [
+    APART.replace("<launch>", '<launch><remap from="t" to="$(env T)"/>'),
+    APART.replace('name="a"', 'name="$(env A)"'),
+    '<launch><let name="x" value="y"/><include file="$(find-pkg-share other)/l.xml"/>'
+    '<node namespace="left" name="a" pkg="p" exec="a"/><node name="b" pkg="p" exec="b">'
+    '<remap from="u" to="/left/t"/></node></launch>',
+]
+
+
+@pytest.mark.parametrize("launch", UNREAD)
+def test_what_rests_on_what_is_not_read_is_not_agreed(tmp_path: Path, launch: str) -> None:
+    """A remapping, a name, an include that is not read: the links of what it reaches wait for the plan's word."""
+    folder = make(tmp_path, LAUNCH, launch)
+    with pytest.raises(Rejected) as caught:
+        load_system(folder)
+    assert {d.code for d in caught.value.diagnostics} == {"ROS126"}
+    assert "name: /a" in str(caught.value.diagnostics[0].hint)
+    said = LAUNCH + "  nodes: {a: {name: /left/a}, b: {name: /b, remap: {u: /left/t}}}\n"
+    assert edges(make(tmp_path, said, launch)) == ["a.x → b.y /left/t"]
+
+
+def test_an_include_that_is_not_read_is_no_doubt_of_what_comes_before_it(tmp_path: Path) -> None:
+    before, after = UNREAD[2].split('<include file="$(find-pkg-share other)/l.xml"/>')
+    launch = before + after.replace("</launch>", '<include file="$(find-pkg-share other)/l.xml"/></launch>')
+    assert edges(make(tmp_path, LAUNCH, launch)) == ["a.x → b.y /left/t"]

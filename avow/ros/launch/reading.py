@@ -255,23 +255,30 @@ class _Reading:
             if part.tag in ("arg", "let") and isinstance(name, str) and self.condition(part, scope) is True:
                 given[name] = self.fixed(value, scope)
         self.push(element, inner, element.get("ns"))
+        path, why = self.included(element, scope)
+        if path is None:
+            self.tell(element, why)
+            if not scope.ros1:  # what it names or remaps holds from here on
+                scope.doubt += (f"it comes after what is not read: {why}",)
+        elif self.file(path, given, inner):
+            scope.take(inner, doubt)
+
+    def included(self, element: Element, scope: _Scope) -> tuple[Path | None, str]:
+        """The file that is included; else why it is not read."""
         try:
             text = self.expanded(_wanted(element, "file"), scope)
         except _Unknown as why:
-            self.tell(element, f"the file that is included is not known: {why}")
-            return
+            return None, f"the file that is included is not known: {why}"
         if not Path(text).is_absolute():
-            self.tell(element, f"{text[:80]!r} is relative to wherever the robot is started: it is not read")
-            return
+            return None, f"{text[:80]!r} is relative to wherever the robot is started: it is not read"
         path = Path(os.path.realpath(text))
         if self.root not in path.parents:
-            self.tell(element, f"{path} lies outside {self.root}: it is not read")
-        elif not path.is_file():
-            self.tell(element, f"there is no file {path}")
-        elif scope.depth >= LAUNCH_DEPTH:
-            self.tell(element, "files are included within one another too deeply")
-        elif self.file(path, given, inner):
-            scope.take(inner, doubt)
+            return None, f"{path} lies outside {self.root}: it is not read"
+        if not path.is_file():
+            return None, f"there is no file {path}"
+        if scope.depth >= LAUNCH_DEPTH:
+            return None, "files are included within one another too deeply"
+        return path, ""
 
     def node(self, element: Element, outer: _Scope) -> None:
         scope = outer.inner()
