@@ -26,6 +26,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     from avow.language.format import format_text
     from avow.language.lexer import KEYWORDS
     from avow.ros.bags import NoBag, Origin, carried, messages
+    from avow.ros.calls import parts_of, with_calls
     from avow.ros.definitions import Definitions
     from avow.ros.drafting import Given, draft, watch
     from avow.ros.listing import Listing
@@ -42,7 +43,8 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
             found = carried(bag, Origin(distro))
             known = Definitions({**known.messages, **found.known})
             seen, note = watch(known, found.types)
-            for event, _ in islice(messages(bag, Origin(distro)), DRAFT_MESSAGES):
+            whole = {topic for topic, kind in found.types.items() if not parts_of(topic, kind)}
+            for event, _ in islice(messages(bag, Origin(distro), whole.__contains__), DRAFT_MESSAGES):
                 note(event)
         except NoBag as no:
             raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None
@@ -55,7 +57,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     assert listing is not None
     if graph is not None:
         origins.append("the running graph" if _MASTER.match(graph) else Path(graph).name)
-    listing = _sound(listing)
+    listing = with_calls(_sound(listing))
     if not any(node.publishes or node.subscribes for node in listing.nodes):
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: there is no node with a topic"))
     graph_file = "models/rosgraph.txt" if graph is not None else None
@@ -105,22 +107,30 @@ def _together(listing: Listing | None, found: Carried) -> Listing:
         for name in names if topic not in known else ():
             callers.setdefault(name, []).append(topic)
     if listing is None and not callers:
-        callers["/robot"] = [topic for topic in found.types if not is_plumbing(topic)]
+        callers["/robot"] = [topic for topic in found.types if not is_plumbing(topic) and not _asks(topic)]
     nodes = tuple(replace(n, publishes=(*n.publishes, *callers.pop(n.name, ()))) for n in nodes)
-    nodes += tuple(Listed(name, tuple(topics)) for name, topics in callers.items())
+    asked = tuple(topic for topic in found.types if _asks(topic)) if "/robot" in callers else ()
+    nodes += tuple(Listed(name, tuple(topics), asked) for name, topics in callers.items())
     return Listing(nodes, {**(listing.types if listing is not None else {}), **found.types})
+
+
+def _asks(topic: str) -> bool:
+    """Whether a topic is the part of calls that their server hears."""
+    from avow.ros.calls import is_part
+
+    return is_part(topic) and topic.endswith(("/_request", "/_goal"))
 
 
 def _sound(listing: Listing) -> Listing:
     """Without names and types that ROS would not take: they come from a file."""
-    from avow.ros.listing import Listing
+    from avow.ros.listing import EVERY_SIDE, Listed, Listing
     from avow.ros.names import is_name
 
     def kept(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in dict.fromkeys(names) if name.startswith("/") and is_name(name))
 
     nodes = tuple(
-        replace(n, publishes=kept(n.publishes), subscribes=kept(n.subscribes), serves=kept(n.serves))
+        Listed(n.name, **{side: kept(getattr(n, side)) for side in EVERY_SIDE})
         for n in listing.nodes
         if kept((n.name,))
     )

@@ -9,11 +9,12 @@ and no service.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from avow.ros.definitions import Message
+from avow.ros.listing import Listed, Listing
 
 CALL_PARTS = ("Request", "Response", "Goal", "Result", "Feedback")
 _PARTS = {part: f"_{part.lower()}" for part in CALL_PARTS}
@@ -34,6 +35,55 @@ def part_topic(name: str, kind: str) -> str:
 def is_part(topic: str) -> bool:
     """Whether a topic is a part of calls: no publisher of ROS publishes it."""
     return topic.rpartition("/")[2] in (*_PARTS.values(), *_KINDS)
+
+
+def named(topic: str) -> str:
+    """What a contract calls the topic of a part of calls: the service or the action."""
+    return topic.rpartition("/")[0] if is_part(topic) else topic
+
+
+def with_calls(listing: Listing) -> Listing:
+    """A graph with the parts of its services' and actions' calls as topics, as far as their types are said; without the
+    topics by which an action works."""
+    types = {t: kind for t, kind in listing.types.items() if kind.partition("/")[0] not in _OWN_CALLS}
+    raw = {topic for topic, kind in types.items() if parts_of(topic, kind)}
+    parts: dict[str, str] = {}
+
+    def sides(names: tuple[str, ...], asked: tuple[str, ...], told: tuple[str, ...]) -> tuple[list[str], list[str]]:
+        found: tuple[list[str], list[str]] = ([], [])
+        for name in names:
+            for part, side in (*((p, 0) for p in asked), *((p, 1) for p in told)):
+                if name in types:
+                    found[side].append(f"{name}/{_PARTS[part]}")
+                    parts[found[side][-1]] = f"{types[name]}_{part}"
+        return found
+
+    nodes: list[Listed] = []
+    for node in listing.nodes:
+        (asked, told), (asks, hears) = sides(node.serves, *_SERVICE), sides(node.calls, *_SERVICE)
+        (goals, results), (sends, awaits) = sides(node.does, *_ACTION), sides(node.orders, *_ACTION)
+        said = [t for t in node.publishes if t not in raw]
+        heard = [t for t in node.subscribes if t not in raw]
+        # who is known by what a bag holds alone
+        ends = {(named(t), t.rpartition("/")[2]) for t in said if is_part(t)}
+        for whole, part in ends:
+            others = (
+                ("_result", "_feedback") if part == "_goal" else ("_goal",) if part in ("_result", "_feedback") else ()
+            )
+            heard += [f"{whole}/{other}" for other in others if f"{whole}/{other}" in types]
+        publishes, subscribes = (*said, *told, *asks, *results, *sends), (*heard, *asked, *hears, *goals, *awaits)
+        nodes.append(replace(node, publishes=_once(publishes), subscribes=_once(subscribes)))
+    return Listing(tuple(nodes), {**listing.types, **parts})
+
+
+def _once(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))
+
+
+_SERVICE = (("Request",), ("Response",))
+_ACTION = (("Goal",), ("Result", "Feedback"))
+_OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "roscpp", "nodelet")
+"""Packages of the services that every node of ROS has."""
 
 
 def is_service_part(topic: str) -> bool:

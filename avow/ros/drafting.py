@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from avow.ros.bags import message_of
+from avow.ros.calls import is_part, named
 from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Scalar, Wire
 from avow.ros.listing import Listed, Listing
 from avow.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
@@ -103,7 +104,9 @@ def draft(given: Given) -> Drafted:
 
 
 def is_plumbing(topic: str) -> bool:
-    """Whether a topic carries ROS's own business."""
+    """Whether a topic carries ROS's own business, or what a client saw of a call whose server's view is drafted."""
+    if is_part(topic):
+        return topic.endswith(("/_request_sent", "/_response_received"))
     return _PLUMBING.match(topic) is not None
 
 
@@ -120,9 +123,10 @@ class _Draft:
     def made(self) -> Drafted:
         nodes, dropped = self.nodes()
         topics = dict.fromkeys(t for n in nodes.values() for t in (*n.publishes, *n.subscribes) if not is_plumbing(t))
-        short = _short(topics, self.given.keywords)
+        spoken = {topic: topic.replace("/_", "_") if is_part(topic) else topic for topic in topics}
+        short = _short(spoken.values(), self.given.keywords)
         for topic in topics:
-            self.ports[topic] = tuple(self.of_topic(topic, short[topic]))
+            self.ports[topic] = tuple(self.of_topic(topic, short[spoken[topic]]))
         bodies = "\n".join(self.node(name, node) for name, node in nodes.items())
         context = "".join(f"  {name} : {what};\n" for name, what in self.types.items())
         head = (
@@ -250,9 +254,9 @@ class _Draft:
         for topic in topics:
             kind = self.given.listing.types.get(topic) or "unknown/Type"
             if not self.ports[topic]:
-                yield f"{kind} {topic}"
+                yield f"{kind} {named(topic)}"
             for port in self.ports[topic]:
-                yield f"{kind} {topic} matches({role}.{port.name})"
+                yield f"{kind} {named(topic)} matches({role}.{port.name})"
 
     def plan(self, nodes: Mapping[str, Listed], dropped: Mapping[str, str]) -> str:
         given = self.given
@@ -310,6 +314,8 @@ class _Draft:
     def answers(self, node: Listed) -> str:
         """By stamp where all that it hears and says is stamped."""
         topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
+        if all(map(is_part, topics)):
+            return "{by: call}"
         kinds = [self.given.known.get(self.given.listing.types.get(t, "")) for t in topics]
         stamped = all(kind is not None and kind.field("header") is not None for kind in kinds)
         return "{by: stamp}" if stamped else "{latency: 10 ms, jitter: 2 ms, because: …}"

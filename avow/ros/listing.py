@@ -25,13 +25,17 @@ class NoListing(Exception):  # noqa: N818 - it is what was found wrong
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A running node, by its whole name, and its topics and services, by theirs."""
+    """A running node, by its whole name, and its topics, services and actions, by theirs."""
 
     name: str
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
     serves: tuple[str, ...] = ()
     calls: tuple[str, ...] = ()
+    does: tuple[str, ...] = ()
+    """The actions that it serves."""
+    orders: tuple[str, ...] = ()
+    """The actions that it is a client of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +72,10 @@ _SIDES = {
     "services": "serves",
     "service servers": "serves",
     "service clients": "calls",
+    "action servers": "does",
+    "action clients": "orders",
 }
+EVERY_SIDE = tuple(dict.fromkeys(_SIDES.values()))
 
 
 def is_info(text: str) -> bool:
@@ -106,12 +113,14 @@ def parse_info(text: str) -> Listing:
 
 
 def _listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
-    return Listed(name, *(tuple(sides.get(side, ())) for side in ("publishes", "subscribes", "serves", "calls")))
+    return Listed(name, **{side: tuple(sides.get(side, ())) for side in EVERY_SIDE})
 
 
 def _of_json(text: str) -> Listing:
-    """``{"/a": {"publishers": {"/t": "std_msgs/Float64"}, "subscribers": {…}, "services": {…}, "clients": {…}}}``."""
+    """``{"/a": {"publishers": {"/t": "std_msgs/Float64"}, "subscribers": {…}, "services": {…}, "clients": {…},
+    "action servers": {…}, "action clients": {…}}}``."""
     words = {"publishers": "publishes", "subscribers": "subscribes", "services": "serves", "clients": "calls"}
+    words |= {"action servers": "does", "action clients": "orders"}
     try:
         data = json.loads(text)
         nodes: list[Listed] = []

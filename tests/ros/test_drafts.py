@@ -154,3 +154,53 @@ def test_names_of_a_graph_are_data(tmp_path: Path) -> None:
     loaded = load_system(run(tmp_path / "w", "--from-graph", str(tmp_path / "g.json"), "--distro", "noetic"))
     assert [node.name for node in loaded.contract.nodes] == ["node_"]
     assert [p.name for p in loaded.contract.nodes[0].outputs] == ["in_", "REAL_"]
+
+
+CALLS = """\
+/gripper
+  Service Servers:
+    /grip: std_srvs/srv/SetBool
+    /gripper/get_parameters: rcl_interfaces/srv/GetParameters
+    /odd: nobody/srv/Knows
+  Action Servers:
+    /spin: control/action/Spin
+/arm
+  Service Clients:
+    /grip: std_srvs/srv/SetBool
+"""
+
+
+def test_services_and_actions_of_a_graph_are_drafted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "graph.txt").write_text(CALLS, encoding="utf-8")
+    folder = tmp_path / "w"
+    done = CliRunner().invoke(init, [str(folder), "--from-graph", "graph.txt", "--distro", "humble"])
+    assert done.exit_code == 0, done.output
+    (folder,) = (path.parent for path in folder.rglob("system.rcl"))
+    text = (folder / "system.rcl").read_text(encoding="utf-8")
+    assert "std_srvs/SetBool_Request /grip matches(in.grip_request)" in text
+    assert "std_srvs/SetBool_Response /grip matches(out.grip_response_success)" in text
+    assert "control/Spin_Goal /spin" in text
+    assert "get_parameters" not in text
+    system = load_system(folder)
+    assert {str(edge) for edge in dataflow(system).edges} == {
+        "arm.grip_request → gripper.grip_request",
+        "gripper.grip_response_success → arm.grip_response_success",
+        "gripper.grip_response_message → arm.grip_response_message",
+    }
+    assert "{by: call}" in (folder / "plan.yaml").read_text(encoding="utf-8")
+    assert CliRunner().invoke(check, [str(folder)]).exit_code == 0
+
+
+def test_services_of_a_bag_are_drafted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rosmonitoring.test_calls import GO, RULE, write_calls  # type: ignore[import-not-found]
+
+    monkeypatch.chdir(tmp_path)
+    bag = write_calls(tmp_path / "calls", [(1, 1, 0.5), (2, 1, True)], f"{RULE}\nSRV: my_msgs/srv/Go\n{GO}", "MCAP")
+    done = CliRunner().invoke(init, [str(tmp_path / "w"), "--from-bag", bag.name])
+    assert done.exit_code == 0, done.output
+    (folder,) = (path.parent for path in (tmp_path / "w").rglob("system.rcl"))
+    text = (folder / "system.rcl").read_text(encoding="utf-8")
+    assert "my_msgs/Go_Request /go matches(in." in text
+    assert "my_msgs/Go_Response /go matches(out." in text
+    assert CliRunner().invoke(check, [str(folder)]).exit_code == 0

@@ -172,9 +172,11 @@ def test_an_edit_of_a_launch_file_is_another_question(tmp_path: Path) -> None:
 UNREAD = [
     APART.replace("<launch>", '<launch><remap from="t" to="$(env T)"/>'),
     APART.replace('name="a"', 'name="$(env A)"'),
-    '<launch><let name="x" value="y"/><include file="$(find-pkg-share other)/l.xml"/>'
-    '<node namespace="left" name="a" pkg="p" exec="a"/><node name="b" pkg="p" exec="b">'
-    '<remap from="u" to="/left/t"/></node></launch>',
+    (
+        '<launch><let name="x" value="y"/><include file="$(find-pkg-share other)/l.xml"/>'
+        '<node namespace="left" name="a" pkg="p" exec="a"/><node name="b" pkg="p" exec="b">'
+        '<remap from="u" to="/left/t"/></node></launch>'
+    ),
 ]
 
 
