@@ -8,7 +8,7 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
@@ -56,14 +56,15 @@ class Monitor:
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     _previous: list[tuple[str, str]] = field(default_factory=list)
-    _clauses: dict[str, list[Watched]] = field(default_factory=dict)
+    clauses: dict[str, list[Watched]] = field(default_factory=dict)
+    """Those that are judged when a variable is published."""
     _assumptions: list[Watched] = field(default_factory=list)
     timing: Timing = field(init=False)
     pairing: Pairing | None = None
     """Answers and the inputs that they are held against; None: the latest."""
     _paired: frozenset[str] = frozenset()
     """The observed inputs."""
-    _assumed: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
     """What the assumptions speak of."""
     backwards: str = ""
     """Where the events' times contradict the order in which they came, though the plan goes by that order."""
@@ -83,10 +84,10 @@ class Monitor:
         self._observe()
         answers = self.setup.answers
         self._paired = self.setup.heard
+        spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
+        self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         if answers is not None and answers.by != "arrival":
             self.pairing = Pairing(answers)
-            spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
-            self._assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         elif remembers(self.setup.node):
             self._so_far = SoFar()
         wanted = None if self.guarantees is None else set(self.guarantees)
@@ -130,8 +131,7 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
-        if readers and self.setup.shared:
-            readers = self._own(readers, event)
+        readers = self._own(readers, event) if readers and self.setup.shared else readers
         names = [name for name, _ in readers or ()]
         found = self.tick(event, set(names))
         if readers is None or not isinstance(topic, str):
@@ -162,7 +162,7 @@ class Monitor:
                     self._forget(name)
                     if pairing is not None and name in self._paired:
                         pairing.saw(name, event, None, self.at[name][0])
-                unreadable |= {id(watched): watched for watched in self._clauses.get(name, ())}
+                unreadable |= {id(watched): watched for watched in self.clauses.get(name, ())}
                 continue
             self._supposed.discard(name)
             updated.append(name)
@@ -177,7 +177,7 @@ class Monitor:
             watched.tally.published += 1
             watched.tally.unreadable += 1
         for watched in self._due(updated, event, found):
-            if watched.paired:
+            if watched.paired or self._accused(watched, event):
                 self._ask(watched, event)
             else:
                 watched.tally.aged({n: self.timing.heard[n] for n in watched.inputs if n in self.timing.heard}, event)
@@ -192,7 +192,7 @@ class Monitor:
     def _own(self, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
         """Those of variables that a message carries, whoever else publishes its topic."""
         unknown = [name for name, _ in readers if self.setup.whose(name, event) is None]
-        for watched in {id(w): w for name in unknown for w in self._clauses.get(name, ())}.values():
+        for watched in {id(w): w for name in unknown for w in self.clauses.get(name, ())}.values():
             watched.tally.unnamed(str(event["topic"]))
             self._lose(watched)
         return [(name, read) for name, read in readers if self.setup.whose(name, event)]
@@ -234,15 +234,6 @@ class Monitor:
         """The variables that a topic's messages carry."""
         return tuple(name for name, _ in self._readers.get(same_topic(topic), ()))
 
-    def triggered_by(self, name: str) -> Sequence[Watched]:
-        """The clauses that are judged when a variable is published."""
-        return self._clauses.get(name, ())
-
-    @property
-    def assumed(self) -> tuple[str, ...]:
-        """What the assumptions speak of."""
-        return tuple(dict.fromkeys(name for watched in self._assumptions for name in watched.names))
-
     def caught_up(self, event: Mapping[str, Any], place: int) -> None:
         """Take over the latest of some events of one topic that could all be read."""
         topic = same_topic(str(event["topic"]))
@@ -263,7 +254,7 @@ class Monitor:
         if self.pairing is not None:
             self._settle(self.pairing.ready(None), found)
             self.backwards = self.backwards or self.pairing.uneven()
-        for watched in {id(w): w for all_ in self._clauses.values() for w in all_}.values():
+        for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
             if watched.fresh:
                 parts = list(watched.fresh.values())
                 watched.fresh.clear()
@@ -275,15 +266,27 @@ class Monitor:
                 watched.only_supposed()
         return found
 
+    def _accused(self, watched: Watched, event: Mapping[str, Any]) -> bool:
+        """Whether a guarantee about outputs alone is broken, of a node that assumes something of its inputs: whose
+        fault it is hangs on what the answer answered."""
+        if self.pairing is None or not watched.outputs or self._paired.isdisjoint(self.assumed):
+            return False
+        values = {**self.values, **watched.memory} if watched.held else self.values
+        known = all(name in values and name not in self._supposed for name in watched.names)
+        if known and watched.truth_of(values, self.solver) is False:
+            return True
+        self.pairing.ask((watched, {}), event, self.events, {}, (), waits=False)  # it counts among the answers
+        return False
+
     def _ask(self, watched: Watched, event: Mapping[str, Any]) -> None:
         """An answer, which will be judged once it is known what it may have answered."""
         assert self.pairing is not None
         values = {**self.values, **watched.memory} if watched.held else self.values
-        own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
+        own = [n for n in (*watched.names, *self.assumed) if n not in self._paired]
         early = any(n not in values or n in self._supposed for n in watched.names if n not in self._paired)
         watched.tally.early += early
         known = {n: values[n] for n in own if n in values}
-        inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self._assumed if n in self._paired))))
+        inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self.assumed if n in self._paired))))
         inputs = tuple(n for n in inputs if n in watched.paired or n in self.pairing.seen)
         about = (watched, self._heard(watched.outputs))
         self.pairing.ask(about, event, self.events, known, inputs, waits=not early)
@@ -336,7 +339,7 @@ class Monitor:
         anew before the answer is whole is judged by itself."""
         touched: dict[int, tuple[Watched, list[str]]] = {}
         for name in updated:
-            for watched in self._clauses.get(name, ()):
+            for watched in self.clauses.get(name, ()):
                 touched.setdefault(id(watched), (watched, []))[1].append(name)
         due: list[Watched] = []
         for watched, names in touched.values():
@@ -417,7 +420,7 @@ class Monitor:
         if watched.steps is not None:
             self._remembering.append(watched)
         for name in triggers:
-            self._clauses.setdefault(name, []).append(watched)
+            self.clauses.setdefault(name, []).append(watched)
         if not triggers:
             self._constant.append(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
@@ -493,5 +496,5 @@ class Monitor:
     def failing(self) -> bool:
         """Whether an assumption does not hold of the values that are known now."""
         self.catch_up()
-        known = (a for a in self._assumptions if a.steps is None and all(name in self.values for name in a.names))
+        known = (a for a in self._assumptions if a.steps is None and self.values.keys() >= set(a.names))
         return any(assumed.truth_of(self.values, self.solver) is False for assumed in known)

@@ -73,7 +73,7 @@ def plan_of(watch: Watch, topic: str) -> Plan | None:
     names = monitor.carried(topic)
     if not names or not monitor.by_values or not monitor.setup.shared.keys().isdisjoint(names):
         return None
-    due: dict[int, Watched] = {id(w): w for name in names for w in monitor.triggered_by(name)}
+    due: dict[int, Watched] = {id(w): w for name in names for w in monitor.clauses.get(name, ())}
     for watched in due.values():
         if watched.held or watched.paired or not watched.outputs <= set(names):
             return None

@@ -56,7 +56,7 @@ def test_rosnode_info() -> None:
 
 def test_ros2_node_info() -> None:
     found = parse_listing(ROS2)
-    assert found.nodes == (Listed("/robot1/sensor", ("/robot1/status",), ("/r",), ("/reset",), ("/go",)),)
+    assert found.nodes == (Listed("/robot1/sensor", ("/robot1/status",), ("/r",), ("/reset",), ("/go",), ("/spin",)),)
     assert found.types["/r"] == "std_msgs/Float64"
     assert found.types["/reset"] == "std_srvs/Empty"
 
