@@ -13,9 +13,8 @@ from pathlib import Path
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
 
-from . import promela, psl
+from . import promela, psl, spin_tool
 from .checker import Checker, Property
-from .spin_tool import version
 from .tuning import SPIN_DEPTH
 
 _ERRORS = re.compile(r"errors: (\d+)")
@@ -31,7 +30,7 @@ class NoOpinion(Exception):  # noqa: N818 - it names a state, not a fault
 
 def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:
     """Key → whether the property holds, says Spin. Raises NoOpinion."""
-    if version() is None:
+    if spin_tool.version() is None:
         raise NoOpinion("spin or gcc is not installed")
     try:
         files = _translated(checker, properties)

@@ -10,7 +10,7 @@ from helpers import some
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin
+from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin_tool
 from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.backends.ajpf.asking import ask
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
@@ -201,7 +201,7 @@ def test_spin_knows_the_fairness_assumptions(lift, tmp_path):
 
 
 def test_spin_missing_is_no_second_opinion(lift, tmp_path, monkeypatch):
-    monkeypatch.setattr(spin, "version", lambda: None)
+    monkeypatch.setattr(spin_tool, "version", lambda: None)
     report = BACKEND.discharge(lift({"engine": "auto"}), tmp_path, Limits(seconds=60))
     assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
     assert "Spin" not in report.tool
@@ -246,7 +246,7 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
 @pytest.mark.needs_ajpf
 def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
     job = lift({"engine": "auto", "semantics": "mcapl"})
-    monkeypatch.setattr(spin, "version", lambda: None)
+    monkeypatch.setattr(spin_tool, "version", lambda: None)
     report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
     assert answers.verdict is Verdict.REFUTED
@@ -259,7 +259,7 @@ def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
 @pytest.mark.needs_ajpf
 def test_a_run_that_ail_does_not_do_is_no_refutation(lift, tmp_path, monkeypatch):
     """A seeded fault: our interpreter takes initial beliefs for granted that AIL does not have."""
-    monkeypatch.setattr(spin, "version", lambda: None)
+    monkeypatch.setattr(spin_tool, "version", lambda: None)
     monkeypatch.setattr(
         replay, "program_text", lambda agents: program_text([replace(agent, beliefs=()) for agent in agents])
     )
