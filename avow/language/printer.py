@@ -211,7 +211,7 @@ class _Printer:
         if phrase is not None:
             shown = [self.show(each, COMPARE) for each in term.arguments]
             limited = self.style.phrases.get(f"{term.operator} limited", phrase) if limit else phrase
-            return limited.format(*shown, limit=limit.strip("[]")), NOT
+            return limited.format(*shown, limit=limit.strip("[]")), OR  # `not a for 3 steps` would be read both ways
         name = self.style.past(term.operator)
         if term.operator in (Past.SINCE, Past.UNTIL):
             left, right = (self.show(each, NOT) for each in term.arguments)

@@ -218,3 +218,42 @@ def test_what_is_printed_reads_back(seed: int) -> None:
             assert show_term(clause.formula, "rcl") == show_term(term, "rcl")
             assert digest(clause.formula) == digest(term)
             assert bool(histories(clause.formula)) == bool(histories(term))
+
+
+def test_the_smtlib_script_is_one_step_of_any_run() -> None:
+    """With the cells at their first values it has exactly the first steps that keep the clauses; what a step leaves is
+    what the cells have next."""
+    import z3
+
+    from avow.solving.contract_smtlib import to_smtlib
+
+    rng = random.Random(5)
+    for _ in range(20):
+        said = formula(rng, 2)
+        ports = "inputs( a : BOOL, n : NATURAL ) outputs( b : BOOL ) topics()"
+        text = f"node n {{ {ports} guarantee g ( {show_term(said, 'rcl')} ) }}"
+        contract, found = check_text(text, "n.rcl")
+        assert contract is not None, found
+        node = compiler.compile_node(contract.nodes[0])
+        script = z3.parse_smt2_string(to_smtlib(contract))
+        first = {c.name: evaluate(c.initial, {}) for c in node.cells if c.initial is not None}
+        for a, b, n in ((a, b, n) for a in (False, True) for b in (False, True) for n in (0, 2)):
+            given = {"in.a": a, "out.b": b, "in.n": n} | {f"in.{name}": v for name, v in first.items()}
+            solver = z3.Solver()
+            solver.add(script)
+            for name, v in given.items():
+                solver.add((z3.Bool(name) if isinstance(v, bool) else z3.Int(name)) == v)
+            held = value(contract.nodes[0].guarantees[0].formula, [{"in.a": a, "out.b": b, "in.n": n}], 0)
+            assert (solver.check() == z3.sat) is held, text
+
+
+def test_english_is_read_one_way() -> None:
+    clauses = "guarantee g ( not held[2 steps](a) and once(not b or a) )"
+    clauses += " guarantee h ( held[2 steps](not a) -> within[3 steps](b) )"
+    contract, _ = check_text(f"node n {{ inputs( a : BOOL ) outputs( b : BOOL ) topics() {clauses} }}", "n.rcl")
+    assert contract is not None
+    shown = [show_term(c.formula, "text") for c in contract.nodes[0].guarantees]
+    assert shown == [
+        "not (in.a for 2 steps already) and ((not out.b or in.a) at some step up to now)",
+        "(not in.a) for 2 steps already implies out.b within 3 steps",
+    ]
