@@ -14,6 +14,7 @@ from itertools import chain
 
 from avow.base.diagnostics import Severity
 from avow.base.files import digest as sha256
+from avow.base.remembered import by_identity
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.variables import Frame, indexed
 from avow.formulas.formula import digest, free_variables
@@ -90,7 +91,10 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
     about = f"{node.name}.{clause.name}"
     given = {(e.source.node, int(e.delayed)): whole.promised(e.source.node, int(e.delayed)) for e in edges}
     goal = whole.clause(node.name, clause.name)
-    assumed = {about: goal} | _bearing(whole, free_variables(goal).union(*(p.speaking for p in given.values())))
+    spoken = free_variables(goal)
+    if whole.environment() or whole.blank():  # of many consumers each would go through all that the provider promises
+        spoken = spoken.union(*(p.speaking for p in given.values()))
+    assumed = {about: goal} | _bearing(whole, spoken)
     providers = tuple(dict.fromkeys(provider for provider, _ in given))
     names = " and ".join(providers)
     verb = "guarantees" if len(providers) == 1 else "guarantee"
@@ -99,14 +103,19 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
         clause.name,
         f"What {names} {verb} can meet assumption {clause.name} of {node.name}.",
         show_term(clause.formula),
-        (about, *(f"{p}.{g.name}" for p in providers for g in whole.node(p).guarantees)),
+        (about, *chain.from_iterable(_guarantees(whole.node(p)) for p in providers)),
         Severity.ERROR,
         clause.span,
     )
-    spoken = free_variables(goal).union(*(free_variables(f) for p in given.values() for f in p.terms.values()))
-    first = {label: fact for label, fact in whole.blank().items() if free_variables(fact) & spoken}
+    first = {label: fact for label, fact in whole.blank().items() if not spoken.isdisjoint(free_variables(fact))}
     meaning = _meaning({**assumed, **first}, (p.digest for p in given.values()))
     return ProviderClaim(claim, meaning, assumed, tuple(p.terms for p in given.values()), first)
+
+
+@by_identity(20_000)
+def _guarantees(node: Node) -> tuple[str, ...]:
+    """The names of what many others may read."""
+    return tuple(f"{node.name}.{clause.name}" for clause in node.guarantees)
 
 
 def _meaning(assumed: Mapping[str, Term], promised: Iterable[str]) -> str:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from avow.base.diagnostics import Span
+from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
 
@@ -76,18 +78,18 @@ class Node:
 
     def clause(self, name: str) -> Clause:
         """The clause of that name. Raises KeyError."""
-        for clause in self.clauses:
-            if clause.name == name:
-                return clause
-        raise KeyError(name)
+        found: Clause = _named(self.assumptions, self.guarantees)[name]
+        return found
 
     def input(self, name: str) -> Port:
         """The input of that name. Raises KeyError."""
-        return _port(self.inputs, name)
+        found: Port = _named(self.inputs, ())[name]
+        return found
 
     def output(self, name: str) -> Port:
         """The output of that name. Raises KeyError."""
-        return _port(self.outputs, name)
+        found: Port = _named(self.outputs, ())[name]
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +110,7 @@ class Contract:
         raise KeyError(name)
 
 
-def _port(ports: tuple[Port, ...], name: str) -> Port:
-    for port in ports:
-        if port.name == name:
-            return port
-    raise KeyError(name)
+@by_identity(20_000)
+def _named(first: tuple[Any, ...], then: tuple[Any, ...]) -> dict[str, Any]:
+    """By name: a node may have thousands of ports, each of which is looked up. The first of a name counts."""
+    return {each.name: each for each in (*reversed(then), *reversed(first))}

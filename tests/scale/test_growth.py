@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -62,3 +63,28 @@ def test_the_closest_facts_are_those_about_the_goal_and_bounds_of_what_these_spe
     for part in split:
         (fact,) = part.terms.values()
         assert set(part.speaking) == set(free_variables(fact))
+
+
+def calls(work: Callable[[], object]) -> int:
+    """How many functions are called: the same on every machine."""
+    found = 0
+
+    def count(frame: object, event: str, argument: object) -> None:
+        nonlocal found
+        found += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        work()
+    finally:
+        sys.setprofile(before)
+    return found
+
+
+@pytest.mark.parametrize("shape", [chain, fan])
+def test_four_times_the_nodes_list_in_at_most_five_times_the_steps(tmp_path: Path, shape: Callable[[int], str]) -> None:
+    first, small, large = (made(tmp_path, shape(count)) for count in (3, 20, 80))
+    catalogue(first)  # what is done once
+    less, more = (calls(lambda: catalogue(system)) for system in (small, large))  # noqa: B023
+    assert more <= 5 * less, (less, more)
