@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from avow.language.contract import Clause, Node
 from avow.language.terms import histories
-from avow.temporal.cells import Records, Unsaid
+from avow.temporal.cell import Unsaid
+from avow.temporal.cells import Records
 
 
 def unsaid(judge: str, node: Node, clause: Clause, *, functions: bool = False) -> str | None:

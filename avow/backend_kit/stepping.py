@@ -37,7 +37,8 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.temporal.cells import Cell, Records, Unsaid, written
+from avow.temporal.cell import Cell, Unsaid
+from avow.temporal.cells import Records, written
 from avow.tuning.bounds import COUNTS_GUESSED
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)

@@ -323,6 +323,14 @@ _SORTS = (
         "with `<=`, `<`, `>=` or `>`; the others have none.",
         "guarantee(held(in.level > 3) -> out.status == high)",
     ),
+    Code(
+        "RCL324",
+        "events and the time between steps",
+        "`arrived(in.scan)` is of an input of the node; `rose`, `fell` and `changed` are of steps, and what has a "
+        "limit in seconds may change between them; `steps(every 20 ms)` and `steps(at most 100 ms)` are guarantees of "
+        "their own.",
+        "guarantee(rose(once[2 s](in.level > 3)) -> out.status == high)",
+    ),
 )
 
 

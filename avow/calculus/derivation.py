@@ -14,7 +14,7 @@ from enum import StrEnum
 from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
 from avow.system.graph import Edge
-from avow.temporal.cells import CELL
+from avow.temporal.cell import CELL
 
 
 class Rule(StrEnum):

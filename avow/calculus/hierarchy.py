@@ -82,6 +82,7 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
         flat.own_inputs,
         flat.constants,
         flat.cells,
+        flat.shared,
         nodes,
         flat=flat,
         faces=folded.faces,

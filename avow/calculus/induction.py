@@ -21,7 +21,7 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
-from avow.temporal.cells import CELL
+from avow.temporal.cell import CELL
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
 from avow.tuning.effort import QUICK_EFFORT
 from avow.tuning.shown import STEP_VARIABLES

@@ -28,7 +28,7 @@ from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
-from avow.temporal.cells import CELL
+from avow.temporal.cell import CELL
 
 
 @dataclass(frozen=True, slots=True)

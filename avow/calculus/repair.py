@@ -41,7 +41,7 @@ from avow.solving.limits import spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
-from avow.temporal.cells import CELL
+from avow.temporal.cell import CELL
 from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
 from avow.tuning.effort import OFFER_STEP_EFFORT, OFFERS_EFFORT
 

@@ -33,8 +33,10 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.language.terms import Literal
 from avow.system.names import ports_named
-from avow.system.plan import Scenario
+from avow.system.plan import STEP_LENGTH, Scenario
+from avow.temporal.clock import pace_of
 from avow.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.tuning.shown import DOMAIN_VALUES
 
@@ -63,6 +65,25 @@ class World:
         if table is not None:
             return (self.interpreted(port.sort, *table),)
         return self.values(f"{node}.{port.name}", ("in", node), port)
+
+    def lengths(self) -> tuple[Fraction, ...]:
+        """How long steps may take, in seconds: those of ``scenario.domains.dt`` or, without, the nodes' own, and half
+        of them. Raises CannotRun."""
+        paces = [pace for node in self.frame.system.contract.nodes if (pace := pace_of(node)) is not None]
+        limits = [(p.relation, Fraction(p.amount.value)) for p in paces if isinstance(p.amount, Literal)]
+        texts = self.scenario.domains.get(STEP_LENGTH)
+        if texts is not None:
+            tried = [t for text in texts if isinstance(t := self.parse(text, REAL), Fraction)]
+        else:
+            tried = [part for relation, most in limits for part in ((most,) if relation == "==" else (most / 2, most))]
+        found = tuple(
+            dict.fromkeys(
+                t for t in tried if t > 0 and all(t == most if r == "==" else t <= most for r, most in limits)
+            )
+        )
+        if not found:
+            raise CannotRun(f"how long a step takes is not said; give scenario.domains: {{{STEP_LENGTH}: …}}")
+        return found
 
     def candidates(self, node: str, port: Port) -> tuple[Value, ...]:
         """The values that are tried for an output that is not a function. Raises CannotRun."""
@@ -247,6 +268,8 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
             if not said and port.sort not in world.domains and _is_sampled(world, port.sort):
                 text = f"scenario: {node.name}.{port.name} has one of the values that are tried"
                 found.append(bound(f"scenario.values.{node.name}.{port.name}", text))
+    if world.frame.timed and STEP_LENGTH not in scenario.domains:
+        found.append(bound("scenario.values.dt", "scenario: the time between steps is one that is tried"))
     return tuple(dict.fromkeys(found))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, product
+from itertools import product
 from random import Random
 
 from avow.base.graphs import components, cycles_in
@@ -28,7 +28,9 @@ from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
-from avow.temporal.cells import CELL, Cell
+from avow.temporal.ages import CLOCK
+from avow.temporal.cell import CELL, Cell
+from avow.temporal.clock import is_arrival
 from avow.tuning.bounds import NODE_ANSWERS
 from avow.tuning.effort import SEARCH_STEPS
 
@@ -86,10 +88,7 @@ class Machine:
         self.constants: list[str] = []
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
-        self.cells = {
-            label.removeprefix("memory "): self._kept(label, cell)
-            for label, cell in zip(self.frame.memory(), chain(*self.frame.cells.values()), strict=True)
-        }
+        self.cells = {f"{node}.{cell.name}": self._kept(node, cell) for node, cell in self.frame.own_cells()}
         """What each step leaves to the next of what clauses remember."""
         self.freed = {node: f"{node}.broken{CELL}" for node in self.frame.cells}
         """Whether an assumption of a node that remembers has been broken: it promises nothing from then on."""
@@ -158,6 +157,11 @@ class Machine:
             entry = self.frame.entry(endpoint.node, endpoint.port)
             if entry in self.frame.constants and variable.qualified not in self.constants:
                 self.constants.append(variable.qualified)
+        if self.frame.timed:
+            names[CLOCK.qualified] = self.world.lengths()
+        for name in self.frame.cells:
+            arrivals = (port.variable for port in self.frame.node(name).inputs if is_arrival(port.variable))
+            names.update((self.frame.input(name, v.name).qualified, (False, True)) for v in arrivals)
         facts = [
             judge(self.world, term, doubts=self.doubts, about=label) for label, term in self.frame.environment().items()
         ]
@@ -240,9 +244,8 @@ class Machine:
         self._begun.append((endpoint, condition, given, found))
         return found
 
-    def _kept(self, label: str, cell: Cell) -> _Kept:
+    def _kept(self, node: str, cell: Cell) -> _Kept:
         """Raises CannotRun for what cannot be computed step by step."""
-        node = label.removeprefix("memory ").partition(".")[0]
         if cell.parameters or cell.initial is None:
             raise CannotRun(f"{node} remembers something for each of many values, or of an unspecified type")
         now = compile_term(substitute(cell.now, self.frame.mapping(node)))

@@ -13,13 +13,16 @@ from avow.base.files import digest as sha256
 from avow.formulas.formula import digest, free_variables, substitute
 from avow.language.contract import Node, Port
 from avow.language.printer import show_sort
-from avow.language.sorts import Sort
+from avow.language.sorts import BOOL, REAL, Sort
 from avow.language.terms import TRUE, Role, Term, Variable
 from avow.system.folding import leaves, own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
-from avow.temporal.cells import Cell, compile_node, remembers
+from avow.temporal.ages import CLOCK
+from avow.temporal.cell import CELL, Cell
+from avow.temporal.cells import compile_node, remembers
+from avow.temporal.clock import GOES_ON, compile_timed, events, longest_limit, one_pace
 
 SUFFIXES = ("", "@before", "@before@before")
 """Now, one step earlier, two steps earlier."""
@@ -89,6 +92,10 @@ class Frame:
     cells: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
     """Node → what its clauses remember; each is an input of the node, by the cell's name."""
 
+    shared: dict[str, str] = field(default_factory=dict)
+    """A cell (``log.earliest#…``) that keeps what another does → that one: where time matters, several nodes may look
+    at the age of the same."""
+
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
     _terms: dict[tuple[str, str, int], Term] = field(default_factory=dict)
@@ -157,7 +164,9 @@ class Frame:
         edge = self.graph.by_target.get(Endpoint(node, port))
         cell = next((cell for cell in self.cells.get(node, ()) if cell.name == port), None)
         if cell is not None:
-            return system_variable(f"{node}.{port}", cell.sort, earlier + 1)
+            return system_variable(self.keeper(node, port), cell.sort, earlier + 1)
+        if edge is None and port.endswith(CELL) and port != CLOCK.name:  # a message's arrival
+            return system_variable(f"{node}.{port}", BOOL, earlier)
         if edge is None:
             sort = self.node(node).input(port).sort
             entry = self.entry(node, port)
@@ -170,6 +179,32 @@ class Frame:
             return Variable(Role.INPUT, port + SUFFIXES[earlier], sort)
 
         return self.output(edge.source.node, edge.source.port, earlier + (1 if edge.delayed else 0))
+
+    def keeper(self, node: str, cell: str) -> str:
+        """The name of the cell that keeps what a cell of a node does."""
+        return self.shared.get(f"{node}.{cell}", f"{node}.{cell}")
+
+    def own_cells(self) -> tuple[tuple[str, Cell], ...]:
+        """Every cell, each kept once, with its node."""
+        found = ((node, cell) for node, cells in self.cells.items() for cell in cells)
+        return tuple((node, cell) for node, cell in found if f"{node}.{cell.name}" not in self.shared)
+
+    def share(self) -> None:
+        """Cells that begin and go on alike are one."""
+        kept: dict[str, str] = {}
+        for node, cells in self.cells.items():
+            for cell in cells:
+                itself = Variable(Role.BOUND, "kept", cell.sort)
+                read = {v: self.input(node, v.name) for v in free_variables(cell.now) if v.role is Role.INPUT}
+                read |= {v: self.output(node, v.name) for v in free_variables(cell.now) if v.role is Role.OUTPUT}
+                now = substitute(cell.now, {**read, cell.before: itself})
+                names = "" if cell.initial is None else digest(cell.initial)
+                meaning = f"{digest(now)} {names} {len(cell.parameters)} {show_sort(cell.sort)}"
+                if (
+                    kept.setdefault(meaning, f"{node}.{cell.name}") != f"{node}.{cell.name}"
+                    and cell.initial is not None
+                ):
+                    self.shared[f"{node}.{cell.name}"] = kept[meaning]
 
     def entry(self, node: str, port: str) -> str:
         """What the plan calls an input from the environment: ``in.map``, or ``planner.map`` where it is set apart."""
@@ -188,21 +223,28 @@ class Frame:
     def memory(self, earlier: int = 0) -> dict[str, Term]:
         """What each step leaves to the next, as functions of its values, labelled ``memory navigation.once#…``."""
         suffix = " one step before" if earlier else ""
-        return {
+        found = {
             f"memory {node}.{cell.name}{suffix}": substitute(
                 cell.leaves(after := Variable(Role.BOUND, f"{node}.{cell.name} now", cell.sort)),
                 {**self.mapping(node, earlier), after: system_variable(f"{node}.{cell.name}", cell.sort, earlier)},
             )
-            for node, cells in self.cells.items()
-            for cell in cells
+            for node, cell in self.own_cells()
         }
+        for node in self.timed[:1]:
+            clock = Variable(Role.INPUT, CLOCK.name + SUFFIXES[earlier], REAL)
+            found[f"memory {node}.{CLOCK.name}{suffix}"] = substitute(GOES_ON, {CLOCK: clock})
+        return found
+
+    @property
+    def timed(self) -> tuple[str, ...]:
+        """The nodes to whose clauses the time between steps matters."""
+        return tuple(n for n in self.cells if any(port.variable == CLOCK for port in self.node(n).inputs))
 
     def blank(self) -> dict[str, Term]:
         """What is remembered before the first step."""
         return {
             f"initial {node}.{cell.name}": substitute(cell.begins(), self.mapping(node))
-            for node, cells in self.cells.items()
-            for cell in cells
+            for node, cell in self.own_cells()
             if cell.initial is not None
         }
 
@@ -251,18 +293,24 @@ def frame(system: System) -> Frame:
     inside = {name for held in leaves(system.plan).values() for name in held}
     nodes: dict[str, Node] = {}
     cells: dict[str, tuple[Cell, ...]] = {}
+    together = one_pace(system.contract.nodes)
+    longest = longest_limit(c.formula for n in system.contract.nodes for c in n.clauses)
     for node in system.contract.nodes:
         nodes[node.name] = node
         # a subsystem's derived contract has no memory of its own: what speaks of other steps stays so, and open
         if remembers(node) and node.name not in inside:
-            made = compile_node(node)
-            ports = tuple(Port(Role.INPUT, c.name, c.sort, show_sort(c.sort)) for c in made.cells)
+            made = compile_timed(node, longest) if together else compile_node(node)
+            read = (*made.before, *events(made))
+            ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
             # a promise that has no formula of one step is no hypothesis; an assumption that has none stays, and open
             kept = tuple(replace(g, formula=TRUE) if g.name in made.unsaid else g for g in made.node.guarantees)
             nodes[node.name] = replace(made.node, inputs=(*node.inputs, *ports), guarantees=kept)
             cells[node.name] = made.cells
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
-    return Frame(system, graph, environment_assumptions(system, graph), own, constants, cells, nodes)
+    made_of = Frame(system, graph, environment_assumptions(system, graph), own, constants, cells, {}, nodes)
+    if made_of.timed:
+        made_of.share()
+    return made_of
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:

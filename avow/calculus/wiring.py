@@ -14,6 +14,8 @@ from avow.kernel.statements import Kind, Place, Wiring
 from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
 from avow.system.temporal import parse_state
+from avow.temporal.ages import CLOCK
+from avow.temporal.clock import GOES_ON, is_arrival
 
 
 def wiring(frame: Frame) -> Wiring:
@@ -28,12 +30,12 @@ def wiring(frame: Frame) -> Wiring:
                 initials[edge.source.node, edge.source.port] = condition
     plan += [(Kind.ENVIRONMENT, a.node, a.port, a.formula) for a in frame.assumed]
     plan += [(Kind.INITIAL, node, port, term) for (node, port), term in initials.items()]
-    for name, cells in frame.cells.items():
-        for cell in cells:
-            own = Variable(Role.OUTPUT, cell.name, cell.sort)
-            plan.append((Kind.DEFINITION, name, cell.name, cell.leaves(own)))
-            if cell.initial is not None:
-                plan.append((Kind.INITIAL, name, cell.name, cell.begins(own)))
+    for name, cell in frame.own_cells():
+        own = Variable(Role.OUTPUT, cell.name, cell.sort)
+        plan.append((Kind.DEFINITION, name, cell.name, cell.leaves(own)))
+        if cell.initial is not None:
+            plan.append((Kind.INITIAL, name, cell.name, cell.begins(own)))
+    plan += [(Kind.DEFINITION, name, CLOCK.name, GOES_ON) for name in frame.timed[:1]]
     for r in system.plan.requirements:
         if r.formula is not None:
             plan.append((Kind.REQUIREMENT, "", r.id, parse_state(r.formula, system.contract, r.formula_span)))
@@ -60,8 +62,18 @@ def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
     for at in frame.graph.environment:
         name, sort = frame.entry(at.node, at.port), frame.node(at.node).input(at.port).sort
         found[Role.INPUT, at.node, at.port] = Place(name, None, 0, sort, name in frame.constants)
+    for node in frame.cells:
+        for event in (port.variable for port in frame.node(node).inputs):
+            if event == CLOCK or is_arrival(event):
+                name = CLOCK.name if event == CLOCK else f"{node}.{event.name}"
+                found[Role.INPUT, node, event.name] = Place(f"in.{name}", None, 0, event.sort)
     for node, cells in frame.cells.items():
         for cell in cells:
+            if (keeper := frame.shared.get(f"{node}.{cell.name}")) is not None:
+                other, _, kept = keeper.partition(".")
+                for role in (Role.OUTPUT, Role.INPUT):
+                    found[role, node, cell.name] = found[role, other, kept]
+                continue
             read = (found[v.role, node, v.name] for v, _ in frame.behind(node, cell.now))
             owner = node if any(place.node for place in read) else ""
             found[Role.OUTPUT, node, cell.name] = Place(f"{node}.{cell.name}", owner, 0, cell.sort)

@@ -26,6 +26,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     Code 1 where the system gets stuck: a node has no answer that its contract allows. Code 2 without a usable scenario.
     """
     from dataclasses import replace
+    from fractions import Fraction
     from random import Random
 
     from avow.base.diagnostics import Diagnostic, Rejected
@@ -35,6 +36,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     from avow.calculus.variables import frame
     from avow.formulas.values import show
     from avow.system.load import load_path
+    from avow.temporal.ages import CLOCK
     from avow.tuning.bounds import WALKS
 
     loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
@@ -52,21 +54,26 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
         raise Rejected(Diagnostic("CLI006", f"{loaded.name} cannot be run: {reason}")) from None
     given = [values for choices in machine.environment.values() for values in choices]
     fixed = {name for name in given[0] if all(values[name] == given[0][name] for values in given)}
-    names = [name for name in given[0] if everything or name not in fixed]
+    names = [name for name in given[0] if (everything or name not in fixed) and name != CLOCK.qualified]
     names += [f"{node}.{port.name}" for node in machine.order for port in loaded.contract.node(node).outputs]
+    now = Fraction(0)
     for number, step in enumerate(walk.steps, start=1):
+        if number > 1 and machine.frame.timed:
+            now += Fraction(str(step.values[CLOCK.qualified]))
+        at = {"time": float(now)} if machine.frame.timed else {}
         values = {name: show(step.values[name]) for name in names}
         if as_json:
-            click.echo(json.dumps({"step": number, "values": values, "broken": list(step.broken)}, ensure_ascii=False))
+            told = {"step": number, **at, "values": values, "broken": list(step.broken)}
+            click.echo(json.dumps(told, ensure_ascii=False))
             continue
-        click.echo(f"step {number}")
+        click.echo(f"step {number}" + (f", at {show(now)} s" if at else ""))
         width = max(map(len, values))
         for name, value in values.items():
             click.echo(f"  {name:{width}}  {value}")
         for clause in step.broken:
             click.echo(f"  the assumption {clause} does not hold")
     if walk.stuck is not None:
-        told = walk.stuck.text()
-        click.echo(json.dumps({"stuck": told}, ensure_ascii=False) if as_json else f"stuck: {told}")
+        why = walk.stuck.text()
+        click.echo(json.dumps({"stuck": why}, ensure_ascii=False) if as_json else f"stuck: {why}")
         return 1
     return 0

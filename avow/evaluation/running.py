@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.values import Value
-from avow.temporal.cells import Cell
+from avow.temporal.cell import Cell
 
 
 class Keeper:

@@ -16,14 +16,28 @@ from avow.language.syntax import (
     Lasting,
     Limited,
     LimitSyntax,
+    Name,
     Number,
+    PaceSyntax,
     Quantification,
     Quantity,
     Sign,
     TermSyntax,
     unparenthesised,
 )
-from avow.language.terms import RESPONSES, Arithmetic, History, Limit, Literal, Past, Quantifier, Term
+from avow.language.terms import (
+    RESPONSES,
+    Arithmetic,
+    History,
+    Limit,
+    Literal,
+    Past,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    timed,
+)
 
 _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
 _PLACE = "a response stands as the whole right side of a clause's outermost `->`, or is the clause"
@@ -34,10 +48,12 @@ class Histories(Relations):
 
     response: TermSyntax | None = None
     """Where a response may stand."""
+    whole: TermSyntax | None = None
+    """The clause."""
 
     def clause(self, tree: TermSyntax) -> Term | None:
         """A clause's formula, which may speak of other steps and be a response."""
-        self.response = _right_side(tree)
+        self.response, self.whole = _right_side(tree), unparenthesised(tree)
         return self.formula(tree)
 
     def quantity(self, tree: Quantity) -> Term | None:
@@ -60,6 +76,10 @@ class Histories(Relations):
         if not self.scope.remembers:
             self.error("RCL322", f"`{operator}` speaks of other steps than this one, and there is one here only", tree)
             return None
+        if operator is Past.STEPS:
+            hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
+            self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
+            return None
         if operator in RESPONSES and self.response is not tree:
             self.error("RCL321", f"`{operator}` is a response, and does not stand here: {_PLACE}", tree)
             return None
@@ -76,6 +96,26 @@ class Histories(Relations):
             return History(operator, made, joined(list(made)), None, self.span(tree))
         sort = NATURAL if operator is Past.COUNTED else BOOL
         return History(operator, made, sort, bound, self.span(tree))
+
+    def pace(self, tree: PaceSyntax) -> Term | None:
+        """A node's pace, which is a guarantee of its own."""
+        told = " ".join(token.text for token in tree.words)
+        relation = {"every": "==", "at most": "<="}.get(told)
+        scale = _scale(tree.length.unit.text)
+        head = unparenthesised(tree.head)
+        if not isinstance(head, Name) or head.text != Past.STEPS or relation is None:
+            hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
+            self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
+            return None
+        if scale is None or Fraction(tree.length.digits) == 0:
+            hint = f"units of time are {', '.join((*UNITS, *LONG_UNITS))}"
+            self.error("RCL320", "how far apart steps are is a length of time", tree.length, hint=hint)
+            return None
+        if self.whole is not tree or not self.scope.remembers:
+            self.error("RCL324", "how far apart steps are is a guarantee of its own, and does not stand here", tree)
+            return None
+        amount = Literal(Fraction(tree.length.digits) * scale, REAL, self.span(tree.length))
+        return History(Past.STEPS, (), BOOL, Limit(relation, amount, False), self.span(tree))
 
     def _limits(self, tree: TermSyntax, operator: Past, limit: LimitSyntax | None) -> bool:
         """Whether it has a limit where it needs one, and one of its kind; reports it if not."""
@@ -116,14 +156,20 @@ class Histories(Relations):
                 self.error("RCL323", "`counted` is of steps since another", tree, hint="write `counted(F since G)`")
                 return None
             arguments = (inner.left, inner.right)
-        if operator in (Past.PREVIOUS, Past.CHANGED):
+        if operator in (Past.PREVIOUS, Past.CHANGED, Past.ARRIVED):
             made = self.terms(arguments)
         else:
             made = [self.formula(each) for each in arguments]
         terms = [term for term in made if term is not None]
         if len(terms) != len(made):
             return None
+        if operator is Past.ARRIVED:
+            return self._input(arguments[0], terms[0])
         for each, term in zip(arguments, terms, strict=True):
+            if operator in (Past.ROSE, Past.FELL, Past.CHANGED) and timed(term) is not None:
+                message = f"`{operator}` is of steps, and this may change between steps: it has a limit in seconds"
+                self.error("RCL324", message, each, hint="it may itself be the condition: `not once[2 s](F) -> …`")
+                return None
             if isinstance(term.sort, FunctionSort | SetSort):
                 message = f"what is remembered is a value, and this is of type {show_sort(term.sort)}"
                 self.error("RCL302", message, each, hint="apply the function, or say what is in the set")
@@ -136,6 +182,13 @@ class Histories(Relations):
             self.error("RCL302", message + f"the others are of {show_sort(terms[0].sort)}", arguments[1])
             return None
         return tuple(same)
+
+    def _input(self, tree: TermSyntax, term: Term) -> tuple[Term, ...] | None:
+        if isinstance(term, Variable) and term.role is Role.INPUT:
+            return (term,)
+        hint = "write `arrived(in.scan)`, of an input of the node"
+        self.error("RCL324", "what arrives is a message of an input", tree, hint=hint)
+        return None
 
     def limit(self, tree: LimitSyntax) -> Limit | None:
         """A limit, in steps or in seconds."""

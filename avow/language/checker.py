@@ -42,6 +42,7 @@ from avow.language.syntax import (
     Negation,
     NodePort,
     Number,
+    PaceSyntax,
     Parentheses,
     PortName,
     Quantification,
@@ -105,6 +106,8 @@ class Checker(Histories):
                 return self.if_then_else(tree, expected)
             case Limited():
                 return self.limited(tree)
+            case PaceSyntax():
+                return self.pace(tree)
             case Lasting():
                 return self.lasting(tree)
             case Quantity():

@@ -9,7 +9,7 @@ from typing import Any
 from avow.base.diagnostics import Span
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import History, Limit, Past, Role, Term, Variable
 
 
 class ClauseKind(StrEnum):
@@ -33,6 +33,12 @@ class Clause:
     sentence_span: Span | None = field(default=None, compare=False, repr=False)
     written: Term | None = field(default=None, compare=False, repr=False)
     """The formula without that, where it was read from a file: for what is said of the text."""
+
+    @property
+    def pace(self) -> Limit | None:
+        """How far apart the node's steps are, where the clause is ``steps(every 20 ms)`` or its like."""
+        formula = self.formula
+        return formula.limit if isinstance(formula, History) and formula.operator is Past.STEPS else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -228,3 +228,17 @@ _QUANTIFIER_LIKE = {
     **dict.fromkeys(("forall", "all", "every", "foreach", "forevery"), "forall"),
     **dict.fromkeys(("exists", "exist", "some", "forsome", "any"), "exists"),
 }
+
+
+SECTION_FORMS = {
+    "INPUTS": "write `inputs( name : TYPE, … )`, or `inputs()` where there are none",
+    "OUTPUTS": "write `outputs( name : TYPE, … )`, or `outputs()` where there are none",
+    "TOPICS": "write `topics( package/Type name matches(in.variable), … )`, or `topics()` where there are none",
+}
+NEAR_SECTIONS = {
+    **dict.fromkeys(("input", "ins"), "inputs"),
+    **dict.fromkeys(("output", "outs"), "outputs"),
+    "topic": "topics",
+    **dict.fromkeys(("assumes", "assumption", "assumptions", "requires", "require"), "assume"),
+    **dict.fromkeys(("guarantees", "garantee", "guarentee", "guaranty", "ensures", "ensure"), "guarantee"),
+}

@@ -27,6 +27,7 @@ from avow.language.syntax import (
     Negation,
     NodePort,
     Number,
+    PaceSyntax,
     Parentheses,
     PortDeclaration,
     PortList,
@@ -101,6 +102,8 @@ def flat(tree: Syntax) -> str:
             return f"[{' '.join(part for part in inside if part)}]"
         case Limited(name=token, limit=limit, arguments=arguments):
             return f"{token.text}{flat(limit)}({_listed(arguments)})"
+        case PaceSyntax(head=head, words=before, length=length):
+            return f"{flat(head)}({' '.join(word.text for word in before)} {flat(length)})"
         case Lasting(word=word, left=one, limit=bound, right=other):
             return f"{flat(one)} {word}{'' if bound is None else flat(bound)} {flat(other)}"
         case Binder(names=names, domain=domain):

@@ -240,6 +240,8 @@ class _Layout:
         return [head + lines[0], *lines[1:-1], lines[-1] + ";"] if len(lines) > 1 else [head + lines[0] + ";"]
 
     def section(self, own: Sequence[Token]) -> list[str]:
+        if own[0].text == "steps":
+            return [flat(self.formulas[own[0].start])]
         keyword = {"A": "assume", "G": "guarantee"}.get(own[0].text, own[0].text)
         head = keyword
         at = 1

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from avow.language.contract import ClauseKind
-from avow.language.expectations import about_keyword
+from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keyword
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
@@ -22,7 +22,7 @@ _CLOSE = frozenset(_OPEN.values())
 _TOP = frozenset(("CONTEXT", "NODE"))
 _SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "ASSUME", "GUARANTEE"))
 _SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
-_ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "ASSUME": 3, "GUARANTEE": 4}
+_ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "STEPS": 3, "ASSUME": 4, "GUARANTEE": 5}
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +291,7 @@ class _OutlineReader:
             elif before and _ORDER[section] < _ORDER[before]:
                 words = {"ASSUME": "an assumption", "GUARANTEE": "a guarantee"}
                 message = f"`{keyword.text}` stands after {words.get(before, f'`{before.lower()}`')}"
-                hint = "the order is: inputs, outputs, topics, assumptions, guarantees"
+                hint = "the order is: inputs, outputs, topics, steps, assumptions, guarantees"
                 self.reports.error("RCL116", message, keyword.start, keyword.end, hint=hint)
             else:
                 before = section
@@ -319,7 +319,7 @@ class _OutlineReader:
             node.broken.add("*")
             if closed or _ORDER[section] < last:
                 message = f"node `{node.name.text}` has no `{section.lower()}( … )`"
-                self.reports.error("RCL118", message, *where, hint=_FORMS[section])
+                self.reports.error("RCL118", message, *where, hint=SECTION_FORMS[section])
         if "GUARANTEE" not in seen and closed:
             message = f"node `{node.name.text}` guarantees nothing"
             self.reports.error("RCL118", message, *where, hint="a node has at least one `guarantee( … )`")
@@ -330,6 +330,8 @@ class _OutlineReader:
             return kind
         if kind == "NAME" and self.tokens[self.at].text in ("A", "G") and self.kind(1) in ("LPAR", "NAME", "STRING"):
             return "ASSUME" if self.tokens[self.at].text == "A" else "GUARANTEE"
+        if kind == "NAME" and self.tokens[self.at].text == "steps" and self.kind(1) == "LPAR":
+            return "STEPS"
         return None
 
     def meant_section(self) -> str | None:
@@ -342,7 +344,8 @@ class _OutlineReader:
             return None
         word = self.tokens[self.at].text
         numbered = word[0] in "AG" and word[1:].isdigit() and self.kind(1) == "LPAR"
-        meant = ("assume" if word[0] == "A" else "guarantee") if numbered else _NEAR.get(word.lower(), word.lower())
+        near = NEAR_SECTIONS.get(word.lower(), word.lower())
+        meant = ("assume" if word[0] == "A" else "guarantee") if numbered else near
         if meant.upper() not in _SECTIONS:
             return None
         hint = f"a clause with a name is written `{meant} {word}( … )`" if numbered else f"write `{meant}`"
@@ -431,6 +434,11 @@ class _OutlineReader:
             return
         part = self.tokens[first:close]
         end = self.tokens[close].start
+        if section == "STEPS":
+            whole = (keyword.start, self.tokens[close].end)
+            formula = parse("formula", self.tokens[first - 2 : close + 1], self.reports, whole[1], keyword.start)
+            node.clauses.append(ClauseSyntax(ClauseKind.GUARANTEE, keyword, None, formula, whole, *whole))
+            return
         if section in ("ASSUME", "GUARANTEE"):
             kind = ClauseKind.ASSUMPTION if section == "ASSUME" else ClauseKind.GUARANTEE
             formula = None
@@ -482,17 +490,3 @@ class _OutlineReader:
             if self.kind() == "RBRACE" and self.kind(1) in (*_TOP, "$END", "RBRACE"):
                 return
             self.at += 1
-
-
-_FORMS = {
-    "INPUTS": "write `inputs( name : TYPE, … )`, or `inputs()` where there are none",
-    "OUTPUTS": "write `outputs( name : TYPE, … )`, or `outputs()` where there are none",
-    "TOPICS": "write `topics( package/Type name matches(in.variable), … )`, or `topics()` where there are none",
-}
-_NEAR = {
-    **dict.fromkeys(("input", "ins"), "inputs"),
-    **dict.fromkeys(("output", "outs"), "outputs"),
-    "topic": "topics",
-    **dict.fromkeys(("assumes", "assumption", "assumptions", "requires", "require"), "assume"),
-    **dict.fromkeys(("guarantees", "garantee", "guarentee", "guaranty", "ensures", "ensure"), "guarantee"),
-}

@@ -36,6 +36,7 @@ from avow.language.syntax import (
     Negation,
     NodePort,
     Number,
+    PaceSyntax,
     Parentheses,
     PortDeclaration,
     PortList,
@@ -397,6 +398,10 @@ class _Build:
     def limited(self, c: list[Any]) -> Limited:
         arguments = tuple(c[3:-1:2])
         return Limited(c[0].start, c[-1].end, _deepest((c[1], *arguments)), c[0], c[1], arguments)
+
+    def pace(self, c: list[Any]) -> PaceSyntax:
+        length = Quantity(c[-3].start, c[-2].end, 1, c[-3].text, c[-2])
+        return PaceSyntax(c[0].start, c[-1].end, c[0].depth + 1, c[0], tuple(c[2:-3]), length)
 
     def plain_limit(self, c: list[Any]) -> LimitSyntax:
         return LimitSyntax(c[0].start, c[2].end, c[1].depth + 1, "", c[1], None)

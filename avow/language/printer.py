@@ -206,6 +206,11 @@ class _Printer:
 
     def history(self, term: History) -> tuple[str, int]:
         """``once[5 steps](F)``, ``F since G``; in words where the style has some."""
+        if term.operator is Past.STEPS and term.limit is not None and isinstance(term.limit.amount, Literal):
+            told = {"==": "every", "<=": "at most"}[term.limit.relation]
+            length = f"{told} {show_number(Fraction(term.limit.amount.value))[0]} s"
+            said = self.style.phrases.get(Past.STEPS, f"{self.style.past(Past.STEPS)}({{limit}})")
+            return said.replace("{limit}", length), ATOM
         limit = "" if term.limit is None else self.limit(term.limit)
         phrase = self.style.phrases.get(term.operator)
         if phrase is not None:

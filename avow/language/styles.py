@@ -122,6 +122,8 @@ _PHRASES = {
     "for": "{0} for {limit}",
     "until": "{0} until {1}",
     "eventually": "{0} eventually",
+    "arrived": "a message of {0} has arrived",
+    "steps": "a step {limit}",
 }
 
 

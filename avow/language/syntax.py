@@ -207,6 +207,15 @@ class Limited(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
+class PaceSyntax(_Placed):
+    """``steps(every 20 ms)``, ``steps(at most 100 ms)``; `words` are what stands before the length."""
+
+    head: TermSyntax
+    words: tuple[Token, ...]
+    length: Quantity
+
+
+@dataclass(frozen=True, slots=True)
 class Lasting(_Placed):
     """``F since G``, ``F since[<= 5 steps] G``, ``R until U``."""
 
@@ -239,6 +248,7 @@ TermSyntax = (
     | IfThenElse
     | Quantity
     | Limited
+    | PaceSyntax
     | Lasting
 )
 
@@ -397,6 +407,8 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return (tree.amount,)
         case Limited():
             return (tree.limit, *tree.arguments)
+        case PaceSyntax():
+            return (tree.head, tree.length)
         case Lasting():
             return (tree.left, tree.right) if tree.limit is None else (tree.left, tree.limit, tree.right)
         case FunctionType():

@@ -62,6 +62,9 @@ class Past(StrEnum):
     FOR = "for"
     UNTIL = "until"
     EVENTUALLY = "eventually"
+    ARRIVED = "arrived"
+    STEPS = "steps"
+    """A node's pace, as a clause of its own: ``steps(at most 100 ms)``; its limit says how far apart steps are."""
 
 
 RESPONSES = frozenset((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL, Past.EVENTUALLY))
@@ -537,3 +540,8 @@ def subterms(term: Term) -> Iterator[Term]:
 def histories(term: Term) -> tuple[History, ...]:
     """What in a term speaks of other steps than this one, in reading order; none in a term of one step."""
     return tuple(part for part in subterms(term) if isinstance(part, History))
+
+
+def timed(term: Term) -> History | None:
+    """What in a term has a limit in seconds, so that also the time between steps counts; None where nothing has."""
+    return next((part for part in histories(term) if part.limit is not None and not part.limit.steps), None)

@@ -52,7 +52,10 @@ def to_rcl(contract: Contract) -> str:
             out.append(f"  {word}( {shown} )" if shown else f"  {word}()")
         topics = ",\n          ".join(_topic(t) for t in node.topics)
         out.append(f"  topics( {topics} )" if topics else "  topics()")
+        out += [f"  {show_term(c.formula, 'rcl')}" for c in node.guarantees if is_own_section(c)]
         for clause in node.clauses:
+            if is_own_section(clause):
+                continue
             word = "assume" if clause in node.assumptions else "guarantee"
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
         out += ["}", ""]
@@ -64,6 +67,11 @@ def to_rcl(contract: Contract) -> str:
         message = "with its constants and the sets of its quantifiers written out, the contract is nested too deeply"
         place = contract.nodes[0].span if contract.nodes else None
         raise Rejected(Diagnostic("RCL110", message, place, hint="split the deepest clause")) from rejected
+
+
+def is_own_section(clause: Clause) -> bool:
+    """Whether a clause is written as ``steps(every 20 ms)``."""
+    return clause.pace is not None and clause.name == "steps" and clause.sentence is None
 
 
 def _hidden_elements(node: Node) -> Iterator[Diagnostic]:

@@ -112,7 +112,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
         ),
     ]
     for clause in node.guarantees:
-        found += _of_guarantee(node, clause)
+        found += _of_guarantee(node, clause) if clause.pace is None else []
     found += [claim for port in node.outputs for claim in _of_output(node, port, g, guaranteed)]
     for clause in node.assumptions:
         found += _of_assumption(node, clause)

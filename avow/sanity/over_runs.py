@@ -20,7 +20,8 @@ from avow.sanity.viability import Viability, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.system.formulas import ports_of
-from avow.temporal.cells import Remembering, compile_node
+from avow.temporal.cells import Remembering
+from avow.temporal.clock import one_step
 from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
 
 _TRIGGER = "trigger"
@@ -37,11 +38,11 @@ class OverRuns:
 
     def __post_init__(self) -> None:
         asked = tuple(
-            replace(clause, name=f"{clause.name} {_TRIGGER}", formula=trigger)
+            replace(clause, name=f"{clause.name} {_TRIGGER}", formula=negation(trigger))  # which is so at no position
             for clause in self.node.guarantees
             for trigger in triggers(clause.formula)
         )
-        self.remembering = compile_node(replace(self.node, guarantees=(*self.node.guarantees, *asked)))
+        self.remembering = one_step(replace(self.node, guarantees=(*self.node.guarantees, *asked)))
 
     @property
     def assumptions(self) -> Mapping[str, Term]:
@@ -83,7 +84,7 @@ class OverRuns:
     @property
     def viability(self) -> Viability:
         if self._viable is None:
-            self._viable = viable(compile_node(self.node), effort=2 * self.bounds.effort, seed=self.bounds.seed)
+            self._viable = viable(one_step(self.node), effort=2 * self.bounds.effort, seed=self.bounds.seed)
         return self._viable
 
     def _realizable(self) -> Finding:
@@ -118,7 +119,7 @@ class OverRuns:
         return Finding(found.verdict, text, needed)
 
     def _not_vacuous(self, name: str) -> Finding:
-        asked = [c.formula for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
+        asked = [negation(c.formula) for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
         for trigger in asked:
             found = self._possible({**self.assumptions, "its trigger": trigger}, "{} cannot hold together in any run")
             if found.verdict is not Verdict.PROVED:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.language.contract import Contract, Node, Port
-from avow.language.sorts import BOOL, FunctionSort
-from avow.system.plan import Plan
+from avow.language.sorts import BOOL, REAL, FunctionSort
+from avow.system.plan import STEP_LENGTH, Plan
 from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.schema import suggest
 from avow.system.source_plan import check_memory
@@ -210,6 +210,9 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
     types = dict(contract.types)
     for name, texts in plan.scenario.domains.items():
         span = domains.key_span(name) if domains else root.span
+        if name == STEP_LENGTH and name not in types:
+            yield from unusable(f"scenario.domains.{name}", texts, REAL, contract, span)
+            continue
         if name not in BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
             yield _unknown("scenario.domains: type or port", name, [*BASE_SORTS, *types, *everything], span)
             continue

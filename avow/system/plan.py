@@ -116,6 +116,10 @@ class Table:
         return tuple(row[at] for row in self.rows)
 
 
+STEP_LENGTH = "dt"
+"""Under `scenario.domains`: how long steps take, in seconds."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """A finite interpretation, used by every bounded check; a verdict from it says that it is bounded.

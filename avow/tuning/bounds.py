@@ -52,7 +52,7 @@ PARTIAL_ANSWERS = 100_000
 PARTIAL_ANSWERS_AGAIN = 2_000
 """The same, once a search was cut short: nothing will be exhaustive any more, and there are other inputs to try."""
 
-NODE_ANSWERS = 4_000
+NODE_ANSWERS = 1_500
 """Answers of one node to one input; with more, a search is not exhaustive."""
 
 SEQUENCE_LENGTHS = 4
@@ -87,7 +87,7 @@ SMALL_TABLE = 3
 VALUES_ENUMERATED = 1_000_000
 """More values than this are not enumerated: the answer would not come in useful time."""
 
-CONSTRAINTS = 4_000
+CONSTRAINTS = 1_500
 """Elimination stops (`TooMany`) when there are more constraints than this: each variable may square their number."""
 
 LINEAR_CASES = 256
@@ -195,3 +195,9 @@ the contract writes down: programs that keep less than they count saturate early
 
 ROUNDED_PART = 2**-40
 """The part of a REAL by which a program may differ from its model for rounding: thousands of roundings of a double."""
+
+LIMITS_NESTED = 2
+"""Instants at which what a limit in seconds is of may itself change in a silence: the terms double with each."""
+
+CLOCKED_SIZE = 1_500
+"""Operators of what is made of a clause with limits in seconds, at most: what people write has some fifty."""

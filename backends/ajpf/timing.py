@@ -14,7 +14,7 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quantifier, Role, Term, histories
-from avow.temporal.cells import responding
+from avow.temporal.responses import responding
 
 
 @dataclass(frozen=True, slots=True)

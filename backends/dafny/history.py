@@ -13,7 +13,7 @@ from avow.backend_kit.stepping import Stepping
 from avow.formulas.formula import conjunction
 from avow.language.printer import show_term
 from avow.language.terms import Variable
-from avow.temporal.cells import CELL
+from avow.temporal.cell import CELL
 
 from .printer import Predicate, Vocabulary, call, print_clause, sort_text
 

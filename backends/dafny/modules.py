@@ -12,7 +12,8 @@ from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
-from avow.temporal.cells import CELL, remembers
+from avow.temporal.cell import CELL
+from avow.temporal.cells import remembers
 
 from .history import ESTABLISHED, History, history
 from .names import RESERVED, Names, file_stem, identifier

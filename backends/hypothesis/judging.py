@@ -12,7 +12,9 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable, histories
-from avow.temporal.cells import CELL, Records, due
+from avow.temporal.cell import CELL
+from avow.temporal.cells import Records
+from avow.temporal.responses import due
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .generate import Inputs

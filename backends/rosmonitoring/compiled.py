@@ -166,7 +166,7 @@ class Compiled:
                 remember(watch, plan, old, tally, found)
         self._last[0] = b""
         self._clock[0] = max((watch.monitor.timing.newest for watch in self._watches), default=-math.inf)
-        self._clock[1] = min((watch.monitor.timing.deadline for watch in self._watches), default=math.inf)
+        self._clock[1] = min((watch.monitor.deadline for watch in self._watches), default=math.inf)
         return list(self._told(found)) if found else []
 
     def _again(self, known: list[tuple[Violation, ...]], line: int) -> list[Violation]:

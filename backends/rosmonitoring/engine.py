@@ -13,24 +13,22 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from avow.evaluation.truth import judge_open
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.ros.bags import publisher
 from avow.temporal.cells import remembers
-from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
-from .memory import UNSURE, SoFar, blamed, watching
+from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
 from .pairing import EARLY, Asked, Pairing, backwards, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Fault, Heard, Violation, Watched, shown, time_text
+from .watched import Fault, Heard, Violation, Watched, open_verdict, shown, time_text, verdict_of
 from .wires import MappingError
 
 
@@ -76,6 +74,8 @@ class Monitor:
     """Clauses that no message changes: judged once, at the first event."""
     _remembering: list[Watched] = field(default_factory=list)
     """Clauses that speak of other steps."""
+    _timed: list[Watched] = field(default_factory=list)
+    """Those that also speak of the time between steps, assumptions first."""
     _so_far: SoFar | None = None
     """Of a node whose clauses speak of other steps."""
 
@@ -171,6 +171,7 @@ class Monitor:
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
+        hear(self._remembering, updated)
         while self._constant:
             self._judge(self._constant.pop(), event, found)
         for watched in unreadable.values():
@@ -200,7 +201,16 @@ class Monitor:
     def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
         """Time has passed, with or without a message of these variables: deadlines do not wait for one."""
         late = self.timing.passes(event, names)
-        return [self._violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
+        found = [self._violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
+        for watched, deadline in overdue(self._timed, event):
+            if self._so_far is not None:
+                self._so_far.note(watched)
+            self._not_met(watched, {**event, "time": deadline}, found, "; no step came in time")
+        return found
+
+    @property
+    def deadline(self) -> float:
+        return min(self.timing.deadline, soonest(self._timed))
 
     def settle_previous(self) -> None:
         """An answer is over: what it said is now what the step before said."""
@@ -324,15 +334,7 @@ class Monitor:
                 found.append(replace(wrong, index=asked.index, heard=heard))
 
     def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
-        truth = watched.truth_of(values, self.solver)
-        if truth is None:
-            return None
-        if truth:
-            return "held"
-        for assumed in self._assumptions:
-            if all(n in values for n in assumed.names) and assumed.truth_of(values, self.solver) is False:
-                return Fault.EXCUSED
-        return Fault.GUARANTEE
+        return verdict_of(watched, self._assumptions, values, self.solver)
 
     def _due(self, updated: Iterable[str], event: Mapping[str, Any], found: list[Violation]) -> list[Watched]:
         """The clauses to be judged now that these variables have new values. A part of an answer that is published
@@ -395,17 +397,10 @@ class Monitor:
             found.append(replace(wrong, heard=heard))
 
     def _open(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
-        """Whether a guarantee holds whatever is not known; None where that matters, or nobody can tell. Broken it is
-        only where all assumptions are known to hold."""
         if not self.solver or not self._questions or watched.clause.kind is ClauseKind.ASSUMPTION:
             return None
         self._questions -= 1
-        truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
-        if truth is False:
-            for assumed in self._assumptions:
-                if any(n not in values for n in assumed.names) or assumed.truth_of(values, self.solver) is not True:
-                    return None
-        return truth
+        return open_verdict(watched, self._assumptions, values, self.solver)
 
     def _forget(self, name: str) -> None:
         self._versions[name] += 1
@@ -419,6 +414,7 @@ class Monitor:
         watched, triggers = found
         if watched.steps is not None:
             self._remembering.append(watched)
+            self._timed += [watched] if watched.steps.silence is not None else []
         for name in triggers:
             self.clauses.setdefault(name, []).append(watched)
         if not triggers:
@@ -440,6 +436,8 @@ class Monitor:
         lost = watched.steps is not None and watched.steps.lost
         key = (*[versions[n] for n in watched.names], supposed)
         if watched.steps is not None:
+            if watched.steps.comes(time_of(event)) and self._so_far is not None:
+                self._so_far = SoFar()
             watched.truth = watched.steps.step(watched, values, self.solver, self.events, supposed)
         elif key != watched.key or watched.held:
             watched.key = key
@@ -454,9 +452,14 @@ class Monitor:
         if supposed and watched.truth is not False:
             tally.supposed += 1
             return
-        tally.judged += 1
         if watched.truth:
+            tally.judged += 1
             return
+        self._not_met(watched, event, found)
+
+    def _not_met(self, watched: Watched, event: Mapping[str, Any], found: list[Violation], late: str = "") -> None:
+        values, tally = self.values, watched.tally
+        tally.judged += 1
         blame = blamed(watched, self._assumptions, self.values, self.solver, self._so_far, self.events)
         if blame is None:
             tally.undecided += 1
@@ -466,7 +469,7 @@ class Monitor:
         fault, why = blame
         if fault is Fault.EXCUSED:
             tally.excused += 1
-        found.append(self._violation(fault, watched.clause.name, event, why, watched, values))
+        found.append(self._violation(fault, watched.clause.name, event, why + late, watched, values))
 
     def _miss(self, names: Set[str]) -> None:
         """Messages of these variables were lost, or could not be read."""

@@ -7,23 +7,31 @@ is not decided, and never held.
 
 from __future__ import annotations
 
+import math
 import numbers
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any, NoReturn
 
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.evaluation.running import Keeper
+from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, INTEGER, NATURAL
-from avow.language.terms import Quantified, Role, Term, histories
-from avow.temporal.cells import Cell, Records, Unsaid, fulfilled, in_the_past, pending
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
+from avow.language.terms import Literal, Quantified, Role, Term, Variable, histories, timed
+from avow.temporal.ages import CLOCK, ELAPSED, Side
+from avow.temporal.cell import CELL, Cell, Unsaid
+from avow.temporal.clock import Timed, is_arrival, longest_limit
+from avow.temporal.responses import due, fulfilled, in_the_past, pending
 
 from .coverage import Tally
 from .options import Setup
+from .pairing import time_of
 from .rules import Choice, Fields, Previous
+from .tuning import GRACE, JITTER
 from .watched import Fault, Watched, trigger_of
 
 
@@ -46,31 +54,141 @@ class _Unknown:
 numbers.Rational.register(_Unknown)  # a Fraction of it asks for its numerator
 
 
+@dataclass(slots=True)
+class Silence:
+    """What a clause with limits in seconds is like between steps, and when its steps were."""
+
+    holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
+    """Whether it holds so many seconds (`ELAPSED`) after a step."""
+    breaks: tuple[Callable[[Mapping[str, Value]], Value], ...]
+    period: Fraction | None
+    """Of a clause that says that steps come every so many seconds."""
+    latest: Fraction | None = None
+    """When its latest step was."""
+    elapsed: Fraction = Fraction(0)
+    """The time from the latest step to the next, which is being judged."""
+    told: bool = False
+    """That it was broken since, has been told."""
+    arrived: set[str] = field(default_factory=set)
+    """The inputs of which a message came since."""
+
+    def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
+        """How long after the latest step silence breaks the clause; None where it never does. Raises NotEvaluable."""
+
+        def at(side: Side, elapsed: Fraction) -> bool:
+            return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
+
+        if not at(Side.AFTER, Fraction(0)):
+            return Fraction(0)
+        times = {Fraction(t) for each in self.breaks if isinstance(t := each(memory), int | Fraction)}
+        for time in sorted(t for t in times if t > 0):
+            if not at(Side.AT, time) or not at(Side.AFTER, time):
+                return time
+        return None
+
+    def passed(self, now: Fraction) -> bool:
+        """A step comes; whether the times have gone back further than a clock does, so that a run begins anew."""
+        since = now - self.latest if self.latest is not None else Fraction(0)
+        if since < -JITTER:
+            return True
+        self.elapsed = max(since, Fraction(0))
+        if self.period is not None and abs(self.elapsed - self.period) <= JITTER:
+            self.elapsed = self.period
+        return False
+
+
 class Memory:
     """What one clause remembers."""
 
-    def __init__(self, cells: tuple[Cell, ...], formula: Term, waiting: Term | None) -> None:
+    def __init__(
+        self, cells: tuple[Cell, ...], formula: Term, waiting: Term | None, silence: Silence | None,
+        arrivals: tuple[Variable, ...],
+    ) -> None:  # fmt: skip
         self.formula = formula
         """The clause as a formula of one step."""
         self.open = False
         """After the latest step, a response is demanded of later ones (or may be)."""
         self.lost = False
         """Steps went by unseen, and not all is known again."""
+        self.alone = False
+        """It speaks of arrivals alone."""
+        self.every = False
+        """Its steps are all messages of what it speaks of: a node that dies would never see what it has to answer."""
         self.answers = False
         """Its steps are answers of the node."""
         self.stepped = 0
         """The event of its latest step."""
+        self.silence = silence
+        self._arrivals = {v.qualified: port_of(v) for v in arrivals}
+        self._arrived = set[str]()
         self._keeper = Keeper(cells)
         self._waiting = None if waiting is None else compile_term(waiting)
         self._cells = {cell.before.qualified for cell in cells}
         whole = not any(_quantified(term) for term in (formula, *(cell.now for cell in cells)))
-        plain = (BOOL, INTEGER, NATURAL)
+        plain = (BOOL, INTEGER, NATURAL, REAL)
         self._open = {c.before.qualified for c in cells if c.sort in plain} if whole else set[str]()
         """What may be unknown in a formula that is evaluated: where it does not matter, the formula is decided."""
 
     def known(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """A step's valuation, of what is known."""
-        return self._keeper.at(values)
+        return self._keeper.at(self._around(values))
+
+    def _around(self, values: Mapping[str, Value]) -> Mapping[str, Value]:
+        """With the time since the step before, and what has arrived since."""
+        arrived = {name: port in self._arrived for name, port in self._arrivals.items()}
+        if self.silence is None:
+            return {**values, **arrived} if arrived else values
+        return {**values, **arrived, CLOCK.qualified: self.silence.elapsed}
+
+    def hears(self, names: Iterable[str]) -> None:
+        """Messages of these variables have come."""
+        self._arrived.update(names)
+
+    def begins(self, now: Fraction) -> None:
+        """A run begins, which counts as an arrival of everything: a clause that speaks of arrivals alone begins with
+        it."""
+        if self.silence is None or self.silence.latest is not None or not self.alone:
+            return
+        self._keeper.advance(self._around({}))
+        self.silence.latest = now
+
+    def late(self, now: Fraction) -> Fraction | None:
+        """When silence has broken the clause, long enough ago that no message on its way matters; told once."""
+        silence = self.silence
+        if silence is None or silence.told or silence.latest is None or self.lost:
+            return None
+        deadline = self.deadline
+        if deadline is None or now <= deadline + GRACE:
+            return None
+        silence.told = True
+        return deadline
+
+    @property
+    def deadline(self) -> Fraction | None:
+        """When silence breaks the clause, unless a step comes before."""
+        silence = self.silence
+        if silence is None or silence.latest is None or silence.told:
+            return None
+        try:
+            after = silence.broken(self._keeper.memory)
+        except (NotEvaluable, KeyError):
+            return None
+        return None if after is None else silence.latest + after
+
+    def comes(self, now: Fraction) -> bool:
+        """A step comes at a time; whether a run begins anew with it."""
+        silence = self.silence
+        if silence is None:
+            return False
+        anew = silence.passed(now)
+        if anew:
+            self._keeper.restart()
+            silence.latest, silence.elapsed, self.lost, self.open = None, Fraction(0), False, False
+        elif (deadline := self.deadline) is not None and silence.latest is not None and now <= deadline + GRACE:
+            silence.elapsed = min(silence.elapsed, deadline - silence.latest)
+        silence.latest = now if anew or silence.latest is None else max(now, silence.latest)
+        silence.told = False
+        return anew
 
     def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
         """A step's valuation, in which what is not known cannot be looked at."""
@@ -87,7 +205,8 @@ class Memory:
             except NotEvaluable:
                 self.open = True
         self._keeper.memory = {n: v for n, v in valuation.items() if n in self._cells}
-        self._keeper.advance(values)
+        self._keeper.advance(self._around(values))
+        self._arrived.clear()
         self._keeper.memory = {n: v for n, v in self._keeper.memory.items() if not isinstance(v, _Unknown)}
         self.lost = self.lost and self._keeper.memory.keys() != self._cells
 
@@ -155,28 +274,43 @@ def blamed(
     return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
 
 
-def watch(clause: Clause, tally: Tally) -> Watched:
+def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     """A clause under watch. Raises NotEvaluable where nothing can judge it."""
     formula, trigger, steps = clause.formula, trigger_of(clause.formula), None
     names = set[str]()
-    if told := histories(formula):
-        timed = next((h.operator for h in told if h.limit is not None and not h.limit.steps), None)
-        if timed is not None:
-            raise NotEvaluable(f"the monitors have no `{timed}` with a limit in seconds")
-        records = Records()
+    if histories(formula):
+        in_time = timed(formula) is not None
+        records = Timed(longest=longest_limit((formula,)))
+        silence: Silence | None = None
         try:
-            formula = records.clause(formula)
+            if in_time:
+                positions = records.positions(formula)
+                holds, breaks = records.instants(positions)
+                formula = positions.now
+                compiled = {side: compile_term(held) for side, held in holds.items()}
+                period = clause.pace.amount if clause.pace is not None and clause.pace.relation == "==" else None
+                every = Fraction(period.value) if isinstance(period, Literal) else None
+                silence = Silence(compiled, tuple(map(compile_term, breaks)), every)
+            else:
+                formula = records.clause(formula)
             trigger = fulfilled(clause.formula) or trigger_of(in_the_past(clause.formula))
-            trigger = None if trigger is None else records.term(trigger)
+            trigger = None if trigger is None else records.past(trigger, in_time=in_time)
             waiting = pending(clause.formula)
-            waiting = None if waiting is None else records.term(waiting)
+            waiting = None if waiting is None else records.past(waiting, in_time=in_time)
         except Unsaid as unsaid:
             raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
-        steps = Memory(tuple(records.cells), formula, waiting)
+        read = {v for term in (formula, *(c.now for c in records.cells)) for v in free_variables(term)}
+        arrivals = tuple(v for v in read if is_arrival(v))
+        steps = Memory(tuple(records.cells), formula, waiting, silence, arrivals)
+        steps.every = in_time and (bool(arrivals) or _answers_inputs(clause.formula))
         names = {n for cell in records.cells for n in free_names(cell.now)}
         names |= free_names(waiting) if waiting is not None else set()
         names |= free_names(trigger) if trigger is not None else set()
         names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}
+        names = names - {CLOCK.qualified, *(v.qualified for v in arrivals)} | set(map(port_of, arrivals))
+        steps.alone = bool(arrivals) and names == set(map(port_of, arrivals))
+        if clause.pace is not None:  # its steps are the node's answers
+            names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
         clause = replace(clause, formula=formula)
     return Watched(
         clause,
@@ -189,12 +323,12 @@ def watch(clause: Clause, tally: Tally) -> Watched:
     )
 
 
-def triggers_of(setup: Setup, names: tuple[str, ...]) -> tuple[str, ...]:
+def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
     """The variables whose publication makes a clause judged, of those that it speaks of."""
     direct = tuple(n for n in names if isinstance(setup.rules[n], Fields | Choice))
     outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
     sources = tuple(rule.source for n in names if isinstance(rule := setup.rules[n], Previous))
-    if outputs and setup.when != "every":
+    if outputs and setup.when != "every" and not every:
         return outputs
     return direct or sources
 
@@ -209,7 +343,7 @@ def watching(
     try:
         if reason := unmonitored(setup, clause):
             raise NotEvaluable(reason)
-        watched = watch(clause, tally)
+        watched = watch(clause, tally, setup)
     except NotEvaluable as error:
         tally.reason = error.reason
         return None
@@ -218,9 +352,10 @@ def watching(
         tally.reason, tally.hidden = hidden[0], True
         return None
     tally.triggered = watched.trigger is None
-    triggers = triggers_of(setup, names)
+    every = watched.steps is not None and watched.steps.every
+    triggers = triggers_of(setup, names, every=every)
     answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
-    if setup.when == "outputs" and answers:
+    if setup.when == "outputs" and answers and not every:
         watched.outputs = frozenset(triggers)
         if len(triggers) > 1:
             watched.held = tuple((n, s) for n, s in previous if n in names and s in triggers)
@@ -231,7 +366,7 @@ def watching(
         tally.unpaired = bool(watched.inputs) and setup.answers is None
         watched.paired = watched.inputs if pairs else ()
     if watched.steps is not None:
-        watched.steps.answers = answers
+        watched.steps.answers = answers and not every
     return watched, triggers
 
 
@@ -245,7 +380,7 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         if setup.answers is not None and setup.answers.by != "arrival":
             return f"{where}it speaks of other steps, whose order only `answers: {{by: arrival}}` tells"
         try:
-            names = watch(about, Tally()).names
+            names = watch(about, Tally(), setup).names
         except NotEvaluable as error:
             return where + error.reason
         hidden = [setup.hidden[name] for name in names if name in setup.hidden]
@@ -254,6 +389,45 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         if not hidden and not triggers_of(setup, names):
             return f"{where}it speaks of other steps, and no message makes one"
     return ""
+
+
+def hear(remembering: Iterable[Watched], names: Iterable[str]) -> None:
+    """Messages of these variables have come."""
+    for watched in remembering:
+        if watched.steps is not None:
+            watched.steps.hears(names)
+
+
+def overdue(timed: Sequence[Watched], event: Mapping[str, Any]) -> list[tuple[Watched, Fraction]]:
+    """The clauses that silence has broken by the time of an event, and when it did, the first first (of the same time:
+    assumptions); each told once."""
+    now = time_of(event) if timed else Fraction(0)
+    found: list[tuple[Watched, Fraction]] = []
+    for watched in timed:
+        assert watched.steps is not None
+        watched.steps.begins(now)
+        if (deadline := watched.steps.late(now)) is not None:
+            watched.truth, watched.tally.published = False, watched.tally.published + 1
+            found.append((watched, deadline))
+    return sorted(found, key=lambda each: (each[1], each[0].clause.kind is not ClauseKind.ASSUMPTION))
+
+
+def soonest(timed: Sequence[Watched]) -> float:
+    """Silence breaks nothing before this time."""
+    left = (watched.steps.deadline for watched in timed if watched.steps is not None)
+    return min((math.nextafter(float(at), 0.0) for at in left if at is not None), default=math.inf)
+
+
+def _answers_inputs(formula: Term) -> bool:
+    """Whether a clause demands something of later positions, by a trigger about inputs only."""
+    found = due(formula)
+    spoken = {v.role for t in found.triggers for v in free_variables(t)} if found is not None else set()
+    return Role.INPUT in spoken and Role.OUTPUT not in spoken
+
+
+def port_of(arrival: Variable) -> str:
+    """``in.scan``, of whether a message of it has arrived."""
+    return f"in.{arrival.name.removeprefix('arrived ').removesuffix(CELL)}"
 
 
 def _quantified(term: Term) -> bool:

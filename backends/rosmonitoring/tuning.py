@@ -1,5 +1,7 @@
 """This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
 
+from fractions import Fraction
+
 TOPICS_KEPT = 1_000
 """Topics of a trace that are remembered by name, to say what it has where it lacks what is listened to."""
 
@@ -106,3 +108,9 @@ DDS_MATCH = 5.0
 
 LAST_DOMAIN = 232
 """The greatest DDS domain: its ports are computed from it, and end at 65535."""
+
+GRACE = Fraction(1, 20)
+"""Seconds after a deadline until silence is told: messages have a way to go."""
+
+JITTER = Fraction(1, 100)
+"""Seconds by which times may go back, and steps that come regularly may be early or late: clocks are no better."""

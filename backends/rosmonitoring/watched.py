@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from avow.evaluation.evaluate import NotEvaluable
-from avow.evaluation.truth import judge
+from avow.evaluation.truth import judge, judge_open
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
@@ -136,6 +137,8 @@ def trigger_of(formula: Term) -> Term | None:
 
 
 def time_text(raw: Any) -> str:
+    if isinstance(raw, Fraction):
+        return show(raw)
     if isinstance(raw, int | float | Decimal) and not isinstance(raw, bool):
         try:
             return show(exact(raw))
@@ -162,3 +165,31 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
 
 def shorten(text: str) -> str:
     return text if len(text) <= 200 else text[:199] + "…"
+
+
+def verdict_of(
+    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
+) -> Fault | str | None:
+    """Whether a clause held of values; None where nobody can tell."""
+    truth = watched.truth_of(values, solver)
+    if truth is None:
+        return None
+    if truth:
+        return "held"
+    for assumed in assumptions:
+        if all(n in values for n in assumed.names) and assumed.truth_of(values, solver) is False:
+            return Fault.EXCUSED
+    return Fault.GUARANTEE
+
+
+def open_verdict(
+    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
+) -> bool | None:
+    """Whether a guarantee holds whatever is not known; None where that matters, or nobody can tell. Broken it is only
+    where all assumptions are known to hold."""
+    truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
+    if truth is False:
+        for assumed in assumptions:
+            if any(n not in values for n in assumed.names) or assumed.truth_of(values, solver) is not True:
+                return None
+    return truth

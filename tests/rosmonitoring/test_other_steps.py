@@ -258,11 +258,9 @@ def test_a_step_that_is_not_judged_is_not_forgotten(
 @pytest.mark.parametrize(
     ("clause", "said", "options"),
     [
-        ("guarantee g ( in.a -> within[2 s](out.b) )", "`within` with a limit in seconds", {}),
         ("guarantee g ( in.a -> eventually(out.b) )", "`eventually`", {}),
         ("guarantee g ( forall(k in NATURAL | once(in.n == k) -> k >= 0 or out.b) )", "remembered for each value", {}),
         ("guarantee g ( once(in.a) -> out.b )", "by: arrival", {"answers": {"by": "stamp"}}),
-        ("assume q ( once[2 s](in.a) ) guarantee g ( out.b )", "the assumption q: ", {}),
     ],
 )
 def test_what_is_not_monitored_is_refused_by_name(

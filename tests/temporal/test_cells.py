@@ -33,7 +33,9 @@ from avow.language.terms import (
     histories,
 )
 from avow.temporal import cells as compiler
-from avow.temporal.cells import Records, Unsaid
+from avow.temporal import responses
+from avow.temporal.cell import Unsaid
+from avow.temporal.cells import Records
 from temporal.positions import Step, broken, value
 
 A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
@@ -139,12 +141,12 @@ def _late(trigger: Term, response: History) -> Term:
     return Not(History(Past.SINCE, since.arguments, BOOL, Limit(">", since.limit.amount, True)))
 
 
-_demanded = compiler._demanded
+_demanded = responses._demanded
 _latest, _earliest, _kept, _record = Records._latest, Records._earliest, Records._kept, Records._record
 _plus = compiler._plus_one
 
 MUTANTS: dict[str, tuple[object, str, object]] = {
-    "a response one step late passes": (compiler, "_demanded", _late),
+    "a response one step late passes": (responses, "_demanded", _late),
     "ages stand still": (compiler, "_plus_one", lambda term: term),
     "ages run twice as fast": (compiler, "_plus_one", lambda term: _plus(_plus(term))),
     "the latest beginning in place of the earliest": (Records, "_earliest", _latest),

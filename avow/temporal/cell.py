@@ -1,0 +1,143 @@
+"""A cell: what one step leaves to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.base.diagnostics import Span
+from avow.formulas.formula import free_variables
+from avow.language.sorts import (
+    BOOL,
+    NATURAL,
+    REAL,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    SequenceSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    Apply,
+    Compare,
+    Construct,
+    EnumValue,
+    History,
+    Iff,
+    Literal,
+    Quantified,
+    Quantifier,
+    Role,
+    SequenceTerm,
+    Term,
+    TupleTerm,
+    Variable,
+)
+
+CELL = "#"
+"""In the name of every cell, and in that of no port."""
+
+
+class Unsaid(Exception):  # noqa: N818 - it names what happened
+    """A clause that has no formula of one step; `reason` is for people."""
+
+    def __init__(self, reason: str, span: Span | None = None) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.span = span
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What one step leaves to the next."""
+
+    before: Variable
+    """What the step before has left: a function of the `parameters`, where there are some. Its name says which record
+    it is of, so that a formula that reads it has another digest where the record is another."""
+    parameters: tuple[Variable, ...]
+    initial: Term | None
+    """What it is before the first step, at every argument; None: any value, which nothing looks at."""
+    now: Term
+    """What this step leaves, at the `parameters`: over the node's ports and what the step before has left."""
+    record: History | None = field(default=None, compare=False, repr=False)
+    """What it is kept for; None of whether a step is the first, and of what lasts through a silence."""
+
+    @property
+    def name(self) -> str:
+        return self.before.name
+
+    @property
+    def sort(self) -> Sort:
+        return self.before.sort
+
+    @property
+    def read(self) -> Term:
+        """What the step before has left at the `parameters`."""
+        return at(self.before, self.parameters)
+
+    def begins(self, cell: Variable | None = None) -> Term:
+        """That a variable (the cell's own) is as the cell is before the first step."""
+        if self.initial is None:
+            return TRUE
+        return self._everywhere(equal(at(cell or self.before, self.parameters), self.initial))
+
+    def leaves(self, after: Variable) -> Term:
+        """That a variable is what this step leaves."""
+        return self._everywhere(equal(at(after, self.parameters), self.now))
+
+    def _everywhere(self, formula: Term) -> Term:
+        return Quantified(Quantifier.FORALL, self.parameters, formula) if self.parameters else formula
+
+
+def some_value(sort: Sort) -> Term | None:
+    """A value of a sort, written down; None of an unspecified type, which has no name for one, and of functions."""
+    match sort:
+        case BoolSort():
+            return FALSE
+        case NaturalSort() | IntegerSort():
+            return Literal(0, NATURAL)
+        case RealSort():
+            return Literal(Fraction(0), REAL)
+        case StringSort():
+            return Literal("", sort)
+        case EnumSort(members=(first, *_)):
+            return EnumValue(first, sort)
+        case SequenceSort():
+            return SequenceTerm((), sort)
+        case TupleSort(items=items):
+            parts = tuple(map(some_value, items))
+            return TupleTerm(tuple(p for p in parts if p is not None), sort) if None not in parts else None
+        case DataSort(constructors=constructors):
+            for made in constructors:
+                arguments = tuple(map(some_value, made.parameters))
+                if None not in arguments:
+                    return Construct(made.name, tuple(a for a in arguments if a is not None), sort)
+            return None
+        case _:  # nothing is known of it
+            return None
+
+
+def equal(left: Term, right: Term) -> Term:
+    return Iff(left, right) if left.sort == BOOL else Compare("==", left, right)
+
+
+def at(variable: Variable, parameters: tuple[Variable, ...]) -> Term:
+    sort = variable.sort
+    return Apply(variable, parameters, sort.result) if parameters and isinstance(sort, FunctionSort) else variable
+
+
+def at_the_parameters(name: str, parts: Iterable[Term], sort: Sort) -> tuple[Variable, tuple[Variable, ...]]:
+    """The variable of a cell for what is said of some terms, and its parameters: their bound variables."""
+    bound = {v for part in parts for v in free_variables(part) if v.role is Role.BOUND}
+    parameters = tuple(sorted(bound, key=lambda v: v.name))
+    kept = FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort
+    return Variable(Role.INPUT, name, kept), parameters

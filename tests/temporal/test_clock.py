@@ -1,0 +1,170 @@
+"""Limits in seconds: cells against the definitions over all positions of timed words; mutants of the compiler die."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from fractions import Fraction
+
+import pytest
+
+from avow.evaluation.evaluate import evaluate
+from avow.evaluation.running import Keeper
+from avow.formulas.values import Value
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, NATURAL, REAL
+from avow.language.terms import (
+    FALSE,
+    And,
+    Compare,
+    History,
+    Iff,
+    Implies,
+    Limit,
+    Literal,
+    Not,
+    Or,
+    Past,
+    Role,
+    Term,
+    Variable,
+    timed,
+)
+from avow.temporal.ages import CLOCK, ELAPSED, Lasting, Side
+from avow.temporal.cell import Unsaid
+from avow.temporal.clock import Timed
+from temporal.timed_words import Meaning, Word
+
+A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
+X = Variable(Role.INPUT, "x", REAL)
+_RELATIONS = ("<=", "<", ">=", ">")
+
+
+def seconds(rng: random.Random, relation: str = "") -> Limit:
+    amount: Term = X if rng.random() < 0.15 else Literal(Fraction(rng.randrange(4)), REAL)
+    return Limit(relation, amount, False)
+
+
+def formula(rng: random.Random, depth: int) -> Term:
+    """A random formula over positions."""
+    if depth == 0:
+        return rng.choice((A, B, A, B, Compare("<=", X, Literal(Fraction(1), REAL)), FALSE))
+    inner = lambda: formula(rng, depth - 1)  # noqa: E731
+    state = lambda: formula(rng, 0)  # noqa: E731
+    match rng.randrange(13):
+        case 0:
+            return Not(inner())
+        case 1 | 2:
+            return rng.choice((And, Or))((inner(), inner()))
+        case 3:
+            return rng.choice((Implies, Iff))(inner(), inner())
+        case 4:
+            return History(rng.choice((Past.ROSE, Past.FELL, Past.CHANGED)), (state(),), BOOL)
+        case 5:
+            return History(Past.PREVIOUS, (inner(), inner()), BOOL)
+        case 6:
+            return History(Past.ARRIVED, (A,), BOOL)
+        case 7:
+            bound = Limit("", Literal(rng.randrange(3), NATURAL), True)
+            return History(rng.choice((Past.ONCE, Past.HISTORICALLY, Past.HELD)), (inner(),), BOOL, bound)
+        case 8:
+            counted = History(Past.COUNTED, (inner(), inner()), NATURAL)
+            return Compare(rng.choice(_RELATIONS), counted, Literal(rng.randrange(4), NATURAL))
+        case 9 | 10:
+            operator = rng.choice((Past.ONCE, Past.HISTORICALLY, Past.HELD))
+            bound = seconds(rng) if operator is Past.HELD or rng.random() < 0.7 else None
+            return History(operator, (inner(),), BOOL, bound)
+        case _:  # since, the most intricate
+            bound = seconds(rng, rng.choice(_RELATIONS)) if rng.random() < 0.8 else None
+            return History(Past.SINCE, (inner(), inner()), BOOL, bound)
+
+
+def word_of(rng: random.Random, length: int = 7) -> Word:
+    steps = [
+        {"in.a": rng.random() < 0.6, "out.b": rng.random() < 0.5, "in.x": Fraction(rng.randrange(4)),
+         "in.arrived a": rng.random() < 0.5}
+        for _ in range(length)
+    ]  # fmt: skip
+    times = [0]
+    for _ in range(length - 1):
+        times.append(times[-1] + rng.choice((0, 1, 1, 2, 3)))
+    return Word(steps, times)
+
+
+def ports(word: Word, k: int) -> dict[str, Value]:
+    step = dict(word.steps[k])
+    dt = Fraction(word.times[k] - word.times[k - 1]) if k else Fraction(5)
+    arrived = {f"in.arrived {name}#": step.pop(f"in.arrived {name}") for name in ("a",)}
+    return {**step, **arrived, CLOCK.qualified: dt}
+
+
+def along(
+    word: Word, records: Timed, clause: Term, positions: Lasting, instants: Mapping[Side, Term]
+) -> tuple[list[bool], list[bool]]:
+    """A clause at each step, with the silence before it, and its value at every position, by its cells."""
+    keeper, judged, values = Keeper(records.cells), list[bool](), list[bool]()
+    for k in range(len(word.steps)):
+        memory = dict(keeper.memory)
+        silent = lambda elapsed, side=Side.AT: bool(  # noqa: E731
+            evaluate(instants[side], {**memory, ELAPSED.qualified: elapsed})  # noqa: B023
+        )
+        for at in range(word.times[k - 1], word.times[k]) if k else ():
+            elapsed = Fraction(at - word.times[k - 1])
+            if elapsed:
+                values.append(silent(elapsed))
+            values.append(silent(elapsed + Fraction(1, 2)))
+            # all of an open interval is alike
+            assert [silent(elapsed, Side.AFTER), silent(elapsed + 1, Side.BEFORE)] == [values[-1]] * 2
+        at_step = keeper.at(ports(word, k))
+        judged.append(bool(evaluate(clause, at_step)))
+        values.append(bool(evaluate(positions.now, at_step)))
+        keeper.advance(ports(word, k))
+    return judged, values
+
+
+def disagreement(rng: random.Random, depth: int) -> str | None:
+    """A formula of which cells and definition say something else somewhere in a word; empty where it is not said."""
+    term, word = formula(rng, depth), word_of(rng)
+    trigger = formula(rng, depth - 1)
+    operator = rng.choice((Past.WITHIN, Past.FOR, Past.UNTIL))
+    limit = Limit("", Literal(Fraction(rng.randrange(4)), REAL), False) if operator is not Past.UNTIL else None
+    wanted = (formula(rng, 1), formula(rng, 1)) if operator is Past.UNTIL else (formula(rng, 1),)
+    response = History(operator, wanted, BOOL, limit)
+    meaning = Meaning(word)
+    for whole in (term, Implies(trigger, response)):
+        if timed(whole) is None:
+            continue
+        records = Timed()
+        try:
+            clause = records.clause(whole)
+            positions = records.positions(whole)
+            instants, _ = records.instants(positions)
+        except Unsaid:
+            continue
+        shown = show_term(whole, "rcl")
+        try:
+            judged, values = along(word, records, clause, positions, instants)
+        except AssertionError:
+            return f"{shown}: an interval is not alike"
+        places = range(len(meaning.positions))
+        if whole is term:
+            expected = [bool(meaning.value(term, p)) for p in places]
+            if values != expected:
+                return f"{shown}: {[p for p in places if values[p] != expected[p]]} of {word.times}"
+        else:
+            first = next((p for p in places if not values[p]), None)
+            if first != meaning.broken(trigger, response):
+                return f"{shown}: first broken {first}, {meaning.broken(trigger, response)} of {word}"
+        for k in range(len(word.steps)):  # a step tells of itself, and of the silence before it unless it was told then
+            before = meaning.places[k - 1] + 1 if k else 0
+            told = k > 0 and not values[before - 1]
+            if judged[k] != all(values[before : meaning.places[k] + 1]) and not told:
+                return f"{shown}: at step {k}"
+    return None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_cells_are_what_the_definitions_say(seed: int) -> None:
+    rng = random.Random(seed)
+    assert [found for _ in range(80) if (found := disagreement(rng, rng.choice((1, 2, 2, 3)))) is not None] == []

@@ -1,0 +1,200 @@
+"""Systems and contracts with limits in seconds: known answers, and random systems against all their runs."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from helpers import some
+
+from avow.base.verdict import Verdict
+from avow.calculus.composition import compose
+from avow.calculus.obligations import all_obligations, settle_all
+from avow.cli.simulate import command as simulate
+from avow.evaluation.evaluate import compile_term
+from avow.evaluation.running import Keeper
+from avow.formulas.formula import substitute
+from avow.formulas.values import Value
+from avow.language.load import check_text
+from avow.language.printer import show_term
+from avow.language.sorts import REAL
+from avow.language.terms import Implies, Literal, Past, Term, histories, timed
+from avow.sanity.viability import viable
+from avow.system.load import load_system
+from avow.temporal.ages import CLOCK
+from avow.temporal.cell import Unsaid
+from avow.temporal.clock import Timed, one_step
+from temporal.test_clock import X, formula
+
+STATES = 300
+STOPPER = """
+node lidar {{ inputs( fault : BOOL ) outputs( silent : BOOL ) topics() guarantee same ( out.silent <=> in.fault ) }}
+node stopper {{
+  inputs( silent : BOOL ) outputs( stopped : BOOL ) topics()
+  steps( {pace} )
+  guarantee stop "After two seconds of silence it is stopped" ( held[2 s](in.silent) -> out.stopped )
+}}
+node log {{
+  inputs( silent : BOOL, stopped : BOOL ) outputs( fine : BOOL ) topics()
+  {more}
+  assume stopped "Silent for {by} s, it is stopped" ( held[{by} s](in.silent) -> in.stopped )
+  guarantee fine ( out.fine )
+}}
+"""
+
+
+def verdicts(folder: Path) -> dict[str, Verdict]:
+    composition = compose(load_system(folder))
+    obligations = all_obligations(composition)
+
+    class Limits:
+        seconds, seed = 5.0, 0
+
+    found = settle_all(composition, obligations, Limits())
+    return {o.name: outcome.verdict for o, outcome in zip(obligations, found, strict=True)}
+
+
+def stopped(folder: Path, pace: str, by: str, more: str = "") -> Verdict:
+    (folder / "system.rcl").write_text(STOPPER.format(pace=pace, by=by, more=more))
+    (folder / "plan.yaml").write_text("{}")
+    return verdicts(folder)["whole.log.stopped"]
+
+
+@pytest.mark.slow
+def test_ages_are_the_same_for_all_nodes(tmp_path: Path) -> None:
+    assert stopped(tmp_path, "at most 500 ms", "3") is Verdict.PROVED
+    assert stopped(tmp_path, "every 500 ms", "2") is Verdict.PROVED
+
+
+@pytest.mark.slow
+def test_steps_that_no_run_can_have_prove_nothing(tmp_path: Path) -> None:
+    """Two periods contradict one another in the one time between steps that a system has: then nothing is said."""
+    assert stopped(tmp_path, "every 500 ms", "1", "steps( every 300 ms )") is not Verdict.PROVED
+    assert stopped(tmp_path, "every 500 ms", "1", "steps( at most 300 ms )") is not Verdict.PROVED
+
+
+def realizable(text: str) -> Verdict:
+    contract, found = check_text(f"node n {{ inputs( r : BOOL ) outputs( s : BOOL ) topics() {text} }}", "n.rcl")
+    assert contract is not None, found
+    return viable(one_step(contract.nodes[0])).verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("clauses", "expected"),
+    [
+        # an answer that needs another step: who comes too late for it is lost
+        ("steps( at most 2 s ) G( rose(in.r) -> within[2 s](s) ) G( rose(in.r) -> not s )", Verdict.PROVED),
+        ("steps( at most 2.1 s ) G( rose(in.r) -> within[2 s](s) ) G( rose(in.r) -> not s )", Verdict.REFUTED),
+        ("steps( every 2 s ) G( rose(in.r) -> within[2 s](s) ) G( rose(in.r) -> not s )", Verdict.PROVED),
+        ("G( rose(in.r) -> within[2 s](s) ) G( rose(in.r) -> not s )", Verdict.REFUTED),
+        ("G( rose(in.r) -> within[2 s](s) )", Verdict.PROVED),
+        ("G( in.r -> for[2 s](s) )", Verdict.PROVED),
+        ("G( in.r -> for[2 s](s) ) G( previous(in.r, FALSE) -> not s )", Verdict.REFUTED),
+        ("A( not held[1 s](in.r) ) G( held[2 s](in.r) -> FALSE )", Verdict.PROVED),
+        ("G( once[1 s](s) )", Verdict.PROVED),  # what is put out stays so
+        ("G( once[1 s](rose(s)) )", Verdict.REFUTED),
+        ("steps( at most 1 s ) A( TRUE ) G( once[2 s](rose(s)) )", Verdict.PROVED),
+    ],
+)
+def test_known_answers(clauses: str, expected: Verdict) -> None:
+    assert realizable(clauses) is expected
+
+
+def clause(rng: random.Random) -> Term:
+    """A random clause with few states, without events of messages; every other one has a limit in seconds."""
+    while True:
+        found = formula(rng, 2)
+        if rng.random() < 0.4:
+            found = Implies(formula(rng, 1), found)
+        found = substitute(found, {X: Literal(Fraction(1), REAL)})
+        if all(h.operator is not Past.ARRIVED for h in histories(found)) and (timed(found) or rng.random() < 0.3):
+            return found
+
+
+class Enumeration:
+    """Every run, in steps of a second, of two nodes over truth values: `a` reads `e` and says `w`, `b` reads `w`."""
+
+    def __init__(self, said: Term, assumed: Term, promised: Term) -> None:
+        self.parts = []
+        for term, names in ((said, "ew"), (assumed, "ww"), (promised, "wv")):
+            records = Timed()
+            self.parts.append((compile_term(records.clause(term)), Keeper(records.cells), names))
+
+    def reach(self) -> Iterator[bool]:
+        """At every step that a run can come to, whether b's assumption holds."""
+        first = (*(tuple(keeper.memory.items()) for _, keeper, _ in self.parts), True)
+        seen, waiting = {first}, [first]
+        while waiting:
+            *memories, kept = waiting.pop()
+            for e, w, v in product((False, True), repeat=3):
+                values = {"e": e, "w": w, "v": v}
+                holds, after = [], []
+                for (judge, keeper, (one, other)), memory in zip(self.parts, memories, strict=True):
+                    keeper.memory = dict(memory)
+                    ports: dict[str, Value] = {
+                        "in.a": values[one],
+                        "out.b": values[other],
+                        CLOCK.qualified: Fraction(1),
+                    }
+                    holds.append(bool(judge(keeper.at(ports))))
+                    keeper.advance(ports)
+                    after.append(tuple(keeper.memory.items()))
+                said, assumed, promised = holds
+                still = kept and assumed
+                if not said or (still and not promised):
+                    continue
+                yield assumed
+                state = (*after, still)
+                if state not in seen:
+                    seen.add(state)
+                    waiting.append(state)
+                    if len(seen) > STATES:
+                        raise OverflowError
+
+
+def drawn(seed: int) -> tuple[Term, Term, Term]:
+    rng = random.Random(seed)
+    return clause(rng), clause(rng), clause(rng)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", some(range(200), 6))
+def test_no_run_says_otherwise(seed: int, tmp_path: Path) -> None:
+    said, assumed, promised = drawn(seed)
+
+    def text(term: Term, one: str, other: str) -> str:
+        return show_term(term, "rcl").replace("in.a", f"in.{one}").replace("out.b", other)
+
+    (tmp_path / "system.rcl").write_text(
+        "node a { inputs( e : BOOL ) outputs( w : BOOL ) topics() steps( every 1 s ) "
+        f"guarantee g ( {text(said, 'e', 'out.w')} ) }}\n"
+        f"node b {{ inputs( w : BOOL ) outputs( v : BOOL ) topics() assume m ( {text(assumed, 'w', 'in.w')} )"
+        f" guarantee h ( {text(promised, 'w', 'out.v')} ) }}\n"
+    )
+    (tmp_path / "plan.yaml").write_text("{}")
+    try:
+        met = all(Enumeration(said, assumed, promised).reach())
+    except (OverflowError, Unsaid):
+        pytest.skip("too many states, or not said")
+    found = verdicts(tmp_path)["whole.b.m"]
+    assert found is not Verdict.PROVED or met
+    assert found is not Verdict.REFUTED or not met
+
+
+def test_a_run_has_its_times(tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( r : BOOL ) outputs( s : BOOL ) topics() steps( at most 2 s ) "
+        "guarantee g ( rose(in.r) -> within[2 s](s) ) guarantee h ( rose(in.r) -> not s ) "
+        "guarantee k ( not once[4 s](arrived(in.r)) -> not s ) }"
+    )
+    (tmp_path / "plan.yaml").write_text("{}")
+    told = CliRunner().invoke(simulate, [str(tmp_path), "--steps", "12", "--seed", "3"], catch_exceptions=False)
+    assert told.exit_code == 0, told.output
+    assert "step 12" in told.output
+    assert "at 0 s" in told.output
