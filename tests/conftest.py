@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import importlib.util
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -17,7 +19,16 @@ ROOT = Path(__file__).parent.parent
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-_DEBIAN = Path("/usr/lib/python3/dist-packages")
+
+@functools.cache
+def _runs(*command: str) -> bool:
+    """Whether a command ends well: what was installed by half is not there."""
+    try:
+        return subprocess.run(command, capture_output=True, check=False, timeout=60).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
 _NEEDS = {
     "needs_ajpf": lambda: "AJPF_HOME" in os.environ,
     "needs_chromium": lambda: any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
@@ -27,8 +38,8 @@ _NEEDS = {
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
-    "needs_ros1": lambda: all((_DEBIAN / name).is_dir() for name in ("rospy", "rosmaster", "diagnostic_msgs")),
-    "needs_roscpp": lambda: Path("/usr/include/ros/ros.h").is_file() and all(map(shutil.which, ("g++", "pkg-config"))),
+    "needs_ros1": lambda: _runs("/usr/bin/python3", "-c", "import diagnostic_msgs, rosmaster, rospy"),
+    "needs_roscpp": lambda: shutil.which("g++") is not None and _runs("pkg-config", "--exists", "roscpp"),
     "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
 }
 
