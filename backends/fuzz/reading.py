@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.language.contract import Port
+from avow.formulas.formula import free_variables
+from avow.language.contract import Node, Port
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.system.parameters import parameters
 from avow.system.paths import inside
@@ -26,6 +27,8 @@ class Reading:
     """A job's source. All paths are absolute."""
 
     job: Job
+    node: Node
+    """The job's, without the ports that are no machine values and of which no clause speaks."""
     source: Source
     adapter: Path
     sources: tuple[Path, ...]
@@ -52,7 +55,12 @@ class Reading:
     @property
     def asked(self) -> tuple[Port, ...]:
         """The inputs that a step is given, in order; the others are memory."""
-        return tuple(p for p in self.job.node.inputs if p.name not in self.memory)
+        return tuple(p for p in self.node.inputs if p.name not in self.memory)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Inputs that the program is not given."""
+        return tuple(p.variable.qualified for p in self.job.node.inputs if p not in self.node.inputs)
 
 
 def load(job: Job) -> Reading:
@@ -70,9 +78,17 @@ def load(job: Job) -> Reading:
     if source.numbers is Numbers.EXACT:
         message = "a compiled program computes with machine numbers: numbers: float64 or float32"
         faults.append(Diagnostic("FUZZ102", message, source.place.at("numbers")))
-    for port in (*job.node.inputs, *job.node.outputs):
-        if not isinstance(_item(port.sort), PLAIN):
+    clauses = (*job.node.assumptions, *(job.clause(o) for o in job.obligations))
+    spoken = {v.qualified for clause in clauses for v in free_variables(clause.formula)}
+    odd_ports = [p for p in (*job.node.inputs, *job.node.outputs) if not isinstance(_item(p.sort), PLAIN)]
+    for port in odd_ports:
+        if port.variable.qualified in spoken or port.name in source.memory:
             faults.append(Diagnostic("FUZZ102", f"no compiled step is given what {port.name} is", place))
+    node = replace(
+        job.node,
+        inputs=tuple(p for p in job.node.inputs if p not in odd_ports),
+        outputs=tuple(p for p in job.node.outputs if p not in odd_ports),
+    )
     sources, wrong = _paths(job, "sources", Path.is_file)
     include, odd = _paths(job, "include", Path.is_dir)
     params, unclear = parameters(job.root, source)
@@ -81,7 +97,7 @@ def load(job: Job) -> Reading:
         raise Rejected(*faults)
     resolved = [path.resolve() for path in (adapter, *sources)]
     return Reading(
-        job, source, resolved[0], tuple(resolved[1:]), tuple(dict.fromkeys(p.resolve() for p in include)), params
+        job, node, source, resolved[0], tuple(resolved[1:]), tuple(dict.fromkeys(p.resolve() for p in include)), params
     )
 
 

@@ -44,7 +44,7 @@ def native(folder: Path | None = None) -> Mapping[str, str]:
 
 def drawable(reading: Reading) -> Drawable:
     """Numbers at which something may change: those of contract, parameters and source."""
-    node, job = reading.job.node, reading.job
+    node, job = reading.node, reading.job
     formulas = [c.formula for c in (*node.assumptions, *(job.clause(o) for o in job.obligations))]
     seen: dict[Fraction, None] = dict.fromkeys(sorted(numbers_of(formulas), key=lambda n: (abs(n), n)))
     seen |= dict.fromkeys(sorted(_leaves(reading.params)))
@@ -66,7 +66,7 @@ def drawable(reading: Reading) -> Drawable:
 
 def tables(reading: Reading, made: Drawable) -> str:
     """`contract.inc`."""
-    node, job = reading.job.node, reading.job
+    node, job = reading.node, reading.job
     guide = Guide({p.name: k for k, p in enumerate(node.inputs)}, {p.name: k for k, p in enumerate(node.outputs)})
     assumed = [guide.root(c.formula) for c in node.assumptions]
     promised = [guide.root(job.clause(o).formula) for o in job.obligations]

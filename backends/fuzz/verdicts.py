@@ -127,7 +127,7 @@ class Bench:
 
     def _steps(self, run: list[Step], reply: Mapping[str, Any]) -> Iterator[tuple[int, tuple[Seen, ...]]]:
         """The steps that the assumptions allow, each with those before it, up to the first that they do not."""
-        node, memory = self.reading.job.node, dict.fromkeys(self.reading.memory, "")
+        node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
         answers = list(reply["replies"])
         trace: tuple[Seen, ...] = ()
         if not answers:
@@ -189,14 +189,14 @@ class Bench:
 
     def _fits(self, answer: Mapping[str, Any]) -> None:
         """Raises Misused where the outputs are not the contract's: no fault of the node."""
-        names = {p.name for p in self.reading.job.node.outputs} - self.reading.memory
+        names = {p.name for p in self.reading.node.outputs} - self.reading.memory
         given = {name for name, _ in answer["value"]["d"]}
         if given != names:
             missing, extra = sorted(names - given), sorted(given - names)
             said = [f"lacks {', '.join(missing)}"] if missing else []
             said += [f"has {', '.join(extra)}, which is no output"] if extra else []
             raise Misused(f"what the adapter gives {' and '.join(said)}")
-        sorts = {p.name: p.sort for p in self.reading.job.node.outputs}
+        sorts = {p.name: p.sort for p in self.reading.node.outputs}
         odd = [
             name for name, data in (*answer["value"]["d"], *answer["memory"].items()) if not _of(data, sorts.get(name))
         ]
@@ -205,7 +205,7 @@ class Bench:
 
     def _begins(self, held: Mapping[str, Any]) -> bool:
         """Whether what the constructor makes of memory meets what is assumed of memory alone."""
-        node = self.reading.job.node
+        node = self.reading.node
         try:
             values = {f"in.{n}": returned(n, v, node.input(n).sort) for n, v in held.items()}
         except NoValue as wrong:
@@ -221,7 +221,7 @@ class Bench:
         return True
 
     def _allowed(self, case: Mapping[str, Any]) -> bool | None:
-        node = self.reading.job.node
+        node = self.reading.node
         try:
             values = {
                 f"in.{n}": returned(n, v, node.input(n).sort) if not isinstance(v, list) else exact(v)
@@ -268,7 +268,7 @@ class Bench:
     def apart(self, asked: Sequence[tuple[list[Step], str, str, Any]]) -> list[Counterexample]:
         """What went wrong with inputs that are no REAL: no output, or one that is none, or a guarantee that does not
         hold as IEEE 754 compares."""
-        node, memory = self.reading.job.node, dict.fromkeys(self.reading.memory, "")
+        node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
         found: dict[str, Counterexample] = {}
         for run, name, word, reply in asked:
             zero = {k: _finite(v) for k, v in run[0].items()}
@@ -305,7 +305,12 @@ class Bench:
         faultless = [claim for claim in job.claims if claim.name == ProgramClaim.FAULTLESS]
         claims = (*(self._claim(c, counts, faulty, stopped) for c in faultless), *settled(job, self.compared))
         rests = tuple(Hypothesis(HypothesisKind.CLAIM, c.local_id, c.digest, c.claim) for c in faultless)
-        return (*(replace(o, rests_on=rests) if o.verdict is Verdict.TESTED else o for o in own), *claims)
+        open_ones = self.reading.left_out
+        remarks = (
+            (f"what it answers does not hang on {', '.join(open_ones)}, which it is not given",) if open_ones else ()
+        )
+        good = {"rests_on": rests, "hypotheses": remarks}
+        return (*(replace(o, **good) if o.verdict is Verdict.TESTED else o for o in own), *claims)  # type: ignore[arg-type]
 
     def _own(
         self,

@@ -41,7 +41,8 @@ def answering(job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
         start: State = {}
         for name, variable in inputs.items():
             own = next((v for v, ghost in ghosts.items() if ghost == variable), variable)
-            start[own.name] = start[variable.name] = given[name]
+            if name in given:  # one that a program is not given is anything
+                start[own.name] = start[variable.name] = given[name]
         for variable in checked.program.state:
             try:
                 start.setdefault(variable.name, default_value(variable.sort))

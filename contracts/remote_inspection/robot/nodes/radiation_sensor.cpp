@@ -7,8 +7,10 @@
 #include <ros/ros.h>
 
 #include <cstdint>
-#include <set>
+#include <memory>
 #include <string>
+
+#include "radiation_sensor.hpp"
 
 namespace rover {
 
@@ -70,9 +72,8 @@ class RadiationSensor {
  public:
   RadiationSensor() {
     ros::NodeHandle own("~");
-    own.param("orange", orange_, 120.0);
-    own.param("red", red_, 250.0);
-    own.param("dwell", dwell_, 5);
+    sensor_ = std::make_unique<rover::RadiationSensor>(
+        own.param("orange", 120.0), own.param("red", 250.0), own.param("dwell", 5));
     inspected_ = node_.advertise<rover::Snapshot>("/inspected", 100, true);
     status_ = node_.advertise<rover::Snapshot>("/radiationStatus", 100, true);
     command_ = node_.subscribe("/command", 100, &RadiationSensor::commanded, this);
@@ -83,14 +84,13 @@ class RadiationSensor {
   void commanded(const boost::shared_ptr<rover::Snapshot const>& message) { latest_ = *message; }
 
   void step(const boost::shared_ptr<rover::Snapshot const>& reading) {
-    readings_ = latest_.command == "inspect" ? readings_ + 1 : 0;
-    if (readings_ >= dwell_ && done_.insert(latest_.id).second) {
+    if (auto ended = sensor_->inspected(latest_.command == "inspect", latest_.id)) {
       rover::Snapshot inspected;
-      inspected.id = latest_.id;
+      inspected.id = *ended;
       inspected_.publish(inspected);
     }
     rover::Snapshot status;
-    status.level = reading->radiation < orange_ ? "green" : reading->radiation < red_ ? "orange" : "red";
+    status.level = sensor_->status(reading->radiation);
     status_.publish(status);
   }
 
@@ -98,9 +98,7 @@ class RadiationSensor {
   ros::Publisher inspected_, status_;
   ros::Subscriber command_, reading_;
   rover::Snapshot latest_;
-  std::set<std::uint32_t> done_;
-  double orange_ = 0, red_ = 0;
-  int dwell_ = 0, readings_ = 0;
+  std::unique_ptr<rover::RadiationSensor> sensor_;
 };
 
 int main(int argc, char** argv) {
