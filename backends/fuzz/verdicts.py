@@ -310,7 +310,11 @@ class Bench:
             (f"what it answers does not hang on {', '.join(open_ones)}, which it is not given",) if open_ones else ()
         )
         good = {"rests_on": rests, "hypotheses": remarks}
-        return (*(replace(o, **good) if o.verdict is Verdict.TESTED else o for o in own), *claims)  # type: ignore[arg-type]
+        answered = tuple(replace(o, **good) if o.verdict is Verdict.TESTED else o for o in own)  # type: ignore[arg-type]
+        said = tuple(
+            replace(o, hypotheses=(*o.hypotheses, *remarks)) if o.verdict is Verdict.TESTED else o for o in claims
+        )
+        return (*answered, *said)
 
     def _own(
         self,

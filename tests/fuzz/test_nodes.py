@@ -162,6 +162,16 @@ def test_an_adapter_that_does_not_fit(step: str, tmp_path: Path) -> None:
     assert not any(o.verdict.supports for o in found.values()), {o.verdict: o.summary for o in found.values()}
 
 
+@pytest.mark.nightly
+def test_what_no_clause_speaks_of_is_left_out_and_said(tmp_path: Path) -> None:
+    rcl = LIMITER.rcl.replace("inputs( v : REAL )", "inputs( v : REAL, at : REAL --> BOOL )")
+    found = replace(LIMITER, rcl=rcl).outcomes(tmp_path / "left")
+    assert {o.verdict for o in found.values()} == {Verdict.TESTED}
+    assert all("in.at" in o.hypotheses[0] for o in found.values())
+    spoken = rcl.rstrip("} ") + " guarantee there ( in.at(0) -> out.u == 0 ) }"
+    assert replace(LIMITER, rcl=spoken).outcomes(tmp_path / "spoken")["there"].verdict is Verdict.ERROR
+
+
 def test_it_does_not_compile(tmp_path: Path) -> None:
     found = replace(LIMITER, adapter="struct AvowNode { int x = ; };\n").outcomes(tmp_path)
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}

@@ -1,0 +1,51 @@
+"""What needs no compiler: declarations that do not fit, tables without code, and a machine without clang."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from avow.backends.fuzz import BACKEND, building
+from avow.base.tools import Tool
+from avow.base.verdict import Verdict
+from fuzz.cpp_nodes import LIMITER, SCAN, WATCHDOG
+
+
+def test_without_clang_it_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(building, "clang", lambda: Tool("clang++", None, None, "sudo apt install clang"))
+    report = LIMITER.report(tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
+    assert len(report.outcomes) == 5, "four guarantees, and that it runs without fault"
+    assert all("sudo apt install clang" in o.summary for o in report.outcomes)
+
+
+def test_no_text_becomes_code(tmp_path: Path) -> None:
+    """Whatever a parameter says: the tables are numbers, generated names, and texts escaped byte for byte."""
+    odd = replace(LIMITER, params={"vmax": 1.5, 'x"; int main() {} //': '\\\n*/ ??/ \u00e9 "', "deep": {"R(": True}})
+    table = BACKEND.export(odd.written(tmp_path))["contract.inc"]
+    bare = re.sub(r'"(?:[A-Za-z0-9]|\\[0-3][0-7]{2})*"', '""', table)
+    assert '"' not in bare.replace('""', "")
+    assert "main" not in bare
+    assert "vmax" not in bare
+    assert table.isascii()
+
+
+@pytest.mark.parametrize(
+    ("cpp", "code"),
+    [
+        (replace(LIMITER, numbers="exact"), "FUZZ102"),
+        (replace(LIMITER, options={"sources": ["src/absent.cpp"]}), "FUZZ101"),
+        (replace(LIMITER, options={"include": ["../out"]}), "FUZZ101"),
+        (replace(SCAN, rcl=SCAN.rcl.replace("<REAL>", "<<REAL>>").replace("in.scan(i)", "in.scan(i)(0)")), "FUZZ102"),
+    ],
+)
+def test_what_does_not_fit_is_told_before_anything_runs(cpp: object, code: str, tmp_path: Path) -> None:
+    assert {d.code for d in BACKEND.check(cpp.written(tmp_path))} == {code}  # type: ignore[attr-defined]
+
+
+def test_every_file_that_is_included_is_named(tmp_path: Path) -> None:
+    job = WATCHDOG.written(tmp_path)
+    assert {path.name for path in BACKEND.files(job)} == {"adapter.hpp", "nodes.hpp", "params.yaml"}
