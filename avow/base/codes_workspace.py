@@ -256,6 +256,37 @@ WORKSPACE_CODES = register(
         "Have the authority issue a new one.",
     ),
     declare(
+        "DRIVE100",
+        "nothing to drive",
+        "The plan declares no callback class as the node, or there is no such node, or no such file.",
+        "Write `source: {python: src/node.py, class: Node, kind: rospy}` for the node (or `kind: rclpy`).",
+    ),
+    declare(
+        "DRIVE101",
+        "no message class",
+        "A message type that the class needs is not defined, or has a field called `topic` or `time`.",
+        "Name the folder of its definition under `messages`, or the distribution under `ros`.",
+    ),
+    declare(
+        "DRIVE102",
+        "topics do not fit",
+        "The class does not subscribe to a topic of the contract's inputs, does not publish one of its outputs, or "
+        "does so with another type.",
+        "Correct the contract's `topics`, the plan's `ros: {nodes: …}`, or the class.",
+    ),
+    declare(
+        "DRIVE103",
+        "cannot be driven",
+        "The class asks for something of ROS that is not driven, hangs on a clock or on chance, or cannot be run.",
+        "The message names it. Time is ROS' own (`rospy.Time.now()`, `get_clock().now()`); chance needs a fixed seed.",
+    ),
+    declare(
+        "DRIVE104",
+        "no such messages",
+        "The trace has nothing for this class, its times run backwards, or a message is not of its topic's type.",
+        "Correct the trace, or name another.",
+    ),
+    declare(
         "CLI006",
         "cannot be run",
         "The system cannot be simulated: the message says what is missing, such as an interpretation or a domain.",

@@ -26,6 +26,7 @@ COMMANDS = {
     "compose": "the derivation and its side conditions",
     "diff": "what changed between two ledgers or two revisions",
     "doctor": "which tools are here, and the command that installs a missing one",
+    "drive": "run a node's callback class without ROS, record it, replay a recording",
     "explain": "one obligation: formula, status, evidence, counterexample, how to re-run it",
     "fmt": "the canonical layout of .rcl files",
     "fretish": "FRETish requirements as nodes of a contract",
@@ -50,6 +51,7 @@ COMMANDS = {
 
 _OF_BACKENDS = {
     "agent": "avow.backends.ajpf.command",
+    "drive": "avow.backends.rosmonitoring.driving",
     "monitor": "avow.backends.rosmonitoring.command",
     "review": "avow.backends.review.command",
 }

@@ -113,7 +113,7 @@ def coded(value: Any, depth: int = 0) -> Any:
 
 
 def load(path: str, function: str, drive: Any = None) -> Any:
-    """The function of the file; with `drive`, the class that the JSON in `function` names, driven."""
+    """The function of the file; with `drive`, which `driving` gives, the class that the JSON in `function` names."""
     spec = importlib.util.spec_from_loader("avow_subject", _FromSource("avow_subject", path))
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} is no Python module")
@@ -124,8 +124,20 @@ def load(path: str, function: str, drive: Any = None) -> Any:
     spec.loader.exec_module(module)
     if drive is not None:
         driven = json.loads(function)
-        return drive.driver(getattr(module, driven["class"]), driven)
+        return drive(getattr(module, driven["class"]), driven)
     return getattr(module, function)
+
+
+def driving(function: str) -> Any:
+    """What drives the class that the JSON in `function` names; nothing of a function. What stands in for ROS is there
+    before the file is loaded."""
+    if not function.startswith("{"):
+        return None
+    steps = _beside("../drive/steps.py")
+    ros = json.loads(function).get("ros")
+    if ros is None:
+        return steps.driver
+    return _beside(f"../drive/{ros['kind']}.py").modules(_beside("../drive/callbacks.py"), ros, steps)
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
@@ -317,7 +329,7 @@ def main() -> None:
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
-        drive = _beside("../drive/steps.py") if function.startswith("{") else None
+        drive = driving(function)
         read_sources_only(os.path.realpath(root))
         dumps, write, leave = json.dumps, os.write, os._exit
 

@@ -26,7 +26,7 @@ from avow.language.contract import Contract, Node
 from avow.language.sorts import DataSort, EnumSort, Sort, components
 from avow.language.terms import Term
 from avow.system.graph import dataflow
-from avow.system.plan import Method, Ros, System
+from avow.system.plan import Driving, Method, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,8 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     if tool.uses_source and job.source is not None:
         declared = job.source
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
-        parts.append(["source", *texts, sorted(declared.memory.items())])
+        kind = [] if declared.kind is Driving.STEP else [declared.kind.value]
+        parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
     return json.dumps(parts)
 
 

@@ -31,15 +31,19 @@ class Subject:
     memory: Mapping[str, str]
     attributes: tuple[str, ...]
     """Whose values after `__init__` are wanted."""
+    ros: Mapping[str, Any] | None = None
+    """Of a callback class: what stands in for ROS (`avow.drive.callbacks`)."""
 
     @property
     def spec(self) -> str:
-        spec = {
+        spec: dict[str, Any] = {
             "class": self.class_name,
             "params": coded(dict(self.params)),
             "memory": dict(self.memory),
             "attributes": list(self.attributes),
         }
+        if self.ros is not None:
+            spec["ros"] = dict(self.ros)
         return json.dumps(spec)
 
 

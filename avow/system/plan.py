@@ -170,6 +170,17 @@ class Numbers(StrEnum):
     """Likewise, of 32 bits."""
 
 
+class Driving(StrEnum):
+    """How a node's class is driven."""
+
+    STEP = "step"
+    """By its method `step`, which is given inputs and returns outputs."""
+    ROSPY = "rospy"
+    """By its callbacks: subscribers and timers of ROS 1."""
+    RCLPY = "rclpy"
+    """By its callbacks: subscriptions and timers of ROS 2."""
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """The program that is the node, declared once for every method that looks at it.
@@ -188,6 +199,7 @@ class Source:
     memory: Mapping[str, str] = field(default_factory=dict)
     """Port → attribute, without ``self.``."""
     place: Located = field(default=Located({}, Span("", 1, 1, 1, 1)), compare=False, repr=False)
+    kind: Driving = Driving.STEP
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from avow.base.diagnostics import Diagnostic
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
-from avow.system.plan import Numbers, Plan, Source
+from avow.system.plan import Driving, Numbers, Plan, Source
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
 
@@ -33,6 +33,9 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
         absent = "class" if "python" in texts else "python"
         message = f"nodes.{name}.source: python and class go together, and {absent} is missing"
         faults.append(Diagnostic("PLAN104", message, piece.span))
+    if texts.get("kind", "step") != "step" and memory is not None:
+        message = f"nodes.{name}: memory is of a class with a method step, and kind is {texts['kind']}"
+        faults.append(Diagnostic("PLAN110", message, memory.span))
     held: dict[str, str] = {}
     for port, part in (memory.entries or {}).items() if memory is not None else ():
         attribute = part.text.removeprefix("self.")
@@ -48,6 +51,7 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
         Numbers(numbers.text) if numbers is not None else Numbers.FLOAT64,
         held,
         node.located(),
+        Driving(texts.get("kind", "step")),
     )
     return found, tuple(faults)
 

@@ -15,7 +15,7 @@ from avow.drive.steps import coded
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.system.parameters import parameters
 from avow.system.paths import inside
-from avow.system.plan import Numbers, Source
+from avow.system.plan import Driving, Numbers, Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +126,9 @@ def _declared(job: Job, source: Source) -> SubjectFile:
     params, faults = parameters(job.root, source)
     if source.numbers is Numbers.FLOAT32:
         faults += (Diagnostic("HYPO106", "a Python class computes with float64, not float32", place),)
+    if source.kind is not Driving.STEP:
+        why = f"what is tested is a class with a method step, and kind is {source.kind}: `avow drive` runs callbacks"
+        faults += (Diagnostic("HYPO106", why, place),)
     wrong = unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
     if wrong:
         faults += (Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place),)

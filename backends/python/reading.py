@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.stepping.cpython import Subject
 from avow.system.parameters import parameters
 from avow.system.paths import inside
-from avow.system.plan import Numbers, Source
+from avow.system.plan import Driving, Numbers, Source
 
 from .program import Step
 from .translate import Translator
@@ -75,6 +75,9 @@ def load(job: Job) -> Reading:
     if source.numbers is Numbers.FLOAT32:
         message = "Python's floats are float64: numbers: float32 is not what this source computes with"
         faults.append(Diagnostic("PYTHON100", message, source.place.at("numbers")))
+    if source.kind is not Driving.STEP:
+        message = f"a class with a method step is proved, and kind is {source.kind}: `avow drive` runs callbacks"
+        faults.append(Diagnostic("PYTHON100", message, source.place.at("source", "kind")))
     path = inside(job.root, source.python)
     text, encoding, tree = "", "", None
     try:

@@ -1,0 +1,363 @@
+"""A callback class, driven: a node of rospy or rclpy, unmodified, in virtual time and without ROS.
+
+`Driven` stands in for the modules that such a file imports: ROS' own (`avow.drive.rospy`, `avow.drive.rclpy`) and the
+messages of the packages that are given. What ROS has and this has not is an error that names it, also where the class
+catches it. Callbacks run one at a time, in the order of their times; a timer that is due at a message's time comes
+first. Time stands still while a callback runs.
+
+A message crosses as data: a whole number ``{"i": digits}``, a float ``{"f": hexadecimal}``, an array ``{"l": [...]}``,
+a message ``{"d": [[field, value], ...]}``; texts and truth values are their own JSON.
+"""
+
+from __future__ import annotations
+
+import heapq
+import importlib.abc
+import importlib.machinery
+import json
+import math
+import struct
+import sys
+import types
+from collections.abc import Callable, Sequence
+from typing import Any
+
+FOREIGN: tuple[str, ...] = (
+    "rospy",
+    "rclpy",
+    "roslib",
+    "rosgraph",
+    "rospkg",
+    "actionlib",
+    "tf",
+    "tf2_ros",
+    "tf2_py",
+    "message_filters",
+)
+FOREIGN += (
+    "dynamic_reconfigure",
+    "cv_bridge",
+    "genpy",
+    "ros_numpy",
+    "rosbag",
+    "ament_index_python",
+    "tf_transformations",
+)
+INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}
+
+
+class NotDriven(RuntimeError):  # noqa: N818 - it says what is the matter
+    """The class asks for something of ROS that is not driven here."""
+
+
+class Driven:
+    """What stands in for ROS in one process."""
+
+    def __init__(self, spec: Any) -> None:
+        self.kind: str = spec["kind"]
+        self.name: str = spec["name"]
+        self.remaps: list[list[str]] = spec["remaps"]
+        self.types: dict[str, Any] = spec["messages"]
+        self.params: Any = {}
+        self.now = 0
+        self.refused: list[str] = []
+        self.said: list[list[Any]] = []
+        self.heard: dict[str, list[tuple[str, Callable[[Any], None]]]] = {}
+        self.spoken: dict[str, str] = {}
+        self.classes: dict[str, Any] = {}
+        self.due: list[tuple[int, int, Callable[[], None]]] = []
+        self.most: int = spec["most"]
+        self.ran = self._order = 0
+
+    # -- what is not there -------------------------------------------------------------------------------
+
+    def refuse(self, what: str) -> NotDriven:
+        """Kept, so that it is told also where the class catches it."""
+        self.refused.append(what)
+        return NotDriven(f"{what} is not driven")
+
+    def module(self, name: str, content: dict[str, Any]) -> types.ModuleType:
+        made = types.ModuleType(name)
+        vars(made).update({"__path__": [], **content})  # so that a module of it is looked for, and refused
+
+        def absent(attribute: str) -> Any:
+            if attribute.startswith("__"):
+                raise AttributeError(attribute)
+            raise self.refuse(f"{name}.{attribute}")
+
+        vars(made)["__getattr__"] = absent
+        sys.modules[name] = made
+        return made
+
+    # -- names, time, topics -----------------------------------------------------------------------------
+
+    def whole(self, name: Any) -> str:
+        """The whole name of a topic: absolute, relative, private, remapped (http://wiki.ros.org/Names)."""
+        if type(name) is not str or not name:
+            raise TypeError(f"a topic's name is a text: {name!r}")
+        found = self._expanded(name)
+        for old, new in self.remaps:
+            if self._expanded(old) == found:
+                return self._expanded(new)
+        return found
+
+    def _expanded(self, name: str) -> str:
+        if name.startswith("/"):
+            return name
+        if name.startswith("~"):
+            return f"{self.name}/{name.lstrip('~/')}"
+        return f"{self.name.rpartition('/')[0]}/{name}"
+
+    def later(self, at: int, act: Callable[[], None]) -> None:
+        self._order += 1
+        heapq.heappush(self.due, (at, self._order, act))
+
+    def until(self, end: int) -> None:
+        """Whatever is due up to then, in the order of its times."""
+        while self.due and self.due[0][0] <= end:
+            at, _, act = heapq.heappop(self.due)
+            self.now = max(self.now, at)
+            self.count()
+            act()
+        self.now = max(self.now, end)
+
+    def count(self) -> None:
+        self.ran += 1
+        if self.ran > self.most:
+            raise self.refuse(f"more than {self.most} callbacks")
+
+    def hear(self, topic: Any, kind: Any, act: Callable[[Any], None]) -> None:
+        whole, name = self.whole(topic), self.type_of(kind)
+        others = self.heard.setdefault(whole, [])
+        if any(other != name for other, _ in others):
+            raise TypeError(f"{whole} is {others[0][0]}, and heard as {name}")
+        others.append((name, act))
+
+    def speak(self, topic: Any, kind: Any) -> str:
+        whole, name = self.whole(topic), self.type_of(kind)
+        if self.spoken.setdefault(whole, name) != name:
+            raise TypeError(f"{whole} is {self.spoken[whole]}, and published as {name}")
+        return whole
+
+    def say(self, topic: str, message: Any) -> None:
+        data = self.data({"n": self.spoken[topic]}, message, topic)
+        self.said.append([topic, self.now, data])
+        for _, act in self.heard.get(topic, ()):
+            self.later(self.now, lambda act=act: act(self.value({"n": self.spoken[topic]}, data)))  # type: ignore[misc]
+
+    def deliver(self, topic: str, data: Any) -> None:
+        for kind, act in self.heard.get(topic, ()):
+            self.count()
+            act(self.value({"n": kind}, data))
+
+    # -- messages ----------------------------------------------------------------------------------------
+
+    def type_of(self, kind: Any) -> str:
+        name = next((name for name, made in self.classes.items() if made is kind), None)
+        if name is None:
+            raise TypeError(f"{kind!r} is no message class")
+        return name
+
+    def message_class(self, name: str) -> Any:
+        """The class of the messages of a type: fields as slots, constants as attributes."""
+        fields = dict(self.types[name]["fields"])
+        driven = self
+
+        def init(self: Any, *given: Any, **named: Any) -> None:
+            if given and (driven.kind != "rospy" or named or len(given) != len(fields)):
+                raise TypeError(
+                    f"{name}: fields are given by name{', or all of them' if driven.kind == 'rospy' else ''}"
+                )
+            wrong = [field for field in named if field not in fields]
+            if wrong:
+                raise AttributeError(f"{name} has no field {wrong[0]!r}")
+            for field, wire in fields.items():
+                setattr(self, field, named[field] if field in named else driven.fresh(wire))
+            for field, value in zip(fields, given, strict=False):
+                setattr(self, field, value)
+
+        def same(self: Any, other: Any) -> bool:
+            return type(other) is type(self) and all(getattr(self, f) == getattr(other, f) for f in fields)
+
+        def shown(self: Any) -> str:
+            return f"{name}({', '.join(f'{f}={getattr(self, f)!r}' for f in fields)})"
+
+        content: dict[str, Any] = {"__slots__": tuple(fields), "__init__": init, "__eq__": same, "__repr__": shown}
+        content |= {"__hash__": None, "_type": name}
+        content |= {called: self._constant(kind, text) for called, kind, text in self.types[name]["constants"]}
+        return type(name.partition("/")[2], (), content)
+
+    @staticmethod
+    def _constant(kind: str, text: str) -> Any:
+        if kind in INTEGERS:
+            return int(text, 0)
+        if kind == "bool":
+            return text.strip().lower() in ("true", "1")
+        return float(text) if kind.startswith("float") else text
+
+    def fresh(self, wire: Any) -> Any:
+        """What a field holds that nobody has set."""
+        if isinstance(wire, dict):
+            if "n" in wire:
+                return self.classes[wire["n"]]()
+            return [self.fresh(wire["a"]) for _ in range(wire["length"] or 0)]
+        if wire in INTEGERS:
+            return 0
+        if wire in ("time", "duration"):
+            return self.moment(wire, 0)
+        return False if wire == "bool" else 0.0 if wire.startswith("float") else ""
+
+    def moment(self, wire: str, nanoseconds: int) -> Any:
+        """A field's time. Given by the ROS that is driven."""
+        raise NotImplementedError
+
+    def nanoseconds(self, wire: str, value: Any) -> int:
+        """Of a field's time. Raises TypeError."""
+        raise NotImplementedError
+
+    def data(self, wire: Any, value: Any, where: str) -> Any:
+        """A value as it goes over the wire. Raises TypeError, ValueError where ROS would refuse it."""
+        if isinstance(wire, dict) and "n" in wire:
+            if type(value) is not self.classes[wire["n"]]:
+                raise TypeError(f"{where}: {value!r} is no {wire['n']}")
+            fields = self.types[wire["n"]]["fields"]
+            return {"d": [[f, self.data(inner, getattr(value, f), f"{where}.{f}")] for f, inner in fields]}
+        if isinstance(wire, dict):
+            if not isinstance(value, list | tuple | bytes | bytearray):
+                raise TypeError(f"{where}: {value!r} is no array")
+            if wire["length"] is not None and len(value) != wire["length"]:
+                raise ValueError(f"{where} has {wire['length']} items, not {len(value)}")
+            return {"l": [self.data(wire["a"], item, f"{where}[{i}]") for i, item in enumerate(value)]}
+        if wire in INTEGERS:
+            sign, bits = INTEGERS[wire]
+            low, high = (0, 2**bits) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1))
+            if not isinstance(value, int) or not low <= value < high:
+                raise ValueError(f"{where}: {value!r} is no {wire}")
+            return {"i": str(int(value))}
+        if wire in ("time", "duration"):
+            return {"i": str(self.nanoseconds(wire, value))}
+        if wire == "bool":
+            if not isinstance(value, bool):
+                raise TypeError(f"{where}: {value!r} is no bool")
+            return value
+        if wire.startswith("float"):
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise TypeError(f"{where}: {value!r} is no {wire}")
+            number = float(value)
+            if wire == "float32" and math.isfinite(number):
+                (number,) = struct.unpack("f", struct.pack("f", number))
+            return {"f": number.hex()}
+        if type(value) is not str:
+            raise TypeError(f"{where}: {value!r} is no {wire}")
+        return value
+
+    def value(self, wire: Any, data: Any) -> Any:
+        """What a subscriber gets: an object of its own."""
+        if isinstance(wire, dict) and "n" in wire:
+            given = dict(data["d"])
+            made = self.classes[wire["n"]]()
+            for field, inner in self.types[wire["n"]]["fields"]:
+                setattr(made, field, self.value(inner, given[field]))
+            return made
+        if isinstance(wire, dict):
+            return [self.value(wire["a"], item) for item in data["l"]]
+        if wire in ("time", "duration"):
+            return self.moment(wire, int(data["i"]))
+        if wire in INTEGERS:
+            return int(data["i"])
+        return float.fromhex(data["f"]) if wire.startswith("float") else data
+
+    # -- modules -----------------------------------------------------------------------------------------
+
+    def install(self) -> None:
+        """The modules of messages, and the refusal of every other module of ROS."""
+        self.classes |= {name: self.message_class(name) for name in self.types}
+        packages: dict[str, dict[str, Any]] = {}
+        for name, made in self.classes.items():
+            package, _, called = name.partition("/")
+            packages.setdefault(package, {})[called] = made
+            made.__module__ = f"{package}.msg"
+        for package, content in packages.items():
+            self.module(package, {"msg": self.module(f"{package}.msg", content)})
+        sys.meta_path.insert(0, _Refusing(self, frozenset(packages)))
+
+
+class _Refusing(importlib.abc.MetaPathFinder):
+    """What is imported and belongs to ROS, and has no stand-in."""
+
+    def __init__(self, driven: Driven, packages: frozenset[str]) -> None:
+        self._driven, self._packages = driven, packages
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: types.ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        first = fullname.partition(".")[0]
+        of_messages = first.endswith(("_msgs", "_interfaces", "_srvs")) or first in self._packages
+        if first in FOREIGN or of_messages:
+            self._driven.refused.append(f"the module {fullname}")
+            raise ModuleNotFoundError(f"the module {fullname} is not driven", name=fullname)
+        return None
+
+
+class Strict:
+    """An object of ROS: what ROS gives it besides is refused by name."""
+
+    _driven: Driven
+    _called = ""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise self._driven.refuse(f"{self._called}.{name}")
+
+
+class Log:
+    """Takes what is logged, and says nothing."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        for name in names:
+            setattr(self, name, self.nothing)
+
+    @staticmethod
+    def nothing(*_given: Any, **_named: Any) -> None:
+        """Nothing of a message in a log is judged."""
+
+
+def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Callable[[str], str]]:
+    """What drives a class: given the class and what it is to be made with, a function from a case to what came of it.
+
+    `values` is the module that decodes parameters; `make` makes an object.
+    """
+
+    def driver(made: Any, spec: Any) -> Callable[[str], str]:
+        def run(case: str) -> str:
+            asked = json.loads(case)
+            driven.now = int(asked["start"])
+            driven.params = values.plain(spec["params"])
+            wrong = ""
+            handled = 0
+            try:
+                node = make(made, driven.params)
+                for topic, at, data in asked["events"]:
+                    driven.until(int(at))
+                    handled += 1
+                    driven.deliver(topic, data)
+                    driven.until(driven.now)  # what it said to itself
+                driven.until(int(asked["end"]))
+                del node
+            except Exception as error:
+                wrong = f"{type(error).__name__}: {error}"[:300]
+            return json.dumps(
+                {
+                    "heard": {topic: kinds[0][0] for topic, kinds in driven.heard.items()},
+                    "spoken": driven.spoken,
+                    "said": driven.said,
+                    "refused": driven.refused,
+                    "wrong": wrong,
+                    "after": handled,
+                }
+            )
+
+        return run
+
+    return driver

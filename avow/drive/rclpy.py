@@ -1,0 +1,239 @@
+"""What stands in for rclpy (https://docs.ros.org/en/rolling/p/rclpy), for a class that is driven."""
+
+from __future__ import annotations
+
+import functools
+import types
+from collections.abc import Callable
+from typing import Any
+
+SECOND = 10**9
+LOGS = ("debug", "info", "warn", "warning", "error", "fatal")
+OF_NODES: tuple[str, ...] = ("create_", "destroy_", "get_", "set_", "add_", "remove_", "declare_", "undeclare_")
+OF_NODES += (
+    "describe_",
+    "list_",
+    "has_",
+    "count_",
+    "resolve_",
+    "publishers",
+    "subscriptions",
+    "timers",
+    "services",
+    "clients",
+)
+OF_NODES += ("executor",)
+"""How names of rclpy's Node begin: what of them is not here is refused, and anything else is the class's own."""
+
+
+def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
+    """Install them; what drives a class. `base` is the module `callbacks`."""
+
+    @functools.total_ordering
+    class Moment(base.Strict):  # type: ignore[misc]
+        def __init__(self, *, nanoseconds: int = 0, seconds: float = 0) -> None:
+            self.nanoseconds = int(seconds * SECOND) + nanoseconds
+
+        def __eq__(self, other: object) -> bool:
+            return type(other) is type(self) and self.nanoseconds == other.nanoseconds
+
+        def __lt__(self, other: Any) -> bool:
+            return self.nanoseconds < other.nanoseconds if type(other) is type(self) else NotImplemented
+
+        def __hash__(self) -> int:
+            return hash(self.nanoseconds)
+
+        def to_msg(self) -> Any:
+            return driven.moment(self._wire, self.nanoseconds)
+
+        @classmethod
+        def from_msg(cls, message: Any, clock_type: Any = None) -> Any:
+            return cls(nanoseconds=driven.nanoseconds(cls._wire, message))
+
+    class Duration(Moment):
+        _called, _wire = "rclpy.duration.Duration", "duration"
+
+    class Time(Moment):
+        _called, _wire = "rclpy.time.Time", "time"
+
+        def __init__(self, *, seconds: float = 0, nanoseconds: int = 0, clock_type: Any = None) -> None:
+            super().__init__(seconds=seconds, nanoseconds=nanoseconds)
+
+        def __add__(self, other: Any) -> Any:
+            return Time(nanoseconds=self.nanoseconds + other.nanoseconds) if type(other) is Duration else NotImplemented
+
+        def __sub__(self, other: Any) -> Any:
+            if type(other) not in (Time, Duration):
+                return NotImplemented
+            kind: Any = Duration if type(other) is Time else Time
+            return kind(nanoseconds=self.nanoseconds - other.nanoseconds)
+
+    class World(base.Driven):  # type: ignore[misc]
+        def moment(self, wire: str, nanoseconds: int) -> Any:
+            made = self.classes[WIRES[wire]]()
+            made.sec, made.nanosec = divmod(nanoseconds, SECOND)
+            return made
+
+        def nanoseconds(self, wire: str, value: Any) -> int:
+            if type(value) is not self.classes[WIRES[wire]]:
+                raise TypeError(f"{value!r} is no {WIRES[wire]}")
+            return int(value.sec) * SECOND + int(value.nanosec)
+
+    driven = World(spec)
+    Moment._driven = driven
+
+    class Publisher(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rclpy.publisher.Publisher"
+
+        def __init__(self, topic: str, kind: Any) -> None:
+            self.topic_name, self.msg_type = topic, kind
+
+        def publish(self, message: Any) -> None:
+            driven.say(self.topic_name, message)
+
+    class Timer(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rclpy.timer.Timer"
+
+        def __init__(self, period: int, callback: Any) -> None:
+            self.timer_period_ns, self.callback, self.turn, self.over = period, callback, 0, False
+            self.reset()
+
+        def fire(self, turn: int) -> None:
+            if self.over or turn != self.turn:
+                return
+            driven.later(driven.now + self.timer_period_ns, lambda: self.fire(turn))
+            self.callback()
+
+        def cancel(self) -> None:
+            self.over = True
+
+        def is_canceled(self) -> bool:
+            return bool(self.over)
+
+        def reset(self) -> None:
+            self.turn, self.over = self.turn + 1, False
+            turn = self.turn
+            driven.later(driven.now + self.timer_period_ns, lambda: self.fire(turn))
+
+    class Subscription(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rclpy.subscription.Subscription"
+
+    class Parameter(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rclpy.parameter.Parameter"
+
+        def __init__(self, name: str, value: Any = None) -> None:
+            self.name, self.value = name, value
+
+    class Clock(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rclpy.clock.Clock"
+
+        def now(self) -> Any:
+            return Time(nanoseconds=driven.now)
+
+    class Node:
+        """What a node inherits. Whatever else rclpy's Node has is refused by name."""
+
+        def __init__(self, node_name: str, *, namespace: Any = None, use_global_arguments: bool = True) -> None:
+            self._avow_declared: dict[str, Any] = {}
+
+        def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any) -> Any:
+            driven.hear(topic, msg_type, callback)
+            return Subscription()
+
+        def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any) -> Any:
+            return Publisher(driven.speak(topic, msg_type), msg_type)
+
+        def create_timer(self, timer_period_sec: float, callback: Any) -> Any:
+            if not timer_period_sec > 0:
+                raise ValueError(f"a timer's period is above 0, not {timer_period_sec!r}")
+            return Timer(int(float(timer_period_sec) * SECOND), callback)
+
+        def declare_parameter(self, name: str, value: Any = None) -> Any:
+            if name in self._avow_declared:
+                raise driven.refuse(f"a second declaration of the parameter {name}")
+            at: Any = driven.params
+            for part in name.split("."):
+                at = at[part] if isinstance(at, dict) and part in at else None
+            found = value if at is None else at
+            if at is not None and value is not None and type(at) is not type(value):
+                raise TypeError(f"the parameter {name} is declared as {value!r}, and set to {at!r}")
+            self._avow_declared[name] = Parameter(name, found)
+            return self._avow_declared[name]
+
+        def declare_parameters(self, namespace: str, parameters: Any) -> Any:
+            prefix = f"{namespace}." if namespace else ""
+            return [self.declare_parameter(f"{prefix}{name}", *rest) for name, *rest in parameters]
+
+        def has_parameter(self, name: str) -> bool:
+            return name in self._avow_declared
+
+        def get_parameter(self, name: str) -> Any:
+            if name not in self._avow_declared:
+                raise KeyError(f"the parameter {name} is not declared")
+            return self._avow_declared[name]
+
+        def get_clock(self) -> Any:
+            return Clock()
+
+        def get_logger(self) -> Any:
+            return base.Log(LOGS)
+
+        def get_name(self) -> str:
+            return str(driven.name.rpartition("/")[2])
+
+        def get_namespace(self) -> str:
+            return str(driven.name.rpartition("/")[0] or "/")
+
+        def get_fully_qualified_name(self) -> str:
+            return str(driven.name)
+
+        def destroy_node(self) -> None:
+            raise driven.refuse("rclpy.node.Node.destroy_node")
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith(OF_NODES):
+                raise driven.refuse(f"rclpy.node.Node.{name}")
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    class QoSProfile:
+        """How much is kept, and how surely it is sent: here every message arrives."""
+
+        def __init__(self, **named: Any) -> None:
+            vars(self).update(named)
+
+    def policy(name: str, *words: str) -> Any:
+        return types.SimpleNamespace(**{word: f"{name}.{word}" for word in words})
+
+    qos: dict[str, Any] = {"QoSProfile": QoSProfile}
+    for short, long, words in (
+        ("Reliability", "QoSReliabilityPolicy", ("RELIABLE", "BEST_EFFORT", "SYSTEM_DEFAULT")),
+        ("Durability", "QoSDurabilityPolicy", ("VOLATILE", "TRANSIENT_LOCAL", "SYSTEM_DEFAULT")),
+        ("History", "QoSHistoryPolicy", ("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT")),
+    ):
+        qos |= dict.fromkeys((f"{short}Policy", long), policy(short, *words))
+    qos |= dict.fromkeys(("qos_profile_sensor_data", "qos_profile_system_default"), QoSProfile(depth=10))
+    driven.install()
+    content: dict[str, Any] = {}
+    for name, inside in (
+        ("node", {"Node": Node}),
+        ("time", {"Time": Time}),
+        ("duration", {"Duration": Duration}),
+        ("qos", qos),
+        ("publisher", {"Publisher": Publisher}),
+        ("timer", {"Timer": Timer}),
+        ("subscription", {"Subscription": Subscription}),
+        ("parameter", {"Parameter": Parameter}),
+        ("clock", {"Clock": Clock}),
+    ):
+        content[name] = driven.module(f"rclpy.{name}", inside)
+    driven.module("rclpy", content)
+
+    def make(made: Any, params: Any) -> Any:
+        if not issubclass(made, Node):
+            raise TypeError(f"{made.__name__} is no rclpy.node.Node")
+        return made()
+
+    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+
+
+WIRES = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}

@@ -1,0 +1,214 @@
+"""What stands in for rospy (http://wiki.ros.org/rospy/Overview), for a class that is driven."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+SECOND = 10**9
+LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
+
+
+def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
+    """Install them; what drives a class. `base` is the module `callbacks`."""
+
+    @functools.total_ordering
+    class Moment:
+        """Whole nanoseconds, as genpy's times are."""
+
+        __slots__ = ("ns",)
+        ns: int
+
+        def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
+            if isinstance(secs, float):
+                whole = int(secs // 1)
+                self.ns = whole * SECOND + round((secs - whole) * SECOND)
+            else:
+                self.ns = secs * SECOND + nsecs
+
+        @classmethod
+        def of(cls, ns: int) -> Any:
+            made = cls()
+            made.ns = ns
+            return made
+
+        @classmethod
+        def from_sec(cls, seconds: float) -> Any:
+            return cls(float(seconds))
+
+        secs = property(lambda self: self.ns // SECOND)
+        nsecs = property(lambda self: self.ns % SECOND)
+
+        def to_sec(self) -> float:
+            return float(self.secs) + float(self.nsecs) / 1e9
+
+        def to_nsec(self) -> int:
+            return self.ns
+
+        def is_zero(self) -> bool:
+            return self.ns == 0
+
+        def __bool__(self) -> bool:
+            return self.ns != 0
+
+        def __eq__(self, other: object) -> bool:
+            return type(other) is type(self) and self.ns == other.ns
+
+        def __lt__(self, other: Any) -> bool:
+            return self.ns < other.ns if type(other) is type(self) else NotImplemented
+
+        def __hash__(self) -> int:
+            return hash(self.ns)
+
+        def __repr__(self) -> str:
+            return f"{type(self).__name__}({self.secs}, {self.nsecs})"
+
+    class Duration(Moment):
+        __slots__ = ()
+
+        def __add__(self, other: Any) -> Any:
+            return type(other).of(self.ns + other.ns) if isinstance(other, Moment) else NotImplemented
+
+        def __sub__(self, other: Any) -> Any:
+            return Duration.of(self.ns - other.ns) if isinstance(other, Duration) else NotImplemented
+
+        def __neg__(self) -> Any:
+            return Duration.of(-self.ns)
+
+        def __abs__(self) -> Any:
+            return Duration.of(abs(self.ns))
+
+    class Time(Moment):
+        __slots__ = ()
+
+        @staticmethod
+        def now() -> Any:
+            return Time.of(driven.now)
+
+        def __add__(self, other: Any) -> Any:
+            return Time.of(self.ns + other.ns) if isinstance(other, Duration) else NotImplemented
+
+        def __sub__(self, other: Any) -> Any:
+            if isinstance(other, Time):
+                return Duration.of(self.ns - other.ns)
+            return Time.of(self.ns - other.ns) if isinstance(other, Duration) else NotImplemented
+
+    class World(base.Driven):  # type: ignore[misc]
+        def moment(self, wire: str, nanoseconds: int) -> Any:
+            return (Time if wire == "time" else Duration).of(nanoseconds)
+
+        def nanoseconds(self, wire: str, value: Any) -> int:
+            if type(value) is not (Time if wire == "time" else Duration):
+                raise TypeError(f"{value!r} is no {wire}")
+            return int(value.ns)
+
+    driven = World(spec)
+
+    class Subscriber(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rospy.Subscriber"
+
+        def __init__(
+            self,
+            name: str,
+            data_class: Any,
+            callback: Any = None,
+            callback_args: Any = None,
+            queue_size: Any = None,
+            buff_size: int = 65536,
+            tcp_nodelay: bool = False,
+        ) -> None:
+            extra = () if callback_args is None else (callback_args,)
+            driven.hear(name, data_class, lambda message: callback(message, *extra) if callback else None)
+
+    class Publisher(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rospy.Publisher"
+
+        def __init__(
+            self, name: str, data_class: Any, latch: bool = False, queue_size: Any = None, tcp_nodelay: bool = False
+        ) -> None:
+            self.topic, self.kind = driven.speak(name, data_class), data_class
+
+        def publish(self, *given: Any, **named: Any) -> None:
+            whole = len(given) == 1 and not named and type(given[0]) is self.kind
+            driven.say(self.topic, given[0] if whole else self.kind(*given, **named))
+
+    class TimerEvent:
+        def __init__(self, before: Any, now: Any) -> None:
+            self.last_expected = self.last_real = before
+            self.current_expected = self.current_real = now
+            self.last_duration = 0.0
+
+    class Timer(base.Strict):  # type: ignore[misc]
+        _driven, _called = driven, "rospy.Timer"
+
+        def __init__(self, period: Any, callback: Any, oneshot: bool = False, reset: bool = False) -> None:
+            if type(period) is not Duration or period.ns <= 0:
+                raise TypeError(f"a timer's period is a Duration above 0, not {period!r}")
+            self.period, self.callback, self.oneshot, self.before, self.over = period.ns, callback, oneshot, None, False
+            driven.later(driven.now + self.period, self.fire)
+
+        def fire(self) -> None:
+            if self.over:
+                return
+            now = Time.of(driven.now)
+            event, self.before = TimerEvent(self.before, now), now
+            if not self.oneshot:
+                driven.later(driven.now + self.period, self.fire)
+            self.callback(event)
+
+        def shutdown(self) -> None:
+            self.over = True
+
+    none = object()
+
+    def find(name: str) -> Any:
+        """Parameters of the declared file are the node's own: ``~limit``, and ``limit`` by no namespace."""
+        at: Any = driven.params
+        for part in name.lstrip("~").strip("/").split("/"):
+            at = at[part] if isinstance(at, dict) and part in at else none
+        return at
+
+    def get_param(name: str, default: Any = none) -> Any:
+        found = find(name)
+        if found is none and default is none:
+            raise KeyError(name)
+        return default if found is none else found
+
+    def init_node(name: str, anonymous: bool = False, log_level: Any = None, disable_signals: bool = False) -> None:
+        """The node's name is what the plan says of it."""
+
+    class ROSException(Exception):  # noqa: N818 - rospy's name
+        pass
+
+    class ROSInterruptException(ROSException, KeyboardInterrupt):
+        pass
+
+    every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
+    content: dict[str, Any] = dict.fromkeys(every, base.Log.nothing)
+    content |= {cls.__name__: cls for cls in (Subscriber, Publisher, Timer, Time, Duration, ROSException)}
+    content |= {"ROSInterruptException": ROSInterruptException, "get_param": get_param, "init_node": init_node}
+    content |= {
+        "has_param": lambda name: find(name) is not none,
+        "get_time": lambda: Time.now().to_sec(),
+        "get_rostime": Time.now,
+        "get_name": lambda: driven.name,
+        "get_namespace": lambda: driven.name.rpartition("/")[0] + "/",
+        "resolve_name": driven.whole,
+        "is_shutdown": lambda: False,
+        "on_shutdown": base.Log.nothing,
+    }
+    driven.install()
+    driven.module("rospy", content)
+
+    def make(made: Any, params: Any) -> Any:
+        return made(params) if _takes(made) else made()
+
+    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+
+
+def _takes(made: Any) -> bool:
+    """Whether the class is made with its parameters."""
+    code = getattr(made.__init__, "__code__", None)
+    defaults = getattr(made.__init__, "__defaults__", None) or ()
+    return code is not None and code.co_argcount - len(defaults) > 1

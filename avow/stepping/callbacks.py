@@ -1,0 +1,377 @@
+"""A node's callback class, run without ROS: messages in, publications out, in virtual time."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.process import ToolMissing
+from avow.isolation.observed import Seen
+from avow.language.contract import Node
+from avow.language.sorts import DataSort, EnumSort
+from avow.language.terms import Role
+from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
+from avow.ros.sources import definitions, require
+from avow.stepping.cpython import Subject, ask
+from avow.stepping.samples import Pool, numbers_of, pool
+from avow.system.parameters import parameters
+from avow.system.paths import inside
+from avow.system.plan import Driving, Source, System
+from avow.system.schema import suggest
+from avow.system.topics import whole_name
+from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS
+
+SECOND = 10**9
+STEP = SECOND // 10
+"""Between two messages that are generated."""
+
+_TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
+_HEADER = Message(HEADER, (Field("stamp", Scalar("time")), Field("frame_id", Scalar("string"))))
+_ROS1_HEADER = Message(HEADER, (Field("seq", Scalar("uint32")), *_HEADER.fields))
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One message: its topic's whole name, nanoseconds, and its content as `avow.drive.callbacks` codes it."""
+
+    topic: str
+    at: int
+    data: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What came of a run. `wrong`: what the class raised, and at which message (from 1; 0: before any)."""
+
+    said: tuple[Event, ...]
+    heard: Mapping[str, str]
+    spoken: Mapping[str, str]
+    wrong: str = ""
+    after: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A declared callback class, ready to be run."""
+
+    system: System
+    node: Node
+    source: Source
+    subject: Subject
+    known: Definitions
+    topics: Run
+    """What it hears and says before any message has come."""
+
+    @property
+    def carried(self) -> frozenset[str]:
+        """The topics that it hears or says."""
+        return frozenset((*self.topics.heard, *self.topics.spoken))
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The topics on which others speak to it: what it says itself it hears by itself."""
+        return frozenset(self.topics.heard) - frozenset(self.topics.spoken)
+
+    def run(self, events: Iterable[Event], start: int, end: int) -> Run:
+        """Twice, in processes of their own. Raises Rejected where ROS' own is asked for that is not driven, where the
+        two differ, or where what came of it hangs on what no recording has."""
+        given = tuple(events)
+        first, second = (_run(self.source, self.subject, given, start, end) for _ in range(2))
+        if first != second:
+            raise _refused(self.source, f"{self.source.class_name} publishes otherwise when it is run again")
+        return first
+
+    def fits(self) -> Iterator[Diagnostic]:
+        """Topics of the contract that the class does not hear or say, or with other messages."""
+        for topic in self.node.topics:
+            if topic.port is None:
+                continue
+            name, kind = whole_name(self.system.plan.ros.names, self.node, topic), canonical(topic.ros_type)
+            both = {**self.topics.heard, **self.topics.spoken}
+            side = both if topic.port.role is Role.INPUT else self.topics.spoken
+            verb = "subscribes to" if topic.port.role is Role.INPUT else "publishes"
+            if name not in side:
+                there = f"it {verb} {', '.join(sorted(side)) or 'nothing'}"
+                text = f"{self.source.class_name} never {verb} {name}, which carries {topic.port.name}: {there}"
+                yield Diagnostic("DRIVE102", text, topic.span)
+            elif side[name] != kind:
+                text = f"{self.source.class_name} {verb} {name} as {side[name]}; the contract says {kind}"
+                yield Diagnostic("DRIVE102", text, topic.span)
+
+    def coded(self, topic: str, event: Mapping[str, Any], where: str) -> Any:
+        """A recorded event's message as data; a field that is left out holds what a new message has. Raises
+        Rejected."""
+        kind = self.topics.heard.get(topic) or self.topics.spoken[topic]
+        fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
+        try:
+            return code(Nested(kind), fields, self.known)
+        except (ValueError, TypeError, KeyError, OverflowError) as error:
+            raise unusable(f"{where}: {topic} carries {kind}: {error}") from None
+
+    def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
+        """Whether a publication is what was recorded, in the fields that the recording has."""
+        fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
+        said = plain_fields(data, fields)
+        recorded = self.coded(topic, event, "the recording")
+        return json.dumps(said) == json.dumps(plain_fields(recorded, fields))
+
+    def generated(self, messages: int, seed: int) -> Iterator[Event]:
+        """So many messages on what it hears, a tenth of a second apart, from the contract's numbers and words."""
+        chance = random.Random(seed)
+        topics = sorted(self.inputs)
+        clauses = (*self.node.assumptions, *self.node.guarantees)
+        numbers = pool(numbers_of(clause.formula for clause in clauses))
+        words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
+        for number in range(messages if topics else 0):
+            topic = chance.choice(topics)
+            made = _drawn(Nested(self.topics.heard[topic]), self.known, numbers, words, chance)
+            yield Event(topic, (number + 1) * STEP, made)
+
+
+def driver(system: System, name: str) -> Driver:
+    """The class that the plan declares as the node. Raises Rejected."""
+    plan, names = system.plan, [each.name for each in system.contract.nodes]
+    if name not in names:
+        raise Rejected(Diagnostic("DRIVE100", f"{system.name} has no node {name!r}", hint=suggest(name, names)))
+    node = system.contract.node(name)
+    source = next((entry.source for entry in plan.nodes if entry.node == node.name), None)
+    if source is None or not source.python:
+        hint = "source: {python: src/node.py, class: Node, kind: rospy}"
+        raise Rejected(Diagnostic("DRIVE100", f"the plan says of no program that it is {node.name}", hint=hint))
+    place = source.place.at("source")
+    if source.kind is Driving.STEP:
+        text = f"{source.class_name} is a class with a method step, which has no topics: `hypothesis` drives it"
+        raise Rejected(Diagnostic("DRIVE100", text, place, hint="a class with callbacks has  kind: rospy  or  rclpy"))
+    root = plan.root.resolve()
+    path = inside(root, source.python)
+    if path is None or not path.is_file():
+        raise Rejected(Diagnostic("DRIVE100", f"there is no file `{source.python}` in the system's folder", place))
+    params, faults = parameters(root, source)
+    if faults:
+        raise Rejected(*faults)
+    known = require(definitions(plan.messages, plan.ros.distro))
+    if known.get(HEADER) is None:
+        header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
+        known = Definitions({**known.messages, HEADER: header})
+    placed = plan.ros.names.placed(node.name)
+    ros = {
+        "kind": source.kind.value,
+        "name": placed.name,
+        "remaps": [list(pair) for pair in placed.remaps],
+        "most": DRIVEN_CALLBACKS,
+        "messages": _messages(node, path, known, source.kind),
+    }
+    subject = Subject(root, path, source.class_name, params, {}, (), ros)
+    found = Driver(system, node, source, subject, known, _run(source, subject, (), 0, 0, quiet=True))
+    if found.topics.wrong:
+        raise _refused(source, f"{source.class_name} is not made: {found.topics.wrong}")
+    wrong = tuple(found.fits())
+    if wrong:
+        raise Rejected(*wrong)
+    return found
+
+
+def _run(
+    source: Source, subject: Subject, events: tuple[Event, ...], start: int, end: int, *, quiet: bool = False
+) -> Run:
+    """One run in a process of its own. `quiet`: only what it hears and says."""
+    asked = {"start": start, "end": end, "events": [[e.topic, e.at, e.data] for e in events]}
+    try:
+        told = ask(subject, [json.dumps(asked)], seconds=DRIVEN_SECONDS, megabytes=DRIVEN_MEGABYTES)
+    except ToolMissing as missing:
+        raise _refused(source, str(missing)) from None
+    if told.fault or not told.replies:
+        raise _refused(source, told.fault or "there is no answer")
+    (reply,) = told.replies
+    if reply["refused"]:
+        once = dict.fromkeys(reply["refused"])
+        raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(once)}")
+    outside = [seen.path for seen in told.observed if seen.kind is Seen.OUTSIDE]
+    if outside and not quiet:
+        text = f"what {source.class_name} publishes hangs on what no recording has: {', '.join(outside)}"
+        raise _refused(source, text)
+    said = tuple(Event(topic, at, data) for topic, at, data in reply["said"])
+    return Run(said, reply["heard"], reply["spoken"], reply["wrong"], reply["after"])
+
+
+def _refused(source: Source, text: str) -> Rejected:
+    return Rejected(Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR))
+
+
+def unusable(text: str) -> Rejected:
+    """A recording that this class cannot be given."""
+    return Rejected(Diagnostic("DRIVE104", text))
+
+
+# -- messages ------------------------------------------------------------------------------------------------
+
+
+def _messages(node: Node, file: Path, known: Definitions, kind: Driving) -> dict[str, Any]:
+    """The types of the contract's topics, and of the packages that the source's folder names, with what they hold."""
+    text = "".join(path.read_text(encoding="utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
+    wanted = [canonical(topic.ros_type) for topic in node.topics]
+    wanted += [name for name in known.messages if name.partition("/")[0] in text]
+    found: dict[str, Any] = {}
+    if kind is Driving.RCLPY:
+        for name, sec in (("builtin_interfaces/Time", "int32"), ("builtin_interfaces/Duration", "int32")):
+            found[name] = {"fields": [["sec", sec], ["nanosec", "uint32"]], "constants": []}
+    while wanted:
+        name = wanted.pop()
+        message = known.get(name)
+        if name in found or name in _TIMES:
+            continue
+        if message is None:
+            hint = "messages: [msg]  names folders with definitions; ros: {distro: noetic}  a distribution's"
+            raise Rejected(Diagnostic("DRIVE101", f"nothing defines {name}", hint=hint))
+        if any(inner.name in ("topic", "time") for inner in message.fields):
+            text = f"{name} has a field that is called as a part of every recorded event: topic or time"
+            raise Rejected(Diagnostic("DRIVE101", text))
+        fields = [[inner.name, _wire(inner.wire)] for inner in message.fields]
+        found[name] = {"fields": fields, "constants": [list(constant) for constant in message.constants]}
+        held = (inner.wire.item if isinstance(inner.wire, Array) else inner.wire for inner in message.fields)
+        wanted += [wire.name for wire in held if isinstance(wire, Nested)]
+    return found
+
+
+def _wire(wire: Wire) -> Any:
+    match wire:
+        case Scalar(name=name):
+            return name
+        case Nested(name=name):
+            return {"n": name}
+        case Array(item=item, length=length):
+            return {"a": _wire(item), "length": length}
+
+
+def code(wire: Wire, value: Any, known: Definitions) -> Any:
+    """A value of JSON as the wire carries it. Raises ValueError, TypeError, KeyError, OverflowError."""
+    match wire:
+        case Nested(name=name):
+            message = known.get(name)
+            if message is None or not isinstance(value, dict):
+                raise ValueError(f"{value!r} is no {name}")
+            unknown = set(value) - {inner.name for inner in message.fields}
+            if unknown:
+                raise ValueError(f"{name} has no field {min(unknown)!r}")
+            return {
+                "d": [
+                    [f.name, code(f.wire, value[f.name], known) if f.name in value else fresh(f.wire, known)]
+                    for f in message.fields
+                ]
+            }
+        case Array(item=item, length=length):
+            if not isinstance(value, list) or (length is not None and len(value) != length):
+                raise ValueError(f"{value!r} is no {wire}")
+            return {"l": [code(item, each, known) for each in value]}
+        case Scalar(name="time" | "duration"):
+            pairs = (("secs", "nsecs"), ("sec", "nanosec"))
+            found = next((pair for pair in pairs if isinstance(value, dict) and set(value) == set(pair)), None)
+            if found is None:
+                raise ValueError(f"{value!r} is no time of seconds and nanoseconds")
+            return {"i": str(int(value[found[0]]) * SECOND + int(value[found[1]]))}
+        case Scalar(name="bool"):
+            if not isinstance(value, bool):
+                raise ValueError(f"{value!r} is no bool")
+            return value
+        case Scalar(name="string" | "wstring"):
+            if not isinstance(value, str):
+                raise ValueError(f"{value!r} is no text")
+            return value
+        case Scalar(name=name) if name in INTEGERS:
+            low, high = INTEGERS[name]
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                raise ValueError(f"{value!r} is no {name}")
+            return {"i": str(value)}
+        case Scalar(name=name):
+            text = getattr(value, "text", value)  # a decimal is kept as its digits
+            if isinstance(text, bool) or not isinstance(text, int | float | str) or isinstance(value, str):
+                raise ValueError(f"{value!r} is no {name}")
+            return {"f": _as_float(float(text), name).hex()}
+
+
+def _as_float(number: float, name: str) -> float:
+    return float(struct.unpack("f", struct.pack("f", number))[0]) if name == "float32" else number
+
+
+def fresh(wire: Wire, known: Definitions) -> Any:
+    """What a field of a new message holds."""
+    match wire:
+        case Nested():
+            return code(wire, {}, known)
+        case Array(item=item, length=length):
+            return {"l": [fresh(item, known) for _ in range(length or 0)]}
+        case Scalar(name="bool"):
+            return False
+        case Scalar(name="string" | "wstring"):
+            return ""
+        case Scalar(name=name):
+            return {"f": (0.0).hex()} if name.startswith("float") else {"i": "0"}
+
+
+def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
+    """The value of JSON that a recording has."""
+    match wire:
+        case Nested(name=name):
+            message = known.get(name)
+            assert message is not None
+            given = dict(data["d"])
+            return {inner.name: shown(inner.wire, given[inner.name], known, kind) for inner in message.fields}
+        case Array(item=item):
+            return [shown(item, each, known, kind) for each in data["l"]]
+        case Scalar(name="time" | "duration"):
+            names = ("secs", "nsecs") if kind is Driving.ROSPY else ("sec", "nanosec")
+            return dict(zip(names, divmod(int(data["i"]), SECOND), strict=True))
+        case Scalar(name=name) if name in INTEGERS:
+            return int(data["i"])
+        case Scalar(name=name):
+            return float.fromhex(data["f"]) if name.startswith("float") else data
+
+
+def plain_fields(data: Any, like: Any) -> Any:
+    """Of a message's data only the fields that a recorded event has."""
+    if isinstance(like, dict) and isinstance(data, dict) and "d" in data:
+        return [[name, plain_fields(value, like[name])] for name, value in data["d"] if name in like]
+    if isinstance(like, list) and isinstance(data, dict) and "l" in data and len(like) == len(data["l"]):
+        return [plain_fields(item, each) for item, each in zip(data["l"], like, strict=True)]
+    return data
+
+
+def _words(sort: Any) -> tuple[str, ...]:
+    match sort:
+        case EnumSort(members=members):
+            return members
+        case DataSort(constructors=constructors):
+            return tuple(constructor.name for constructor in constructors)
+        case _:  # numbers are drawn apart, and no other sort has words
+            return ()
+
+
+def _drawn(wire: Wire, known: Definitions, numbers: Pool, words: list[str], chance: random.Random) -> Any:
+    match wire:
+        case Nested(name=name):
+            message = known.get(name)
+            assert message is not None
+            return {"d": [[f.name, _drawn(f.wire, known, numbers, words, chance)] for f in message.fields]}
+        case Array(item=item, length=length):
+            number = chance.choice(numbers.lengths) if length is None else length
+            return {"l": [_drawn(item, known, numbers, words, chance) for _ in range(number)]}
+        case Scalar(name="time" | "duration"):
+            return {"i": str(chance.randrange(100) * STEP)}
+        case Scalar(name="bool"):
+            return chance.random() < 0.5
+        case Scalar(name="string" | "wstring"):
+            return chance.choice(words) if words and chance.random() < 0.9 else chance.choice(("", "other"))
+        case Scalar(name=name) if name in INTEGERS:
+            low, high = INTEGERS[name]
+            return {"i": str(chance.choice([n for n in (*numbers.ints, 0) if low <= n <= high]))}
+        case Scalar(name=name):
+            found = chance.choice(numbers.floats)
+            near = found if chance.random() < 0.5 else found + chance.uniform(-1.0, 1.0)
+            return {"f": _as_float(near if math.isfinite(near) else found, name).hex()}

@@ -1,0 +1,123 @@
+"""``avow drive``: run a node's callback class without ROS; what it publishes as a trace, or against a recording."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from avow.stepping.callbacks import Driver, Event, Run
+
+
+@click.command()
+@click.argument("system")
+@click.argument("node")
+@click.argument("trace", required=False, type=click.Path(path_type=Path))
+@click.option("--replay", is_flag=True, help="Compare what it publishes with what TRACE has on its topics.")
+@click.option("--messages", type=click.IntRange(1, 100_000), default=200, show_default=True, help="Without TRACE.")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write inputs and publications, as a trace.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of generated messages.")
+def command(
+    system: str, node: str, trace: Path | None, replay: bool, messages: int, output: Path | None, seed: int
+) -> int:
+    """Run the callback class that the plan of SYSTEM (a folder, or a name under contracts/) declares as NODE, in
+    virtual time and without ROS.
+
+    It hears the messages that TRACE (JSON lines or a bag) has on its topics, or without TRACE generated ones. -o writes
+    what it heard and published, for `avow monitor` and as a trace of the plan. --replay compares its publications with
+    those of TRACE, topic by topic, in their order and every bit of them; times are not compared.
+
+    Code 1 where the class raises, or publishes otherwise than the recording; 2 where it asks for something of ROS that
+    is not driven, or where what it publishes hangs on a clock or on chance.
+    """
+    from avow.base.workspace import system_folder
+    from avow.stepping.callbacks import driver, unusable
+    from avow.system.load import load_system
+
+    if replay and trace is None:
+        raise click.UsageError("--replay compares with a TRACE")
+    found = driver(load_system(system_folder(system)), node)
+    recorded = tuple(_recorded(found, trace)) if trace is not None else ()
+    if trace is None:
+        events = tuple(found.generated(messages, seed))
+        times = [event.at for event in events]
+    else:
+        events = tuple(event for event, _ in recorded if event.topic in found.inputs)
+        times = [event.at for event, _ in recorded]
+        if not events:
+            topics = ", ".join(sorted(found.inputs))
+            raise unusable(f"{trace} has no message on a topic that {node} subscribes to: {topics}")
+    run = found.run(events, *((times[0], times[-1]) if times else (0, 0)))
+    if output is not None:
+        output.write_text("".join(f"{line}\n" for line in _lines(found, events, run)), encoding="utf-8")
+    click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
+    if run.wrong:
+        click.echo(f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}")
+        return 1
+    if not replay:
+        return 0
+    different = tuple(_different(found, recorded, run))
+    for text in different:
+        click.echo(text)
+    if not different:
+        click.echo("the recording has the same")
+    return 1 if different else 0
+
+
+def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:
+    """The trace's messages on topics that the class hears or says, in the order of the trace. Raises Rejected."""
+    from avow.stepping.callbacks import SECOND, Event, unusable
+
+    from .numbers import exact
+    from .traces import read_trace
+
+    before = 0
+    for recorded in read_trace(trace, wanted=lambda topic: _whole(topic) in found.carried):
+        topic = _whole(str(recorded.event["topic"]))
+        if topic not in found.carried:
+            continue
+        at = round(Fraction(exact(recorded.event["time"])) * SECOND)
+        where = f"{trace}:{recorded.line}" if recorded.line else f"{trace}, message {recorded.index}"
+        if at < before:
+            raise unusable(f"{where}: its time lies before that of the message above")
+        before = at
+        yield Event(topic, at, found.coded(topic, recorded.event, where)), recorded.event
+
+
+def _whole(topic: str) -> str:
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
+def _lines(found: Driver, events: tuple[Event, ...], run: Run) -> Iterator[str]:
+    """The trace: of one time, what was heard stands before what was said."""
+    from avow.ros.definitions import Nested
+    from avow.stepping.callbacks import SECOND, shown
+
+    kinds = {**run.heard, **run.spoken}
+    for event in sorted((*events, *run.said), key=lambda event: event.at):
+        whole, part = divmod(event.at, SECOND)
+        fields = shown(Nested(kinds[event.topic]), event.data, found.known, found.source.kind)
+        rest = json.dumps(fields)[1:-1]
+        yield f'{{"topic": {json.dumps(event.topic)}, "time": {whole}.{part:09d}{", " if rest else ""}{rest}}}'
+
+
+def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run) -> Iterator[str]:
+    """Topic by topic the first publication that is not as recorded."""
+    for topic in sorted(run.spoken):
+        said = [event for event in run.said if event.topic == topic]
+        before = [raw for event, raw in recorded if event.topic == topic]
+        for number, (event, raw) in enumerate(zip(said, before, strict=False), start=1):
+            if not found.said_as(topic, event.data, raw):
+                there = json.dumps({k: v for k, v in raw.items() if k not in ("topic", "time")}, default=str)
+                here = next(_lines(found, (), type(run)((event,), run.heard, run.spoken)))
+                yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
+                break
+        else:
+            if len(said) != len(before):
+                yield f"{topic}: {len(said)} published, {len(before)} recorded"

@@ -1,0 +1,223 @@
+"""Callback classes of rospy and rclpy run as they are, in virtual time; what is not driven is refused by name."""
+
+from __future__ import annotations
+
+import json
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from avow.backends.rosmonitoring.driving import command
+from avow.base.diagnostics import Rejected
+from avow.pipeline.work import method_job
+from avow.system.load import load_system
+
+CONTRACT = """\
+context { Level : {green, red}; Red = 250; }
+node watch {
+  inputs( r : REAL )
+  outputs( status : Level )
+  topics( float64 r matches(in.r), string status matches(out.status) )
+  guarantee high ( in.r >= Red -> out.status == red )
+  guarantee low ( in.r < Red -> out.status == green )
+}
+"""
+ROS1 = """\
+import rospy
+from std_msgs.msg import Float64, String
+
+
+class Watch:
+    def __init__(self):
+        rospy.init_node("watch")
+        self.red = rospy.get_param("~red", 100.0)
+        self.said = rospy.Publisher("status", String, queue_size=1, latch=True)
+        self.level = "green"
+        rospy.Subscriber("r", Float64, self.heard)
+        rospy.Timer(rospy.Duration(0.25), self.tick)
+
+    def heard(self, message):
+        self.level = "red" if message.data >= self.red else "green"
+        # HERE
+
+    def tick(self, event):
+        self.said.publish(self.level)
+        rospy.loginfo("%s at %s", self.level, event.current_real.to_sec())
+
+
+if __name__ == "__main__":
+    Watch()
+    rospy.spin()
+"""
+ROS2 = """\
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64, String
+
+
+class Watch(Node):
+    def __init__(self):
+        super().__init__("watch")
+        self.red = self.declare_parameter("red", 100.0).value
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+        self.said = self.create_publisher(String, "status", qos)
+        self.level = "green"
+        self.create_subscription(Float64, "r", self.heard, 10)
+        self.create_timer(0.25, self.tick)
+
+    def heard(self, message):
+        self.level = "red" if message.data >= self.red else "green"
+        # HERE
+
+    def tick(self):
+        self.get_logger().info(f"{self.level} at {self.get_clock().now().nanoseconds}")
+        self.said.publish(String(data=self.level))
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(Watch())
+"""
+TRACE = [("r", 0.0, 10.0), ("/r", 0.1, 250.0), ("r", 0.6, 249.99999999999997), ("other", 0.7, 1), ("r", 1.0, 300.0)]
+
+
+def system(folder: Path, kind: str, text: str, methods: str = "[]") -> Path:
+    (folder / "src").mkdir(parents=True)
+    (folder / "system.rcl").write_text(CONTRACT, encoding="utf-8")
+    (folder / "src/watch.py").write_text(text, encoding="utf-8")
+    (folder / "src/params.yaml").write_text("red: 250.0\n", encoding="utf-8")
+    (folder / "plan.yaml").write_text(
+        "system: w\ncontract: system.rcl\nenvironment: {watch.r: {because: a sensor}}\nnodes:\n  watch:\n"
+        f"    source: {{python: src/watch.py, class: Watch, kind: {kind}, parameters: src/params.yaml}}\n"
+        f"    methods: {methods}\n",
+        encoding="utf-8",
+    )
+    return folder
+
+
+def trace(folder: Path) -> Path:
+    path = folder / "trace.jsonl"
+    lines = [json.dumps({"topic": topic, "time": at, "data": value}) for topic, at, value in TRACE]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def drive(*arguments: object) -> Result:
+    return CliRunner().invoke(command, [str(a) for a in arguments], standalone_mode=False)
+
+
+def told(result: Result) -> str:
+    """What was rejected."""
+    assert isinstance(result.exception, Rejected), result.exception
+    return " ".join(d.message for d in result.exception.diagnostics)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "text"), [("rospy", ROS1), ("rclpy", ROS2)])
+def test_a_class_runs_as_it_is_and_its_recording_replays(tmp_path: Path, kind: str, text: str) -> None:
+    folder = system(tmp_path / "w", kind, text)
+    recording = tmp_path / "recording.jsonl"
+    done = drive(folder, "watch", trace(tmp_path), "-o", recording)
+    assert done.return_value == 0, (done.output, done.exception)
+    events = [json.loads(line) for line in recording.read_text(encoding="utf-8").splitlines()]
+    said = [(e["time"], e["data"]) for e in events if e["topic"] == "/status"]
+    assert said == [(0.25, "red"), (0.5, "red"), (0.75, "green"), (1.0, "green")]  # a timer due then comes first
+    assert [e["topic"] for e in events].count("/r") == 4
+    again = drive(folder, "watch", recording, "--replay")
+    assert again.return_value == 0, again.output
+    assert "the recording has the same" in again.output
+    changed = recording.read_text(encoding="utf-8").replace('0.500000000, "data": "red"', '0.5, "data": "green"')
+    recording.write_text(changed, encoding="utf-8")
+    other = drive(folder, "watch", recording, "--replay")
+    assert other.return_value == 1
+    assert "/status: publication 2 is" in other.output
+
+
+CAUGHT = {
+    "rospy.wait_for_message('r', Float64)": "rospy.wait_for_message",
+    "rospy.sleep(1)": "rospy.sleep",
+    "hasattr(rospy, 'Rate')": "rospy.Rate",
+    "self.said.get_num_connections()": "rospy.Publisher.get_num_connections",
+    "import tf as _": "the module tf",
+    "import rospy.core as _": "the module rospy.core",
+    "import nav_msgs.msg as _": "the module nav_msgs",
+    "from rospy import Rate as _": "rospy.Rate",
+}
+
+
+def test_what_of_ros_is_not_driven_is_refused_by_name_also_where_it_is_caught(tmp_path: Path) -> None:
+    lines = "".join(f"\n        try: {line}\n        except Exception: pass" for line in CAUGHT)
+    folder = system(tmp_path / "w", "rospy", ROS1.replace("# HERE", lines))
+    found = told(drive(folder, "watch", trace(tmp_path)))
+    assert [line for line, why in CAUGHT.items() if why not in found] == []
+
+
+REFUSED = [
+    ("import time, random; self.level += '' if time.time() and random.random() < 2 else ' '", "hangs on"),
+    ("open('/tmp/x', 'w')", "writes"),
+    ("rospy.Timer(rospy.Duration(1e-9), self.tick)", "more than"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "why"), REFUSED)
+def test_a_recording_hangs_on_nothing_else(tmp_path: Path, line: str, why: str) -> None:
+    folder = system(tmp_path / "w", "rospy", ROS1.replace("# HERE", line))
+    assert why in told(drive(folder, "watch", trace(tmp_path)))
+
+
+def test_nodes_of_ros_2_have_what_they_have(tmp_path: Path) -> None:
+    folder = system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", "self.create_client(None, 'x')"))
+    assert "rclpy.node.Node.create_client" in told(drive(folder, "watch", trace(tmp_path)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('"r", Float64', '"q", Float64', "never subscribes to /r"),
+        ('"r", Float64', '"r", String', "subscribes to /r as std_msgs/String"),
+        ('"status", String', '"~status", String', "never publishes /status"),
+        ("class Watch:", "class Other:", "cannot be loaded"),
+        ("def __init__(self):", "def __init__(self):\n        1 / 0", "ZeroDivisionError"),
+    ],
+)
+def test_a_class_that_does_not_fit(tmp_path: Path, old: str, new: str, why: str) -> None:
+    assert why in told(drive(system(tmp_path / "w", "rospy", ROS1.replace(old, new)), "watch"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", ["1 / 0", "self.said.publish(5)", "message.no_field = 1"])
+def test_a_callback_that_raises_is_told(tmp_path: Path, line: str) -> None:
+    done = drive(system(tmp_path / "w", "rospy", ROS1.replace("# HERE", line)), "watch", trace(tmp_path))
+    assert done.return_value == 1
+    assert "raised at message 1: " in done.output
+
+
+@pytest.mark.slow
+def test_generated_messages_are_the_same_for_a_seed(tmp_path: Path) -> None:
+    folder = system(tmp_path / "w", "rospy", ROS1)
+    made = []
+    for seed in (1, 1, 2):
+        assert drive(folder, "watch", "--messages", 30, "--seed", seed, "-o", tmp_path / "made").return_value == 0
+        made.append((tmp_path / "made").read_text(encoding="utf-8"))
+    assert made[0] == made[1] != made[2]
+    assert '"red"' in made[0]
+    assert '"green"' in made[0]
+
+
+@pytest.mark.parametrize("backend", ["python", "hypothesis"])
+def test_methods_about_a_step_refuse_callbacks(tmp_path: Path, backend: str) -> None:
+    loaded = load_system(system(tmp_path / "w", "rospy", ROS1, f"[{backend}]"))
+    (method,) = loaded.plan.node("watch").methods
+    tool = import_module(f"avow.backends.{backend}").BACKEND
+    found = tool.check(method_job(loaded, loaded.contract.node("watch"), method))
+    assert any("kind is rospy" in d.message and d.is_error for d in found)
+
+
+def test_a_step_class_has_no_topics(tmp_path: Path) -> None:
+    folder = system(tmp_path / "w", "step", "class Watch:\n    def step(self, r):\n        return 'red'\n")
+    assert "has no topics" in told(drive(folder, "watch"))
