@@ -4,7 +4,8 @@
 
 `threshold`: one output, one bound, a fresh reading at each event. `agent`: the case study's agent over laps of the
 nominal run, which breaks its contract from the second lap on. `rover`: all four nodes over one mission with a fresh
-reading each time. Processor time, so that company on the machine matters less; memory is the peak of the process.
+reading each time. `answers`: a threshold on each answer, paired with its input by order. The bags hold the threshold's
+readings. Processor time, so that company on the machine matters less; memory is the peak of the process.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -52,6 +55,41 @@ def laps(count: int) -> Iterator[str]:
         yield json.dumps({**event, "time": round(event["time"] + at // len(nominal) * lap, 2)})
 
 
+ANSWERS = """
+node sensor {
+  inputs( r : REAL )
+  outputs( v : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 v matches(out.v) )
+  guarantee high ( in.r >= 100 -> out.v >= 100 )
+}
+"""
+
+
+def answers(count: int) -> Iterator[str]:
+    for line in readings(count // 2):
+        yield line.replace('"v"', '"r"')
+        yield line
+
+
+def bag(path: Path, count: int, form: str) -> Path:
+    """The threshold's readings: `form` is ros1, SQLITE3 or MCAP."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    store: Any = get_typestore(Stores.ROS1_NOETIC if form == "ros1" else Stores.ROS2_HUMBLE)
+    kind = "std_msgs/msg/Float64"
+    serialize = store.serialize_ros1 if form == "ros1" else store.serialize_cdr
+    writer: Any = Writer1(path) if form == "ros1" else Writer2(path, version=9, storage_plugin=StoragePlugin[form])
+    with writer:
+        to = writer.add_connection("/v", kind, typestore=store)
+        for event in map(json.loads, readings(count)):
+            message = store.types[kind](data=event["data"])
+            writer.write(to, int(event["time"] * 1e9) + 10**9, serialize(message, kind))
+    return path
+
+
 def written(path: Path, lines: Iterator[str]) -> Path:
     with path.open("w", encoding="utf-8") as file:
         file.writelines(line + "\n" for line in lines)
@@ -82,17 +120,24 @@ def timed(name: str, count: int, action: Callable[[], int]) -> None:
     print(f"  {name:<44} {count / seconds:>12,.0f} events/s, {found:,} found, {peak} MB")
 
 
+def single(folder: Path, contract: str, options: str) -> System:
+    """A system of one node, `sensor`."""
+    folder.mkdir()
+    (folder / "system.rcl").write_text(contract, encoding="utf-8")
+    method = f"{{rosmonitoring: {options}}}"
+    plan = f"contract: system.rcl\nros: {{distro: noetic}}\nnodes: {{sensor: {{methods: [{method}]}}}}\n"
+    (folder / "plan.yaml").write_text(plan, encoding="utf-8")
+    return load_system(folder)
+
+
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000
     from rosmonitoring.conftest import write_case
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "system.rcl").write_text(THRESHOLD, encoding="utf-8")
-        method = "{rosmonitoring: {mapping: {}}}"
-        plan = f"contract: system.rcl\nros: {{distro: noetic}}\nnodes: {{sensor: {{methods: [{method}]}}}}\n"
-        (folder / "plan.yaml").write_text(plan, encoding="utf-8")
-        threshold, rover = load_system(folder), load_system(write_case(folder))
+        threshold, rover = single(folder / "one", THRESHOLD, "{mapping: {}}"), load_system(write_case(folder))
+        paired = single(folder / "two", ANSWERS, "{answers: {by: order, because: all links stand}, mapping: {}}")
         print(f"{count} events")
         values = written(folder / "v.jsonl", readings(count))
         timed("threshold: json.loads and an if", count, lambda: plain(values))
@@ -102,6 +147,11 @@ def main() -> None:
         fine = written(folder / "mission.jsonl", (json.dumps(event) for event in mission(count)))
         timed("agent, nothing broken", count, lambda: judged(rover, ["agent"], fine))
         timed("all four nodes of the rover, nothing broken", count, lambda: judged(rover, [], fine))
+        asked = written(folder / "answers.jsonl", answers(count))
+        timed("answers by order, each a fresh reading", count, lambda: judged(paired, [], asked))
+        for form, name in (("ros1", "v.bag"), ("SQLITE3", "v2"), ("MCAP", "v3")):
+            record = bag(folder / name, count, form)
+            timed(f"threshold, a bag ({form})", count, partial(judged, threshold, [], record))
 
 
 if __name__ == "__main__":

@@ -64,6 +64,8 @@ class Compiled:
         self._told = told
         self._heard = heard
         self._watches = [watch_of(monitor) for monitor in monitors]
+        self._by_values = any(monitor.by_values for monitor in monitors)
+        """Else the engine judges all that is listened to, and nothing of it is remembered."""
         self._fresh = itertools.count(1 << 40)
         self._shapes: list[Shape] = []
         self._known: dict[tuple[int, int, str], dict[Any, Token]] = {}
@@ -151,8 +153,13 @@ class Compiled:
         self._flush()
         raw = event.get("topic")
         topic = raw if isinstance(raw, str) else ""
-        before = [[*watch.tokens] for watch in self._watches]
+        if not self._by_values and any(watch.monitor.listens(topic) for watch in self._watches):
+            self._heard(topic, 1)
+            found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
+            self._passed()
+            return list(self._told(found)) if found else []
         plans = [self._plan(watch, topic) for watch in self._watches]
+        before = [[*watch.tokens] for watch in self._watches]
         tallies = [[counts_of(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
         self._heard(topic, 1)
         found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
@@ -164,10 +171,14 @@ class Compiled:
             self._look(watch, set(plan.names) - unreadable if plan else set(), which, groups)
             if plan is not None:
                 remember(watch, plan, old, tally, found)
+        self._passed()
+        return list(self._told(found)) if found else []
+
+    def _passed(self) -> None:
+        """The engine has judged an event: later ones are passed over only from its time on."""
         self._last[0] = b""
         self._clock[0] = max((watch.monitor.timing.newest for watch in self._watches), default=-math.inf)
         self._clock[1] = min((watch.monitor.deadline for watch in self._watches), default=math.inf)
-        return list(self._told(found)) if found else []
 
     def _again(self, known: list[tuple[Violation, ...]], line: int) -> list[Violation]:
         """What was told before of an event like the latest."""

@@ -68,7 +68,10 @@ def whole(value: int) -> Fraction:
 def _fraction(text: str) -> Fraction:
     if len(text) > NUMBER_LENGTH or abs(_exponent(text)) > NUMBER_LENGTH:
         raise NotANumber
+    front, point, digits = text.partition(".")
     try:
+        if point and text.isascii() and digits.isdecimal() and front.removeprefix("-").isdecimal():
+            return Exact(int(front + digits), 10 ** len(digits))  # as nearly all are
         return Exact(text)
     except (ValueError, ZeroDivisionError):
         raise NotANumber from None

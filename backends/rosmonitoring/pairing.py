@@ -270,6 +270,7 @@ _time = attrgetter("time")
 def time_of(event: Mapping[str, Any]) -> Fraction:
     """An event's time in seconds; 0 where it says none (which a recorded one always does)."""
     try:
-        return Fraction(exact(event.get("time")))
+        found = exact(event.get("time"))
     except NotANumber:
         return Fraction(0)
+    return Fraction(found) if found.__class__ is int else found  # type: ignore[return-value]
