@@ -62,15 +62,23 @@ class Blame:
             match violation.fault:
                 case Fault.GUARANTEE:
                     self._note(violation, _Origin(f"{_place(violation)}{self._doubt(violation)}", violation.index))
-                case Fault.EXCUSED if origin := self._since(violation.node, violation.index):
+                case Fault.EXCUSED if origin := self._excuse(violation):
                     self._note(violation, origin)
                 case _:  # no output of the node is wrong by it
                     pass
         self._open += origins
-        yield from (v for v in violations if v.fault is not Fault.ASSUMPTION)
-        yield from self._settle(late=False)
+        settled = list(self._settle(late=False))
         if over or len(self._open) > BREACHES_OPEN:
-            yield from self._settle(late=True)
+            settled += self._settle(late=True)
+        yield from (self._excused(v) for v in violations if v.fault is not Fault.ASSUMPTION)
+        yield from settled
+
+    def _excused(self, violation: Violation) -> Violation:
+        """What an assumption excuses, with what broke that, as far as it is known."""
+        if violation.fault is not Fault.EXCUSED:
+            return violation
+        origin = self._excuse(violation)
+        return replace(violation, cause=f"{origin.text} caused it" if origin is not None and origin.text else "")
 
     def _settle(self, *, late: bool) -> Iterator[Violation]:
         """Those whose cause is known; `late`: also those of which it will not be."""
@@ -102,6 +110,13 @@ class Blame:
     def _since(self, node: str, event: int) -> _Origin | None:
         """Where the assumption began to fail that was broken last before an event."""
         return next((origin for one, origin in reversed(self._assumed.get(node, ())) if one.index <= event), None)
+
+    def _excuse(self, violation: Violation) -> _Origin | None:
+        """Where the assumption began to fail that excuses a breach: by what the answer was held against."""
+        pairing = self.monitors[violation.node].pairing
+        given = [pairing.answered.get(message, {}) for message, _ in violation.heard.values()] if pairing else []
+        found = next((origin for one in given if (origin := self._by(violation.node, one)) is not None), None)
+        return found or self._since(violation.node, violation.index)
 
     def _by(self, node: str, given: Mapping[str, tuple[int, ...]]) -> _Origin | None:
         """Where the assumption began to fail that was broken by one of some messages."""

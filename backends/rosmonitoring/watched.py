@@ -26,7 +26,7 @@ class Fault(StrEnum):
     """What an event showed to be wrong."""
 
     GUARANTEE = "guarantee broken: this node"
-    EXCUSED = "guarantee not met, with an assumption broken: environment"
+    EXCUSED = "guarantee not met, with an assumption broken: not this node"
     ASSUMPTION = "assumption broken: environment"
     PROVIDER = "assumption broken: by a node that provides it"
     SILENT = "silent for longer than the plan allows"
