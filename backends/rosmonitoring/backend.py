@@ -429,7 +429,10 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
 
 def _topics(runs: list[_Run]) -> str:
     """What the traces lack, and what they have."""
-    silent = sorted({topic for run in runs for topic in run.monitor.silent})
+    from .options import same_topic
+
+    monitors = [run.monitor for run in runs]
+    silent = sorted({t for monitor in monitors for t in monitor.setup.topics if same_topic(t) not in monitor.heard})
     heard = sorted({topic for run in runs for topic in run.monitor.heard})
     if not silent:
         return ""

@@ -114,11 +114,6 @@ class Monitor:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
 
-    @property
-    def silent(self) -> tuple[str, ...]:
-        """What it listens to and never heard."""
-        return tuple(topic for topic in self.setup.topics if same_topic(topic) not in self.heard)
-
     def listens(self, topic: str) -> bool:
         """Whether a topic's messages say anything of the node."""
         return same_topic(topic) in self._readers

@@ -216,10 +216,9 @@ class _Machine:
         """The rules that matter, and the symbols of their variables."""
         wanted = list(names)
         for name in wanted:
-            if name in self.setup.hidden:
-                raise NotRml(self.setup.hidden[name])
-            if name in self.setup.shared:
-                raise NotRml(f"several nodes publish the topic of {name}, and an event does not say whose it is")
+            several = f"several nodes publish the topic of {name}, and an event does not say whose it is"
+            if why := self.setup.hidden.get(name, several if name in self.setup.shared else ""):
+                raise NotRml(why)
             rule = self.setup.rules[name]
             if isinstance(rule, Previous) and rule.source not in wanted:
                 if rule.source in self.setup.hidden:
