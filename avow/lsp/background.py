@@ -66,15 +66,25 @@ class Asked:
         """What is known of a node; None while it is not asked."""
         return self.answers.get(_key(node))
 
-    def ask(self, sources: Sequence[Source], nodes: Sequence[Node]) -> None:
-        """Ask of the nodes of which nothing is known yet; whatever else is under way is given up."""
-        missing = frozenset(_key(node) for node in nodes) - self.answers.keys()
-        if missing == self.wanted and self.task is not None and not self.task.done():
+    def ask(self, systems: Sequence[tuple[Sequence[Source], Contract]]) -> None:
+        """Ask of the nodes of these systems of which nothing is known yet, one system after the other; whatever else is
+        under way is given up."""
+        asked = [(sources, self._missing(sources, contract)) for sources, contract in systems]
+        wanted = frozenset(key for _, missing in asked for key in missing)
+        if wanted == self.wanted and self.task is not None and not self.task.done():
             return
         self.give_up()
-        if missing:
-            self.wanted = missing
-            self.task = asyncio.get_running_loop().create_task(self._run(sources, missing))
+        if wanted:
+            self.wanted = wanted
+            self.task = asyncio.get_running_loop().create_task(self._one_by_one(asked))
+
+    def _missing(self, sources: Sequence[Source], contract: Contract) -> frozenset[str]:
+        return frozenset(_key(node) for node in askable(sources, contract)) - self.answers.keys()
+
+    async def _one_by_one(self, asked: Sequence[tuple[Sequence[Source], frozenset[str]]]) -> None:
+        for sources, missing in asked:
+            if missing - self.answers.keys():
+                await self._run(sources, missing)
 
     def give_up(self) -> None:
         """End the process that is under way, if there is one."""

@@ -124,12 +124,11 @@ class Server:
     # -- sanity --------------------------------------------------------------------------------------------------------
 
     def ask(self, uri: str) -> None:
-        """Ask of the sanity of the nodes of a document's system."""
+        """Ask of the sanity of the nodes of the systems that are open, first of that of the document changed last."""
         self.soon = None
-        document = self.documents.get(uri)
-        if document is not None and uri in self.open_now:
-            project = document.project
-            self.asked.ask(project.sources, askable(project.sources, project.contract))
+        open_now = sorted(self.open_now & self.documents.keys(), key=lambda each: each != uri)
+        projects = [self.documents[each].project for each in open_now]
+        self.asked.ask([(project.sources, project.contract) for project in projects])
 
     def settled(self) -> None:
         """Something more is known: the messages and hints of every open document are shown again."""

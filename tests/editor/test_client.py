@@ -375,3 +375,10 @@ def test_sanity_is_asked_in_the_background(editor: Editor) -> None:
     editor.write(uri, broken)
     editor.until(lambda: "halt" in hints(editor, uri, broken))
     assert "low" not in hints(editor, uri, broken)
+
+
+def test_sanity_of_two_documents_that_change_one_after_the_other(editor: Editor) -> None:
+    one, two = (CONTRACT.replace("Limit = 120", f"Limit = {limit}") for limit in (121, 122))
+    first, second = editor.open("untitled:first", one), editor.open("untitled:second", two)
+    for uri, text in ((first, one), (second, two)):
+        editor.until(lambda uri=uri, text=text: hints(editor, uri, text).get("low") == "✓ sane")  # type: ignore[misc]
