@@ -11,7 +11,7 @@ from avow.language.lexer import LONG_UNITS, STEPS, UNITS
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import DataSort, FunctionSort, SequenceSort
-from avow.language.terms import Role
+from avow.language.terms import Past, Role
 from avow.lsp.names import Text
 from avow.lsp.places import Place, place_of
 from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE, QUANTIFIERS, SECTIONS
@@ -67,6 +67,12 @@ def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
         case "NODE", "INPUTS" | "OUTPUTS":
             if any(t.type == "COLON" for t in place.before):
                 yield from _types(contract)
+        case "NODE", "STEPS":
+            if place.last == "NUMBER":
+                yield from (Offer(unit, "unit") for unit in (*UNITS, *LONG_UNITS))
+            elif place.last == "LPAR":
+                yield Offer("every", "keyword", "exactly so far apart")
+                yield Offer("at most", "keyword", "no further apart")
         case "NODE", "TOPICS":
             yield from _of_topic(place, node)
         case "NODE", "ASSUME" | "GUARANTEE":
@@ -104,7 +110,7 @@ def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator
     for role in (Role.INPUT, Role.OUTPUT):
         yield from _ports(node, role, f"{role}.")
     yield from _values(contract)
-    for form in FORMS.values():
+    for form in (form for form in FORMS.values() if form.name != Past.STEPS):
         yield Offer(form.name, "function", form.label, form.template, form.meaning)
     for word, meaning in QUANTIFIERS.items():
         yield Offer(word, "operator", f"{word}(x in S | F)", f"{word}(${{1:x}} in ${{2:REAL}} | ${{3:F}})", meaning)

@@ -123,7 +123,8 @@ def clause_names(node: NodeSyntax) -> Iterator[tuple[Meaning, int, int, bool]]:
         what = What.ASSUMPTION if clause.kind is ClauseKind.ASSUMPTION else What.GUARANTEE
         name = clause.name.text if clause.name is not None else f"{letter}{counts[clause.kind]}"
         place = clause.name or Token("", "", clause.start, clause.start + 1)
-        yield Meaning(what, name, node.name.text), place.start, place.end, clause.name is not None
+        own = clause.name is not None and clause.name.start != clause.start  # `steps( … )` is called by its keyword
+        yield Meaning(what, name, node.name.text), place.start, place.end, own
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 from avow.language.lexer import Token
 from avow.language.parser import QUANTIFIERS
+from avow.language.terms import Past
 from avow.lsp.names import Text
 
 _TOP = ("CONTEXT", "NODE")
-_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "ASSUME", "GUARANTEE")
+_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "STEPS", "ASSUME", "GUARANTEE")
 _WORDS = {"A": "ASSUME", "G": "GUARANTEE"}
 
 
@@ -60,6 +61,8 @@ def _scan(found: Sequence[Token]) -> Place:
         between = depth == 0 and (not section or opened)
         if kind == "NAME" and top == "NODE" and brace and between and token.text in _WORDS:
             kind = _WORDS[token.text]
+        if kind == "NAME" and token.text == Past.STEPS and top == "NODE" and brace and between:
+            kind = "STEPS"
         if kind in _TOP:
             top, node, section, start, depth, brace, opened = kind, "", "", at + 1, 0, 0, False
         elif kind in _SECTIONS:

@@ -58,6 +58,8 @@ _FORMS = (
     Form(Past.ROSE, ("F",), "F has just become true; before the first step it counts as false"),
     Form(Past.FELL, ("F",), "F has just become false; at the first step nothing fell"),
     Form(Past.CHANGED, ("t",), "t has another value than at the step before; not at the first step"),
+    Form(Past.ARRIVED, ("in.p",), "a message of the input has come since the step before"),
+    Form(Past.STEPS, ("every 20 ms",), "a part of a node: how far apart its steps are"),
     Form(Past.ONCE, ("F",), "F at some step up to now; with a limit, at this step or one of so many before"),
     Form(Past.HISTORICALLY, ("F",), "F at every step up to now; with a limit, at this step and so many before"),
     Form(Past.HELD, ("F",), "F now and at each of the 5 steps before; false while the run is shorter", "[5 steps]"),
@@ -89,6 +91,7 @@ SECTIONS: Mapping[str, tuple[str, str]] = {
     "inputs": ("inputs( ${1:name} : ${2:REAL} )", "what the node takes in"),
     "outputs": ("outputs( ${1:name} : ${2:REAL} )", "what the node gives out"),
     "topics": ("topics( ${1:package/Type} ${2:name} matches(${3:in.name}) )", "the ROS topics that carry them"),
+    Past.STEPS: ("steps( ${1|every,at most|} ${2:20} ms )", "how far apart its steps are"),
     "assume": ('assume ${1:name} "${2:what the node may rely on}"\n  ( ${3:TRUE} )', "what the node may rely on"),
     "guarantee": ('guarantee ${1:name} "${2:what the node promises}"\n  ( ${3:TRUE} )', "what the node promises"),
 }

@@ -115,6 +115,13 @@ def test_completion(editor: Editor, folder: Path) -> None:
     editor.write(uri, broken)
     assert "colour" in labels(editor, uri, broken, "-> out.", 7), "while it is being typed"
     editor.write(uri, CONTRACT)
+    paced = CONTRACT.replace("  guarantee low", "  steps( at most 20 ms )\n  guarantee low")
+    editor.write(uri, paced)
+    assert "ms" in labels(editor, uri, paced, "20 ms", 3)
+    assert {"every", "at most"} == labels(editor, uri, paced, "at most").keys()
+    assert "in.r" in labels(editor, uri, paced, "in.r < Limit")
+    assert "steps" in labels(editor, uri, paced, "steps(")
+    editor.write(uri, CONTRACT)
     plan = editor.open(folder / "plan.yaml")
     assert {"requirements", "nodes", "expected"} <= labels(editor, plan, PLAN, "system").keys()
     assert {"criticality", "methods"} <= labels(editor, plan, PLAN, "methods").keys()
