@@ -103,7 +103,7 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
         clause.name,
         f"What {names} {verb} can meet assumption {clause.name} of {node.name}.",
         show_term(clause.formula),
-        (about, *chain.from_iterable(_guarantees(whole.node(p)) for p in providers)),
+        sum((_guarantees(whole.node(p)) for p in providers), (about,)),
         Severity.ERROR,
         clause.span,
     )
