@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 LONGEST = 150.0
@@ -33,9 +35,14 @@ def wait_for(done: Callable[[], bool]) -> None:
 
 @contextmanager
 def running(command: Sequence[object], **more: Any) -> Iterator[subprocess.Popen[str]]:
-    """A process that is over when this is left."""
-    process = subprocess.Popen([str(word) for word in command], text=True, **more)
-    watchdog = threading.Timer(LONGEST, process.kill)
+    """A process that is over when this is left, and all that it started."""
+    process = subprocess.Popen([str(word) for word in command], text=True, start_new_session=True, **more)
+
+    def kill() -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+    watchdog = threading.Timer(LONGEST, kill)
     watchdog.start()
     try:
         yield process
@@ -43,4 +50,7 @@ def running(command: Sequence[object], **more: Any) -> Iterator[subprocess.Popen
         watchdog.cancel()
         if process.poll() is None:
             process.terminate()
-        process.wait(timeout=30)
+        try:
+            process.wait(timeout=30)
+        finally:
+            kill()

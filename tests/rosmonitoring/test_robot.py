@@ -72,10 +72,11 @@ def until_told(words: str, robot: list[object], how: list[object], folder: Path)
             first = next((line for line in watching.stdout if words in line), "")
             watching.send_signal(signal.SIGINT)
             rest, wrong = watching.communicate()
+    wait_for(lambda: not answers(port))  # with the robot its master is gone
     return first, rest + wrong, watching.returncode
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_ros1
 def test_on_ros_1_a_wrong_command_is_withheld(tmp_path: Path) -> None:
     robot = ["--fault", "ignore_orange", "--enforce"]

@@ -12,6 +12,7 @@ Needs Debian's python3-rospy and python3-rosmaster. To watch: avow monitor contr
 
 import argparse
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -100,6 +101,7 @@ def command(name, given):
 
 def everything(given):
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{given.port}", "ROS_IP": "127.0.0.1"}
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the nodes end too
     started = []
     try:
         if not given.master:
