@@ -36,10 +36,10 @@ class Faulty(Bus):
 
 def parameters(fault=None, sources=None):
     found = {name: dict(values) for name, values in PARAMETERS.items()}
-    if sources is not None:
-        found["world"]["sources"] = sources
     for node, values in faults.PARAMETERS.get(fault, {}).items():
         found[node] |= values
+    if sources is not None:
+        found["world"]["sources"] = sources
     return found
 
 
