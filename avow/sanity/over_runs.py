@@ -13,7 +13,7 @@ from typing import assert_never
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, rename, substitute
 from avow.language.contract import ClauseKind, Node
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
 from avow.sanity.results import Bounds, Finding, listing
 from avow.sanity.viability import Viability, viable
@@ -76,7 +76,11 @@ class OverRuns:
                 return self._not_vacuous(claim.subject or "")
             case Property.CONSTRAINED:
                 return self._constrained(claim.subject or "")
-            case Property.DETERMINED | Property.NEEDED | Property.MEETABLE:
+            case Property.DETERMINED:
+                return self._determined(claim.subject or "")
+            case Property.NEEDED:
+                return self._needed(claim.subject or "")
+            case Property.MEETABLE:
                 return Finding(Verdict.UNKNOWN, "not asked of clauses that speak of other steps")
             case _:
                 assert_never(claim.about)
@@ -146,6 +150,42 @@ class OverRuns:
             if remembered
             else Finding(found.verdict, text)
         )
+
+    def _determined(self, name: str) -> Finding:
+        """Two answers at one step of a run. Where an output is remembered, one of them may be no answer in the end."""
+        output = self.node.output(name).variable
+        again = {
+            v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in (p.variable for p in self.node.outputs)
+        }
+        together = {
+            **self.assumptions,
+            **self.guarantees,
+            **{f"{label} again": substitute(f, again) for label, f in self.guarantees.items()},
+            "different": Not(Compare("==", output, again[output])),
+        }
+        found = self._possible(together, "{} leave one value")
+        if found.verdict is Verdict.REFUTED:
+            return Finding(Verdict.PROVED)
+        if found.verdict is not Verdict.PROVED:
+            return found
+        if any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in ports_of(cell.now)):
+            return Finding(
+                Verdict.UNKNOWN, f"two values of out.{name} are possible at a step, and one may matter later"
+            )
+        return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name} at a step of a run")
+
+    def _needed(self, name: str) -> Finding:
+        """Whether the node could keep its guarantees for ever without the assumption."""
+        if self.viability.verdict is not Verdict.PROVED:
+            return Finding(Verdict.UNKNOWN, "whether the guarantees can be kept with it is not shown")
+        others = tuple(clause for clause in self.node.assumptions if clause.name != name)
+        match OverRuns(replace(self.node, assumptions=others), self.bounds).viability.verdict:
+            case Verdict.REFUTED:
+                return Finding(Verdict.PROVED)
+            case Verdict.PROVED:
+                return Finding(Verdict.REFUTED, "every guarantee can be kept without it", (name,))
+            case _:  # no answer
+                return Finding(Verdict.UNKNOWN, "whether the guarantees could be kept without it is open")
 
     def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
         """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""

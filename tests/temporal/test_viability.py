@@ -18,7 +18,7 @@ from avow.language.terms import RESPONSES, History, Implies, Literal, Not, Term,
 from avow.sanity.analysis import analyse
 from avow.sanity.viability import viable
 from avow.system.formulas import ports_of
-from avow.temporal.cells import Records, compile_node
+from avow.temporal.cells import Records, compile_node, remembers
 from temporal.positions import Step, broken, value
 from temporal.test_cells import N, formula
 from temporal.test_systems import clause
@@ -205,3 +205,37 @@ def test_what_is_not_a_safety_property_is_not_called_realizable() -> None:
     contract, _ = check_text(text, "n.rcl")
     assert contract is not None
     assert {r.verdict for r in analyse(contract.nodes[0])} == {Verdict.UNKNOWN}
+
+
+def allowed_steps(node: Node, depth: int) -> list[list[Step]]:
+    """Every run of so many steps at most that keeps all clauses."""
+    found: list[list[Step]] = []
+    waiting: list[list[Step]] = [[]]
+    while waiting:
+        run = waiting.pop()
+        for a, b in ((a, b) for a in BOTH for b in BOTH):
+            longer = [*run, {"in.a": a, "out.b": b, "in.n": 1}]
+            if all(holds(c.formula, longer) for c in node.clauses):
+                found.append(longer)
+                if len(longer) < depth:
+                    waiting.append(longer)
+    return found
+
+
+@pytest.mark.parametrize("seed", some(range(150), 6))
+def test_determined_and_needed_against_all_runs(seed: int) -> None:
+    node = node_of(*drawn(seed))
+    found = {r.name: r.verdict for r in analyse(node)}
+    runs = allowed_steps(node, 4)
+    answers: dict[tuple[object, ...], set[object]] = {}
+    for run in runs:
+        before = tuple(tuple(step.values()) for step in run[:-1])
+        answers.setdefault((*before, run[-1]["in.a"]), set()).add(run[-1]["out.b"])
+    two = any(len(each) > 1 for each in answers.values())
+    assert found["determined-b"] is not Verdict.PROVED or not two
+    assert found["determined-b"] is not Verdict.REFUTED or two or len(runs) == 0
+    if remembers(node) and found.get("needed-a") in (Verdict.PROVED, Verdict.REFUTED):
+        without = replace(node, assumptions=())
+        always: Term = Not(Literal(False, node.assumptions[0].formula.sort))
+        loses = environment_wins(always, [c.formula for c in without.guarantees], DEPTH)
+        assert found["needed-a"] is Verdict.PROVED or not loses
