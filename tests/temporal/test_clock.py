@@ -30,6 +30,7 @@ from avow.language.terms import (
     Variable,
     timed,
 )
+from avow.temporal import ages, clock
 from avow.temporal.ages import CLOCK, ELAPSED, Lasting, Side
 from avow.temporal.cell import Unsaid
 from avow.temporal.clock import Timed
@@ -168,3 +169,25 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
 def test_cells_are_what_the_definitions_say(seed: int) -> None:
     rng = random.Random(seed)
     assert [found for _ in range(80) if (found := disagreement(rng, rng.choice((1, 2, 2, 3)))) is not None] == []
+
+
+_older, _kind = ages.Record._older, clock._kind
+
+MUTANTS: dict[str, tuple[object, str, object]] = {
+    "ages stand still": (ages.Record, "_older", lambda self, kept, length: kept),
+    "ages run twice as fast": (ages.Record, "_older", lambda self, a, b: _older(self, _older(self, a, b), b)),
+    "an instant is as the times around it": (ages, "sided", lambda relation, side: relation),
+    "the latest beginning in place of the earliest": (
+        clock, "_kind", lambda term: ages.Kind.LATEST if term.limit is not None else _kind(term),
+    ),
+    "silence is as nothing were": (Timed, "_held", lambda self, last: FALSE if last.sort == BOOL else last),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_die(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    where, attribute, mutant = MUTANTS[name]
+    monkeypatch.setattr(where, attribute, mutant)
+    rng = random.Random(7)
+    assert any(disagreement(rng, 2) is not None for _ in range(150))
