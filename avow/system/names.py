@@ -23,13 +23,11 @@ _FORMER = {
     "unmeetable": "meetable",
     "unneeded": "needed",
 }
-_FORMER_NAME = re.compile(rf"(^|/)({'|'.join(_FORMER)})(?=-|\*)")
+_FORMER_NAME = re.compile(rf"((?:^|/)(?:sanity|[^/]*\*[^/]*)/)({'|'.join(_FORMER)})(?=-|\*)")
 
 
 def renamed(obligation: str) -> str | None:
     """Today's id of a sanity claim, or pattern of such ids, given the one that named the fault; None for any other."""
-    if "/guarantee/" in obligation:
-        return None
     today = _FORMER_NAME.sub(lambda found: found[1] + _FORMER[found[2]], obligation)
     return today if today != obligation else None
 
