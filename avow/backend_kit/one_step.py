@@ -24,7 +24,7 @@ def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
     asked, refused = _sayable(tool, job)
     outcomes = tuple(Outcome(o.id, Verdict.UNKNOWN, refused[o.id]) for o in job.obligations if o.id in refused)
     if job.obligations and not asked.obligations:
-        unasked = "no guarantee that the method could judge is left"
+        unasked = next(iter(refused.values()))
         outcomes = (*outcomes, *(Outcome(c.id, Verdict.UNKNOWN, unasked) for c in job.claims))
         return Report(outcomes, tool.name, tool.version)
     report = tool.discharge(asked, folder, limits)

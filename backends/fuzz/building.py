@@ -17,6 +17,8 @@ from .tables import TABLES, Drawable, native, tables
 from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
 
 _INSTALL = "sudo apt install clang"
+LINK = "avow-adapter.hpp"
+"""The adapter by another name: its own path may hold what no line of C++ can say."""
 _COMMON = (
     "-std=c++17",
     "-g1",
@@ -59,6 +61,7 @@ def write(reading: Reading, made: Drawable, folder: Path) -> None:
     """The generated files and the fixed ones."""
     for name, text in {**native(), TABLES: tables(reading, made)}.items():
         (folder / name).write_text(text, encoding="utf-8")
+    (folder / LINK).symlink_to(reading.adapter)
 
 
 def fuzzed(reading: Reading, folder: Path, seconds: float) -> Built:
@@ -80,15 +83,13 @@ def _build(reading: Reading, folder: Path, main: str, flags: tuple[str, ...], na
     tool = clang()
     if tool.path is None:
         raise ToolMissing(f"clang++ is not here ({_INSTALL})")
-    includes = [f"-I{folder}", *(f"-I{path}" for path in reading.include)]
+    includes = [f"-I{folder}", "-iquote", str(reading.adapter.parent), *(f"-I{path}" for path in reading.include)]
     objects: list[str] = []
     read: list[Path] = []
     for k, source in enumerate((folder / main, *reading.sources)):
         object_file = folder / f"{name}-{k}.o"
         listed = folder / f"{name}-{k}.d"
-        quoted = str(reading.adapter).replace("\\", "\\\\").replace('"', '\\"')
-        adapter = f'-DADAPTER="{quoted}"'
-        words = [*_COMMON, *flags, *includes, adapter, "-MMD", "-MF", str(listed)]
+        words = [*_COMMON, *flags, *includes, f'-DADAPTER="{LINK}"', "-MMD", "-MF", str(listed)]
         done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, seconds)
         if done.code != 0 or not object_file.is_file():
             raise NotBuilt(_first(done, reading, folder))
@@ -114,8 +115,15 @@ def _first(done: Completed, reading: Reading, folder: Path) -> str:
         return "clang did not end in the time given"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
     said = (lines or done.stderr.strip().splitlines() or [f"clang ended with code {done.code}"])[0]
-    root = str(reading.job.root.resolve()) + os.sep
-    return said.replace(root, "").replace(str(folder) + os.sep, "")[:300]
+    return plainly(said, reading, folder)[:300]
+
+
+def plainly(said: str, reading: Reading, folder: Path) -> str:
+    """What a tool says, with places that are the same on every machine."""
+    root = reading.job.root.resolve()
+    own = reading.adapter.relative_to(root) if reading.adapter.is_relative_to(root) else reading.adapter
+    said = said.replace(str(folder / LINK), str(own)).replace(LINK, str(own))
+    return said.replace(str(root) + os.sep, "").replace(str(folder) + os.sep, "")
 
 
 def _listed(path: Path, folder: Path) -> list[Path]:

@@ -255,8 +255,7 @@ class Work:
 
     def _said(self, log: str) -> str:
         """What a sanitizer reports, with a place that is the same on every machine."""
-        root = str(self.job.root.resolve()) + os.sep
-        text = log.replace(root, "").replace(str(self.folder) + os.sep, "")
+        text = building.plainly(log, self.reading, self.folder)
         plainly = re.search(r"^(\S+:\d+:\d+): (runtime error: .+)$", text, re.MULTILINE)
         if plainly:
             return f"{plainly[1]}: {plainly[2]}"
