@@ -58,6 +58,8 @@ def check(
         if status == "unsat" and len(core) > 1:
             core = _minimal(translator, assertions, tracked, core, effort, seed, engine)
     except z3.Z3Exception as error:
+        if "unknown parameter" in str(error):
+            raise RuntimeError(f"Z3: {error}") from error  # a fault of ours: as an answer it would stay unseen
         status, model, core, reason = "unknown", None, (), f"Z3: {error}"
     found = Model(translator, model) if model is not None else None
     order = [label for label, _ in tracked if label in core]
@@ -161,7 +163,7 @@ class Said:
 HANGS = "the solver hangs"
 
 
-def put(translator: Sorts, solver: Any, effort: int, seed: int = 0, *assumptions: Expr) -> Said:
+def put(translator: Sorts, solver: Any, effort: int, seed: int | None = 0, *assumptions: Expr) -> Said:
     """Put what a solver holds to it: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends what hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
@@ -178,10 +180,10 @@ def put(translator: Sorts, solver: Any, effort: int, seed: int = 0, *assumptions
     return Said("unknown", HANGS if interrupted.is_set() else _reason(solver))
 
 
-def configured(solver: Any, effort: int, seed: int) -> None:
-    """Set a solver's limit and seed."""
+def configured(solver: Any, effort: int, seed: int | None) -> None:
+    """Set a solver's limit and seed; None for one that has no seed."""
     solver.set("rlimit", steps(effort))
-    if isinstance(solver, z3.Solver):
+    if isinstance(solver, z3.Solver) and seed is not None:
         solver.set("random_seed", seed)
         # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
         solver.set("smt.arith.nl.grobner", False)
@@ -222,7 +224,7 @@ def _ask_qsat(
     tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
     solver = z3.Tactic(tactic, ctx=translator.context).solver()
     solver.add(*everything)
-    said = put(translator, solver, effort)
+    said = put(translator, solver, effort, None if tactic == "nlqsat" else 0)
     if said.status == "sat":
         return "sat", solver.model(), (), ""
     if said.status == "unsat" and _arithmetic_only(everything):
