@@ -434,10 +434,12 @@ FILES: dict[str, tuple[str, str]] = {
     "models/agent_impl.dfy": ("agent", "dafny"),
     "models/localisation_node.py": ("localisation", "review"),
     "models/make_trace.py": ("", ""),
-    "models/radiation_sensor.imp": ("radiationSensor", "hoare"),
+    "models/radiation_sensor.imp": ("radiationSensor", "hoare fuzz"),
     "models/radiation_sensor.py": ("radiationSensor", "hypothesis"),
     "models/radiation_sensor_impl.dfy": ("radiationSensor", "dafny"),
     "models/simulate_navigation.py": ("", ""),
+    "robot/nodes/radiation_sensor.hpp": ("radiationSensor", "fuzz"),
+    "robot/nodes/radiation_sensor.yaml": ("radiationSensor", "fuzz"),
     "reviews/localisation.yaml": ("localisation", "review"),
     "traces/nominal.jsonl": ("agent localisation navigation radiationSensor", "rosmonitoring"),
 }
