@@ -4,7 +4,8 @@ A step class has ``__init__(self, params)`` (or ``__init__(self)``) and ``step(s
 output, or a dict of outputs by name. Memory is held in attributes.
 
 Values cross as JSON that keeps every bit: a float is ``{"f": hexadecimal}``, an int ``{"i": digits}``, a Fraction
-``{"q": [numerator, denominator]}``, a list ``{"l": [...]}``; truth values and texts are their own JSON.
+``{"q": [numerator, denominator]}``, a list ``{"l": [...]}``, what is given as a tuple ``{"t": [...]}``; truth values
+and texts are their own JSON.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ def plain(data: Any) -> Any:
             return Fraction(int(numerator), int(denominator))
         case {"l": list(items)}:
             return [plain(item) for item in items]
+        case {"t": list(items)}:
+            return tuple(plain(item) for item in items)
         case {"d": list(pairs)}:
             return {str(key): plain(value) for key, value in pairs}
         case _:

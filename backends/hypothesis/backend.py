@@ -129,6 +129,8 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
     met = zip(own["triggers"], own["hits"], own["edge_hits"], strict=True)
     triggers = [{"trigger": t, "met": n, "met_at_edges": m} for t, n, m in met]
     details: dict[str, object] = {"triggers": triggers}
+    if answer["left_out"]:
+        details["left out"] = answer["left_out"]
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
     if own["failure"] is not None:
         values = tuple((str(name), str(value)) for name, value in own["failure"])

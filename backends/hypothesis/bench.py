@@ -393,6 +393,7 @@ class Bench:
             "undecided": self.undecided,
             "wanted": self.cases,
             "stopped": stopped,
+            "left_out": self.data.get("left_out", []),
             "observed": to_json(self.subject.observed()),
             "isolation": self.subject.isolation.value,
             "apart": self.apart,

@@ -123,11 +123,12 @@ def _data(job: Job, subject: SubjectFile) -> str:
         "memory": list(subject.memory),
         "source": subject.source,
         "numbers": numbers(job),
-        "inputs": [_port(port) for port in job.node.inputs],
-        "outputs": [_port(port) for port in job.node.outputs],
+        "inputs": [_port(port) for port in job.node.inputs if port.variable.qualified not in subject.left_out],
+        "outputs": [_port(port) for port in job.node.outputs if port.variable.qualified not in subject.left_out],
+        **({"left_out": sorted(subject.left_out)} if subject.left_out else {}),
         "assumptions": [_clause(clause) for clause in job.node.assumptions],
         "guarantees": [_clause(job.clause(obligation)) for obligation in job.obligations],
-        "scenario": _scenario(job),
+        "scenario": {n: rows for n, rows in _scenario(job).items() if f"in.{n}" not in subject.left_out},
     }
     return json.dumps(data, indent=1, ensure_ascii=True) + "\n"
 

@@ -11,12 +11,12 @@ import json
 import math
 import random
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from avow.formulas.values import Element, Value
+from avow.formulas.values import Data, Element, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
@@ -54,6 +54,7 @@ class SequenceBench(Bench):
     def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
         super().__init__(data, folder)
         self.memory: tuple[str, ...] = tuple(data["memory"])
+        self.unread = tuple(name.removeprefix("out.") for name in data.get("left_out", ()) if name.startswith("out."))
         self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
         self.traces: dict[str, Trace] = {}
         self._first: list[list[Inputs]] = []
@@ -80,7 +81,7 @@ class SequenceBench(Bench):
         if "error" in answer:
             raise SubjectFailed(f"the step raises {answer['why']}")
         try:
-            found = outputs(_as_host(answer["value"]), self.others) if self.others else {}
+            found = outputs(_as_host(answer["value"], self.unread), self.others) if self.others else {}
             held = {n: v for n, v in answer["memory"].items() if n in self.output_sorts}
             return found | {n: received(_as_host(v), self.output_sorts[n], f"out.{n}") for n, v in held.items()}
         except (Malformed, ValueError, TypeError, KeyError) as error:
@@ -116,6 +117,10 @@ class SequenceBench(Bench):
                 return name
             case SequenceValue(items=items):
                 return {"l": [self.coded(item) for item in items]}
+            case Data(constructor=constructor, arguments=arguments):
+                return {"t": [constructor, *map(self.coded, arguments)]}
+            case tuple():
+                return {"t": [self.coded(item) for item in value]}
         raise Impossible(f"a step class is not given {value}")
 
     def decoded(self, data: Any, sort: Sort, name: str) -> Value:
@@ -394,7 +399,7 @@ class SequenceBench(Bench):
             (answer,) = self._asked(self.subject, {"on": True, "steps": [given]})["steps"]
             if "error" in answer:
                 return f"the step raises {answer['why']}"
-            outputs(_as_host(answer["value"]), self.others)
+            outputs(_as_host(answer["value"], self.unread), self.others)
         except (SubjectFailed, Malformed) as error:
             return str(error)
         return ""
@@ -414,8 +419,8 @@ class SequenceBench(Bench):
         return report
 
 
-def _as_host(data: Any) -> Any:
-    """What a class returned, as a subject's process has it (`convention`)."""
+def _as_host(data: Any, but: Collection[str] = ()) -> Any:
+    """What a class returned, as a subject's process has it (`convention`); `but`: names of a dict that are left out."""
     match data:
         case {"f": str(text)}:
             number = float.fromhex(text)
@@ -424,9 +429,9 @@ def _as_host(data: Any) -> Any:
             return {"q": [str(part) for part in number.as_integer_ratio()]}
         case {"i": str(digits)}:
             return {"q": [digits, "1"], "w": True}
-        case {"l": items}:
+        case {"l": items} | {"t": items}:
             return {"t": [_as_host(item) for item in items]}
         case {"d": pairs}:
-            return {"m": [[key, _as_host(value)] for key, value in pairs]}
+            return {"m": [[key, _as_host(value)] for key, value in pairs if key not in but]}
         case _:  # its own JSON
             return data

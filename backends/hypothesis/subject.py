@@ -6,13 +6,24 @@ import ast
 import difflib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.drive.steps import coded
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.formulas.formula import free_variables
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+)
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Numbers, Source
@@ -30,6 +41,8 @@ class SubjectFile:
     driven: bool = False
     source: bool = False
     """Whether it is the node's own class."""
+    left_out: frozenset[str] = frozenset()
+    """Ports by qualified name that no clause speaks of: inputs that the class is not given, outputs not looked at."""
 
 
 def subject(job: Job) -> SubjectFile:
@@ -47,10 +60,11 @@ def subject(job: Job) -> SubjectFile:
     defined = _top_level(tree)
     if found.driven:
         assert job.source is not None
-        if not isinstance(defined.get(job.source.class_name), ast.ClassDef):
+        declared = defined.get(job.source.class_name)
+        if not isinstance(declared, ast.ClassDef):
             where = job.source.place.at("source", "class")
             raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{job.source.class_name}`", where))
-        return found
+        return _without(found, _method(declared, "step"), job)
     if found.function not in defined:
         near = difflib.get_close_matches(found.function, [*defined], 1)
         hint = f"did you mean `{near[0]}`?" if near else None
@@ -88,6 +102,26 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
         raise Rejected(*problems)
     spec = {"class": definition.name, "params": coded({}), "memory": {}, "attributes": []}
     return SubjectFile(found.name, found.path, json.dumps(spec), (), True)
+
+
+def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> SubjectFile:
+    """The node's own class, without the ports of no plain type that no clause speaks of; but of an input only where
+    `step` does not take it. Raises Rejected."""
+    clauses = (*job.node.assumptions, *map(job.clause, job.obligations))
+    spoken = {v.qualified for clause in clauses for v in free_variables(clause.formula)}
+    taken = {a.arg for a in (*step.args.args, *step.args.kwonlyargs)} if step is not None else set()
+    every = step is None or step.args.kwarg is not None
+    left: set[str] = set()
+    for port in (*job.node.inputs, *job.node.outputs):
+        called = port.variable.qualified
+        needed = port in job.node.inputs and (every or port.name in taken)
+        if not unfit({port.name: port.sort}):
+            continue
+        if called in spoken or needed or port.name in found.memory:
+            place = job.source.place.at("source") if job.source is not None else None
+            raise Rejected(Diagnostic("HYPO106", f"a step class is not given what {port.name} is", place))
+        left.add(called)
+    return replace(found, left_out=frozenset(left))
 
 
 def _method(definition: ast.ClassDef, name: str) -> ast.FunctionDef | None:
@@ -129,9 +163,6 @@ def _declared(job: Job, source: Source) -> SubjectFile:
     if source.kind is not Driving.STEP:
         why = f"what is tested is a class with a method step, and kind is {source.kind}: `avow drive` runs callbacks"
         faults += (Diagnostic("HYPO106", why, place),)
-    wrong = unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
-    if wrong:
-        faults += (Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place),)
     if faults:
         raise Rejected(*faults)
     spec = {"class": source.class_name, "params": coded(dict(params)), "memory": dict(source.memory), "attributes": []}
@@ -148,9 +179,21 @@ def parameter_files(job: Job) -> tuple[Path, ...]:
 def unfit(ports: Mapping[str, Sort]) -> str:
     """The first port whose values no step class is given; empty where there is none."""
     for name, sort in ports.items():
-        if not isinstance(sort.item if isinstance(sort, SequenceSort) else sort, _PLAIN):
+        if not _plain(sort):
             return name
     return ""
+
+
+def _plain(sort: Sort) -> bool:
+    match sort:
+        case SequenceSort(item=item):
+            return isinstance(item, _PLAIN)
+        case DataSort(constructors=constructors):
+            return all(isinstance(part, _PLAIN) for each in constructors for part in each.parameters)
+        case TupleSort(items=items):
+            return all(isinstance(item, _PLAIN) for item in items)
+        case _:  # one value
+            return isinstance(sort, _PLAIN)
 
 
 _PLAIN = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort)

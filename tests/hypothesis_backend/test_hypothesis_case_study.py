@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from hoare.systems import make_job
 from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND
-from avow.base.verdict import Outcome, Verdict
+from avow.base.verdict import Object, Outcome, Verdict
+from avow.conformance.seeded import settle as conformance_settle
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
 
@@ -141,3 +143,30 @@ def test_a_scenario_gives_the_places(tmp_path: Path) -> None:
     assert outcome.counterexample is not None
     shown = dict(outcome.counterexample.values)["in.map"]
     assert "-8.18" in shown or "3.25" in shown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "broken"),
+    [
+        ("", "", set()),
+        ("r < self.orange", "r <= self.orange", {"medium"}),
+        ("elif r < self.red", "elif r < self.red or self.readings == 7", {"high"}),  # only after seven readings
+        ('params["red"]', '(params["red"] + 1e-9)', {"high"}),
+    ],
+)
+def test_the_class_that_the_robot_runs(tmp_path: Path, root: Path, old: str, new: str, broken: set[str]) -> None:
+    folder = tmp_path / "remote_inspection"
+    shutil.copytree(root / SYSTEM, folder)
+    sensor = folder / "robot/nodes/radiation_sensor.py"
+    text = sensor.read_text(encoding="utf-8")
+    assert old in text
+    sensor.write_text(text.replace(old, new, 1), encoding="utf-8")
+    system = load_system(folder)
+    method = next(m for m in system.plan.node("radiationSensor").methods if m.id == "driven")
+    job = method_job(system, system.contract.node("radiationSensor"), method)
+    found = conformance_settle(BACKEND, job, tmp_path / "made", Limits()).outcomes
+    assert {o.of for o in found} == {Object.SOURCE}
+    verdicts = {o.obligation.rpartition("/")[2]: o.verdict for o in found}
+    assert {n for n, v in verdicts.items() if v is Verdict.REFUTED} == broken
+    assert {v for n, v in verdicts.items() if n not in broken} == {Verdict.TESTED}

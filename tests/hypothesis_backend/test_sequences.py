@@ -144,3 +144,41 @@ def test_a_class_that_takes_its_time_is_not_refuted_for_it_and_asked_again(step:
     assert "asks again" in found.summary
     assert found.details[RETRY] is True
     assert found.counterexample is None
+
+
+WIDE = "context { Command : { go(REAL, INTEGER), stop }; Marks : NATURAL --> BOOL; }"
+WIDE_PORTS = "inputs( c : Command, before : Marks ) outputs( u : REAL, marks : Marks )"
+TAKES = "c):\n        return {'u': c[1] if c[0] == 'go' else %s, 'marks': set()}\n"
+
+
+def wide(folder: Path, clause: str, step: str) -> Job:
+    work = job(folder, REAL, SAME, "r):\n        return r\n")
+    (folder / "node.py").write_text(f"{HEAD}    def step(self, {step}")
+    (folder / "system.rcl").write_text(f"{WIDE} node made {{ {WIDE_PORTS} topics() guarantee g ( {clause} ) }}")
+    system = load_system(folder)
+    return method_job(system, system.contract.node("made"), work.method)
+
+
+def test_commands_are_tuples_and_ports_that_no_clause_speaks_of_are_left_out(tmp_path: Path) -> None:
+    clause = "in.c == stop -> out.u == 5"
+    # `stop` has no arguments, and comes as a tuple of its name
+    (right,) = settle(BACKEND, wide(tmp_path, clause, TAKES % "5.0"), tmp_path / "made", Limits()).outcomes
+    assert (right.verdict, right.of) == (Verdict.TESTED, Object.SOURCE), right.summary
+    assert right.details["left out"] == ["in.before", "out.marks"]
+    (wrong,) = settle(BACKEND, wide(tmp_path, clause, TAKES % "6.0"), tmp_path / "made", Limits()).outcomes
+    assert wrong.verdict is Verdict.REFUTED
+    assert wrong.counterexample is not None
+    assert ("in.c", "stop") in wrong.counterexample.values
+
+
+@pytest.mark.parametrize(
+    ("clause", "step"),
+    [
+        ("forall(i in NATURAL | in.before(i) -> out.marks(i))", TAKES % "5.0"),  # a clause speaks of them
+        ("out.u == 5", "c, before):\n        return {'u': 5.0, 'marks': before}\n"),  # the class is to be given one
+        ("out.u == 5", "**given):\n        return {'u': 5.0, 'marks': set()}\n"),
+    ],
+)
+def test_a_port_that_matters_is_not_left_out(clause: str, step: str, tmp_path: Path) -> None:
+    (told,) = BACKEND.check(wide(tmp_path, clause, step))
+    assert told.code == "HYPO106"
