@@ -131,7 +131,7 @@ CONTRACTS = {
 }
 
 
-@pytest.mark.nightly  # the second solver takes minutes over squares
+@pytest.mark.slow  # over squares Z3 instantiates for a while before its other engine is asked
 @pytest.mark.parametrize("name", some(CONTRACTS, 8))
 def test_what_is_found(name: str) -> None:
     context, ports, clauses, faults, notes = CONTRACTS[name]
