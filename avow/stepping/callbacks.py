@@ -116,8 +116,11 @@ class Driver:
             raise unusable(f"{where}: {topic} carries {kind}: {error}") from None
 
     def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
-        """Whether a publication is what was recorded, in the fields that the recording has."""
+        """Whether a publication is what was recorded, in the fields that the recording has; one that has
+        none says nothing."""
         fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
+        if not fields and data["d"]:
+            return False
         said = plain_fields(data, fields)
         recorded = self.coded(topic, event, "the recording")
         return json.dumps(said) == json.dumps(plain_fields(recorded, fields))

@@ -84,6 +84,7 @@ FIXES_TRIED = 12
 
 LINES_NAMED = 5
 """Lines of a plan that a rename names because the old name is left in them: a name may be a common word."""
+
 DRIVEN_SECONDS = 60.0
 """Seconds for one run of a callback class, whose time is virtual: thousands of messages take one."""
 

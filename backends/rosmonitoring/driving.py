@@ -62,6 +62,9 @@ def command(
         return 1
     if not replay:
         return 0
+    if not run.said and not any(event.topic in run.spoken for event, _ in recorded):
+        click.echo("nothing was published, and nothing is recorded: there is nothing to compare")
+        return 1
     different = tuple(_different(found, recorded, run))
     for text in different:
         click.echo(text)

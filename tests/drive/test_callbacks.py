@@ -221,3 +221,35 @@ def test_methods_about_a_step_refuse_callbacks(tmp_path: Path, backend: str) -> 
 def test_a_step_class_has_no_topics(tmp_path: Path) -> None:
     folder = system(tmp_path / "w", "step", "class Watch:\n    def step(self, r):\n        return 'red'\n")
     assert "has no topics" in told(drive(folder, "watch"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["ros1", "mcap"])
+def test_a_bag_is_a_recording_too(tmp_path: Path, form: str) -> None:
+    pytest.importorskip("rosbags")
+    from rosmonitoring.test_bags import write_bag
+
+    readings = [{"data": 10.0}, {"data": 250.0}, {"data": float("nan")}]
+    bag = write_bag(tmp_path / "b", form, "std_msgs/msg/Float64", readings)
+    text = ROS1.replace('"r"', '"v"').replace("# HERE", "assert message.data != 10.0 or type(message.data) is float")
+    folder = system(tmp_path / "w", "rospy", text)
+    (folder / "system.rcl").write_text(CONTRACT.replace("float64 r", "float64 v"), encoding="utf-8")
+    done = drive(folder, "watch", bag, "-o", tmp_path / "made.jsonl")
+    assert done.return_value == 0, (done.output, done.exception)
+    assert "watch: 3 messages heard, 8 published" in done.output
+    assert drive(folder, "watch", tmp_path / "made.jsonl", "--replay").return_value == 0
+
+
+def test_nothing_is_not_the_same(tmp_path: Path) -> None:
+    silent = ROS1.replace("rospy.Timer(rospy.Duration(0.25), self.tick)", "pass")
+    done = drive(system(tmp_path / "w", "rospy", silent), "watch", trace(tmp_path), "--replay")
+    assert done.return_value == 1
+    assert "nothing to compare" in done.output
+
+
+@pytest.mark.slow
+def test_a_recorded_message_without_fields_is_not_the_same(tmp_path: Path) -> None:
+    recorded = trace(tmp_path)
+    said = "".join(f'\n{{"topic": "status", "time": {at}}}' for at in (1.0, 1.0, 1.0, 1.0))
+    recorded.write_text(recorded.read_text(encoding="utf-8") + said, encoding="utf-8")
+    assert drive(system(tmp_path / "w", "rospy", ROS1), "watch", recorded, "--replay").return_value == 1

@@ -119,7 +119,7 @@ def test_a_refutation_of_a_run_lasts(tmp_path: Path) -> None:
     case = {first.obligation: [first.details["case"]]}
     for text, verdict in ((wrong, Verdict.REFUTED), (right, Verdict.UNKNOWN)):
         work = job(tmp_path, text, rcl, "s.py:f", cases=1)
-        (again, _) = run(Job(work.system, work.node, work.method, work.obligations, case)).outcomes
+        (again, _) = run(Job(work.system, work.node, work.method, work.obligations, kept=case)).outcomes
         assert again.verdict is verdict, again.summary
 
 

@@ -105,7 +105,7 @@ def test_a_case_is_tried_again_first(tmp_path: Path) -> None:
     clauses = "guarantee g ( in.go -> out.n == in.n + 1 and not out.u )"
     work = job(tmp_path, COUNT, clauses, COUNTS, n="n")
     (first,) = settle(BACKEND, work, tmp_path / "made", Limits()).outcomes
-    again = Job(work.system, work.node, work.method, work.obligations, {first.obligation: [first.details["case"]]})
+    again = Job(work.system, work.node, work.method, work.obligations, kept={first.obligation: [first.details["case"]]})
     (second,) = settle(BACKEND, again, tmp_path / "again", Limits()).outcomes
     assert second.verdict is Verdict.REFUTED
 
