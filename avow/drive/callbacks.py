@@ -18,6 +18,7 @@ import json
 import math
 import struct
 import sys
+import threading
 import types
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -140,6 +141,8 @@ class Driven:
         return whole
 
     def say(self, topic: str, message: Any) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            raise self.refuse("what is published by a thread of its own")
         data = self.data({"n": self.spoken[topic]}, message, topic)
         self.said.append([topic, self.now, data])
         for _, act in self.heard.get(topic, ()):
@@ -345,6 +348,8 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
                     driven.until(driven.now)  # what it said to itself
                 driven.until(int(asked["end"]))
                 del node
+                if threading.active_count() > 1:
+                    driven.refuse("a thread of its own")
             except Exception as error:
                 wrong = f"{type(error).__name__}: {error}"[:300]
             return json.dumps(

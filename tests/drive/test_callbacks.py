@@ -158,6 +158,11 @@ def test_what_of_ros_is_not_driven_is_refused_by_name_also_where_it_is_caught(tm
 REFUSED = [
     ("import time, random; self.level += '' if time.time() and random.random() < 2 else ' '", "hangs on"),
     ("open('/tmp/x', 'w')", "writes"),
+    (
+        "import threading; t = threading.Thread(target=self.said.publish, args=('x',)); t.start(); t.join()",
+        "by a thread",
+    ),
+    ("import threading; threading.Timer(60, print).start()", "a thread of its own"),
     ("rospy.Timer(rospy.Duration(1e-9), self.tick)", "more than"),
 ]
 
