@@ -100,8 +100,8 @@ def certify(assessment: Assessment) -> KernelRun:
     """Let the kernel establish again, in this run, what the calculus told that it proved: the report's grades."""
     workspace, system = assessment.workspace, assessment.surveyed.system
     ledger = ledger_of(workspace.ledger(system.name))
-    entries = counting_now(ledger, workspace.root, system)
-    found = kernel_run(entries, workspace.root, system, assessment.run.id)
+    entries = counting_now(ledger, workspace.root, system, assessment.run)
+    found = kernel_run(entries, workspace.root, system, assessment.run)
     twice = sum(one.solvers > 1 for one in found.established)
     told = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
     assessment.state.certified[system.name] = told
@@ -140,7 +140,7 @@ def build(assessment: Assessment) -> Case:
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
     files = (*plan.contract_files, plan.path, *plan.included)
-    entries = counting_now(ledger, workspace.root, system)
+    entries = counting_now(ledger, workspace.root, system, assessment.run)
     texts = {workspace.relative(path): path.read_bytes() for path in files}
     return build_case(
         system,
@@ -171,7 +171,7 @@ def build(assessment: Assessment) -> Case:
         graph_svg=graph_svg(system),
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
         baseline=newest_signed(workspace.signed, system.name)[0],
-        kernel=kernel_run(entries, workspace.root, system, assessment.run.id),
+        kernel=kernel_run(entries, workspace.root, system, assessment.run),
     )
 
 
@@ -232,13 +232,13 @@ def _key(assessment: Assessment) -> str:
 
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
-    entries = counting_now(ledger, root, surveyed.system)
+    entries = counting_now(ledger, root, surveyed.system, assessment.run)
     earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(assessment)]
     key = signing_key()
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
-    kernel = kernel_run(entries, root, surveyed.system, assessment.run.id)
+    kernel = kernel_run(entries, root, surveyed.system, assessment.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     return digest(
         json.dumps(

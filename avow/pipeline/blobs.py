@@ -23,7 +23,7 @@ from avow.base import diagnostics, verdict
 from avow.base.diagnostics import Span
 from avow.calculus import providers
 from avow.formulas import finite, values
-from avow.language import contract, sorts, terms
+from avow.language import contract, operator_names, sorts, terms
 from avow.pipeline import slices
 from avow.ros import names
 from avow.sanity import claims
@@ -31,7 +31,7 @@ from avow.system import plan
 
 _NOWHERE = Span("", 1, 1, 1, 1)
 _MODULES: tuple[ModuleType, ...] = (
-    *(sorts, terms, contract, plan, names, values, finite, claims, providers, slices),
+    *(sorts, operator_names, terms, contract, plan, names, values, finite, claims, providers, slices),
     *(diagnostics, verdict),
 )
 

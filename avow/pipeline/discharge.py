@@ -56,7 +56,7 @@ def _is_settled(
     intact: Intact,
 ) -> bool:
     found = [e for e in entries if not outlived(e, refuted)]
-    records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system)]
+    records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system, run)]
     if not records or (run.fresh and records[-1].run != run.id):
         return False
     last = records[-1]

@@ -28,6 +28,7 @@ from avow.evidence.record import Evidence
 from avow.kernel.certificate import Certificate
 from avow.kernel.solvers import Solvers
 from avow.pipeline.engine_code import trusted_parts
+from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, texts_digest
 from avow.solving.apart import Apart, Both, versions
 from avow.system.plan import System
@@ -41,22 +42,24 @@ def written(certificates: Certificates) -> str:
     return json.dumps({scope: to_json(found) for scope, found in sorted(certificates.made.items())}, sort_keys=True)
 
 
-def still_counts(record: Evidence, root: Path, system: System) -> bool:
+def still_counts(record: Evidence, root: Path, system: System, run: Run) -> bool:
     """Whether a record is as good as when it was made."""
-    return stands(record, root) and _established(record, root, system)
+    return stands(record, root) and _established(record, root, system, run)
 
 
-def counting_now(ledger: Ledger, root: Path, system: System) -> tuple[Entry, ...]:
+def counting_now(ledger: Ledger, root: Path, system: System, run: Run) -> tuple[Entry, ...]:
     """The entries; those that do not count any more with a key that is nobody's."""
     return tuple(
-        entry if _established(entry.evidence, root, system) else not_established(entry)
+        entry if _established(entry.evidence, root, system, run) else not_established(entry)
         for entry in as_of_now(ledger, root)
     )
 
 
 @dataclass(slots=True)
-class _Checked:
-    """One system as it stands, in this process. `kernels`: one for each file of certificates, by its digest."""
+class Checked:
+    """What the kernel said of one system as it stands, in one run (`Run.checked`).
+
+    `kernels`: one for each file of certificates, by its digest."""
 
     texts: str
     kernels: dict[str, Certificates] = field(default_factory=dict)
@@ -65,21 +68,18 @@ class _Checked:
     runs: dict[str, KernelRun] = field(default_factory=dict)
 
 
-_known: dict[Path, _Checked] = {}
-
-
-def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: str) -> KernelRun:
+def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -> KernelRun:
     """What the kernel establishes, in this run, of what the calculus told that it proved; with cvc5 as well where it is
-    installed, for so many steps of its own. Asked once in a process for the same entries."""
+    installed, for so many steps of its own. Asked once in a run for the same entries."""
     records = [e.evidence for e in entries if e.evidence.method == COMPOSE and e.evidence.verdict is Verdict.PROVED]
     records = [r for r in records if isinstance(r.details.get("certificate"), dict)]
     texts = {path: _kept_text(r, root) for r in records if (path := _kept(r)) is not None}
-    asked = digest(json.dumps([run, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
-    checked = _checked(system)
+    asked = digest(json.dumps([run.id, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
+    checked = _checked(system, run)
     if asked not in checked.runs:
         # Z3's answers first: what cvc5 is asked is only what holds already
-        good = [r for r in records if _holds(r, root, system) is not None]
-        checked.runs[asked] = _twice(good, texts, system, run, checked.solvers)
+        good = [r for r in records if _holds(r, root, system, run) is not None]
+        checked.runs[asked] = _twice(good, texts, system, run.id, checked.solvers)
     return checked.runs[asked]
 
 
@@ -100,11 +100,11 @@ def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, r
     return KernelRun(run, tuple(found[name] for name in sorted(found)), versions(), used, parts)
 
 
-def _checked(system: System) -> _Checked:
+def _checked(system: System, run: Run) -> Checked:
     texts = texts_digest(system)
-    checked = _known.get(system.plan.root)
+    checked = run.checked.get(system.plan.root)
     if checked is None or checked.texts != texts:
-        checked = _known[system.plan.root] = _Checked(texts)
+        checked = run.checked[system.plan.root] = Checked(texts)
     return checked
 
 
@@ -121,15 +121,15 @@ def _kept_text(record: Evidence, root: Path) -> str:
         return ""
 
 
-def _established(record: Evidence, root: Path, system: System) -> bool:
+def _established(record: Evidence, root: Path, system: System, run: Run) -> bool:
     if record.method != COMPOSE or record.verdict is not Verdict.PROVED:
         return True
-    return isinstance(record.details.get("certificate"), dict) and _holds(record, root, system) is not None
+    return isinstance(record.details.get("certificate"), dict) and _holds(record, root, system, run) is not None
 
 
-def _holds(record: Evidence, root: Path, system: System) -> Reestablished | None:
+def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablished | None:
     """What the kernel establishes of a record with a certificate, if with the key that the record tells."""
-    told, text, checked = record.details["certificate"], _kept_text(record, root), _checked(system)
+    told, text, checked = record.details["certificate"], _kept_text(record, root), _checked(system, run)
     question = (record.obligation, str(told.get("key")), digest(text))
     if question not in checked.answers:
         certificates = checked.kernels.get(question[2])

@@ -7,6 +7,10 @@ import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from avow.pipeline.recheck import Checked
 
 EXPLAIN = "AVOW_EXPLAIN"
 """Environment variable that makes gates say what they lack (`avow verify --explain` sets it)."""
@@ -36,12 +40,14 @@ def asked_seconds() -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The identity of a run, as evidence records name it."""
+    """A run: its identity, as evidence records name it, and what it found out so far."""
 
     id: str
     fresh: bool
     """It settles everything anew."""
     begun: float = field(default_factory=time.monotonic, compare=False)
+    checked: dict[Path, Checked] = field(default_factory=dict, compare=False, repr=False)
+    """System's folder → what the kernel established again of it."""
 
     @property
     def seconds(self) -> float:

@@ -28,6 +28,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.pipeline import recheck
 from avow.pipeline.derivations import derivation_views, discharging
+from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, catalogue, compose_work
 from avow.system.load import load_system
 
@@ -91,7 +92,8 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
     system = load_system(folder)
     composition = compose(system)
     work = compose_work(composition)
-    good = [r for r in kept if r.key == work.keys.get(r.obligation) and recheck.still_counts(r, root, system)]
+    run = Run("now", False)
+    good = [r for r in kept if r.key == work.keys.get(r.obligation) and recheck.still_counts(r, root, system, run)]
     todo = [o for o in work.obligations if o.id not in {r.obligation for r in good}]
     outcomes = settle_all(composition, todo, Limits())
     text = recheck.written(composition.certificates)
