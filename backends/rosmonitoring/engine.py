@@ -128,6 +128,8 @@ class Monitor:
             self.heard.add(same_topic(topic))
         readers = self._own(readers, event) if readers and self.setup.shared else readers
         names = [name for name, _ in readers or ()]
+        if readers is not None and self._so_far is not None and self._timed:
+            self._so_far.hears(time_of(event), self._timed)
         found = self.tick(event, set(names))
         if readers is None or not isinstance(topic, str):
             return found
@@ -431,8 +433,7 @@ class Monitor:
         lost = watched.steps is not None and watched.steps.lost
         key = (*[versions[n] for n in watched.names], supposed)
         if watched.steps is not None:
-            if watched.steps.comes(time_of(event)) and self._so_far is not None:
-                self._so_far = SoFar()
+            watched.steps.comes(time_of(event))
             watched.truth = watched.steps.step(watched, values, self.solver, self.events, supposed)
         elif key != watched.key or watched.held:
             watched.key = key

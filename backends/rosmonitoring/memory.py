@@ -69,6 +69,8 @@ class Silence:
     """The time from the latest step to the next, which is being judged."""
     told: bool = False
     """That it was broken since, has been told."""
+    spared: Fraction | None = None
+    """Where the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
     arrived: set[str] = field(default_factory=set)
     """The inputs of which a message came since."""
 
@@ -86,15 +88,11 @@ class Silence:
                 return time
         return None
 
-    def passed(self, now: Fraction) -> bool:
-        """A step comes; whether the times have gone back further than a clock does, so that a run begins anew."""
-        since = now - self.latest if self.latest is not None else Fraction(0)
-        if since < -JITTER:
-            return True
-        self.elapsed = max(since, Fraction(0))
+    def passed(self, now: Fraction) -> None:
+        """A step comes."""
+        self.elapsed = max(now - self.latest, Fraction(0)) if self.latest is not None else Fraction(0)
         if self.period is not None and abs(self.elapsed - self.period) <= JITTER:
             self.elapsed = self.period
-        return False
 
 
 class Memory:
@@ -175,20 +173,26 @@ class Memory:
             return None
         return None if after is None else silence.latest + after
 
-    def comes(self, now: Fraction) -> bool:
-        """A step comes at a time; whether a run begins anew with it."""
+    def comes(self, now: Fraction) -> None:
+        """A step comes at a time."""
         silence = self.silence
         if silence is None:
-            return False
-        anew = silence.passed(now)
-        if anew:
-            self._keeper.restart()
-            silence.latest, silence.elapsed, self.lost, self.open = None, Fraction(0), False, False
-        elif (deadline := self.deadline) is not None and silence.latest is not None and now <= deadline + GRACE:
-            silence.elapsed = min(silence.elapsed, deadline - silence.latest)
-        silence.latest = now if anew or silence.latest is None else max(now, silence.latest)
+            return
+        silence.passed(now)
+        if (deadline := self.deadline) is not None and silence.latest is not None and now <= deadline + GRACE:
+            allowed = deadline - silence.latest
+            if silence.elapsed > allowed:
+                silence.spared, silence.elapsed = silence.elapsed, allowed
+        silence.latest = now if silence.latest is None else max(now, silence.latest)
         silence.told = False
-        return anew
+
+    def restart(self) -> None:
+        """A run begins anew: what waited is cut."""
+        self._keeper.restart()
+        self._arrived.clear()
+        self.lost = self.open = False
+        if self.silence is not None:
+            self.silence.latest, self.silence.elapsed, self.silence.told = None, Fraction(0), False
 
     def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
         """A step's valuation, in which what is not known cannot be looked at."""
@@ -215,6 +219,10 @@ class Memory:
     ) -> bool | None:
         """The clause at a step, which is then over. What an initial value of the plan says is not remembered."""
         truth = watched.truth_of(values, solver)
+        if self.silence is not None and self.silence.spared is not None:
+            self.silence.elapsed, self.silence.spared = self.silence.spared, None
+            if truth and watched.clause.kind is ClauseKind.GUARANTEE:
+                truth, watched.tally.reason = None, watched.tally.reason or LATE
         if supposed:
             self.stepped = event
             self.forget()
@@ -229,6 +237,7 @@ class Memory:
         self._keeper.memory = {}
 
 
+LATE = f"an answer came after its deadline, by at most {GRACE * 1000} ms: it may have been on its way"
 UNSURE = "it is not known whether the assumptions have held so far"
 
 
@@ -239,6 +248,18 @@ class SoFar:
     broken: str = ""
     unsure: bool = False
     """A message of an assumption was not seen, or nobody could tell whether one held."""
+    newest: Fraction | None = None
+    """The latest time of a message, in the run that goes on."""
+
+    def hears(self, now: Fraction, timed: Sequence[Watched]) -> None:
+        """A message has come. Where times go back further than a clock does, a run begins anew for all clauses at once:
+        were it for each at its own next step, an assumption broken between would be forgotten."""
+        if self.newest is not None and now < self.newest - JITTER:
+            self.broken, self.unsure, self.newest = "", False, now
+            for watched in timed:
+                assert watched.steps is not None
+                watched.steps.restart()
+        self.newest = now if self.newest is None else max(now, self.newest)
 
     def note(self, watched: Watched) -> None:
         """A clause was judged: an assumption?"""

@@ -24,7 +24,7 @@ from avow.formulas.values import Value, show
 from .numbers import Decimal, NotANumber, exact
 from .reading import at
 from .rules import Path
-from .tuning import COMBINATIONS, KEYS_KEPT
+from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME
 from .wires import MappingError, seconds
 
 if TYPE_CHECKING:
@@ -272,5 +272,7 @@ def time_of(event: Mapping[str, Any]) -> Fraction:
     try:
         found = exact(event.get("time"))
     except NotANumber:
+        return Fraction(0)
+    if not -LATEST_TIME <= found <= LATEST_TIME:
         return Fraction(0)
     return Fraction(found) if found.__class__ is int else found  # type: ignore[return-value]

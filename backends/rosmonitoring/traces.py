@@ -13,7 +13,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 from .bags import NOWHERE, Event, Origin, is_bag, messages
 from .numbers import Decimal, NotANumber, exact
-from .tuning import EVENT_CHARACTERS
+from .tuning import EVENT_CHARACTERS, LATEST_TIME
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +55,14 @@ def wrong_time(event: Event) -> str:
     raw = event.get("time")
     if raw is None:
         return "the event has no `time`: seconds, as a number"
-    if isinstance(raw, Decimal) and raw.text[0] != "-" and len(raw.text) < 40 and "e" not in raw.text.lower():
+    text = raw.text if isinstance(raw, Decimal) else "-"
+    if text[0] != "-" and len(text) < 40 and text.find(".") <= 12 and "e" not in text.lower():
         return ""  # as nearly all are; kept out of the cache of values that are seen again
     try:
-        return "" if exact(raw) >= 0 else f"`time` is negative: {raw}"
+        time = exact(raw)
+        if time > LATEST_TIME:
+            return f"`time` is in seconds, and after {LATEST_TIME:.0e} of them: {json.dumps(raw, default=str)[:60]}"
+        return "" if time >= 0 else f"`time` is negative: {raw}"
     except NotANumber:
         return f"`time` is no number of seconds: {json.dumps(raw, default=str)[:60]}"
 

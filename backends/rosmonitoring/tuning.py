@@ -109,6 +109,9 @@ DDS_MATCH = 5.0
 LAST_DOMAIN = 232
 """The greatest DDS domain: its ports are computed from it, and end at 65535."""
 
+LATEST_TIME = 10**12
+"""Seconds, 31,700 years: a greater time of an event is none, but perhaps nanoseconds."""
+
 GRACE = Fraction(1, 20)
 """Seconds after a deadline until silence is told: messages have a way to go."""
 

@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import random
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+import pytest
+from temporal.test_clock import A, B, X, formula, word_of
+from temporal.timed_words import Meaning, Word
+
 from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.options import Setup
+from avow.backends.rosmonitoring.traces import read_trace
 from avow.backends.rosmonitoring.watched import Fault, Violation
+from avow.base.diagnostics import Rejected
+from avow.formulas.formula import free_variables
+from avow.language.contract import Clause, ClauseKind
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, REAL
+from avow.language.terms import History, Implies, Limit, Literal, Past, Term, histories, timed
 
 from .test_other_steps import Make, found, made
 
@@ -72,3 +88,117 @@ def test_what_was_promised_while_a_sensor_lives_is_not_laid_at_the_node_when_it_
     both = "assume alive ( once[1 s](arrived(in.a)) )\n" + WITHIN
     events = [at(0, a=False), at(0.1, b=False), at(1, a=True)]
     assert [f for f, _, _ in told(make_system, both, *events, at(5, b=True))] == [Fault.ASSUMPTION, Fault.EXCUSED]
+
+
+def tallied(make: Make, clauses: str, *events: Event) -> dict[str, tuple[int, int, int]]:
+    """Of each clause, how often it was held, broken, undecided."""
+    monitor = Monitor(found(made(make, *clauses.split("\n"))))
+    for event in events:
+        monitor.step(event)
+    return {name: (t.decided - t.broken, t.broken, t.undecided) for name, t in monitor.tallies.items()}
+
+
+def test_what_came_a_little_late_is_neither_held_nor_broken(make_system: Make) -> None:
+    short = "guarantee g ( rose(in.a) -> within[20 ms](out.b) )"
+    events = [at(0, b=False), at(0, a=False), at(1, a=True)]
+    assert tallied(make_system, short, *events, at(1.02, b=True), OTHER) == {"g": (3, 0, 0)}
+    assert tallied(make_system, short, *events, at(1.021, b=True), OTHER) == {"g": (2, 0, 1)}
+    assert tallied(make_system, short, *events, at(1.08, b=True), OTHER)["g"][1:] == (1, 0)
+    pace = "guarantee g ( TRUE )\nguarantee steps ( steps(at most 20 ms) )"
+    assert tallied(make_system, pace, *(at(k * 0.069, b=True) for k in range(9)))["steps"] == (1, 0, 8)
+    alive = "assume alive ( once[100 ms](arrived(in.a)) )\nguarantee g ( in.a -> out.b )"
+    late = [at(0, a=True), at(0.12, a=True), at(0.13, b=False)]
+    assert told(make_system, alive, *late) == [(Fault.GUARANTEE, "g", "0.13")]  # an assumption gets the benefit
+
+
+def test_a_run_begins_anew_for_all_clauses_at_once(make_system: Make) -> None:
+    """Else an assumption that was broken since the times went back would be forgotten at a guarantee's first step."""
+    both = "assume alive ( once[1 s](arrived(in.a)) )\nguarantee g ( held[2 s](in.a) -> out.b )"
+    alive = [at(t, a=True) for t in (7.9, 8.8, 9.4)]
+    events = [at(10, a=True), at(10.1, b=True), at(5, a=True), at(7, a=True), at(7, b=False), *alive, at(9.5, b=False)]
+    faults = [(fault, clause) for fault, clause, _ in told(make_system, both, *events)]
+    assert (Fault.ASSUMPTION, "alive") in faults
+    assert (Fault.EXCUSED, "g") in faults
+    assert (Fault.GUARANTEE, "g") not in faults
+
+
+@pytest.mark.parametrize("time", ["1e400", "1e13", "9" * 400, "9" * 30 + ".5"])
+def test_a_time_that_is_none(time: str, tmp_path: Path, make_system: Make) -> None:
+    trace = tmp_path / "t.jsonl"
+    trace.write_text(f'{{"topic": "o", "time": {time}, "b": true}}\n')
+    with pytest.raises(Rejected, match="time"):
+        list(read_trace(trace))
+    assert told(make_system, WITHIN, {**at(0, b=True), "time": int("9" * 400)}) == []  # live: never an exception
+
+
+HEAD = """
+node n {
+  inputs( a : BOOL, x : REAL )
+  outputs( b : BOOL )
+  topics( m/I i matches(in.a), m/I i matches(in.x), m/O o matches(out.b) )
+  guarantee g ( in.a -> in.x >= 0 or out.b )
+}"""
+
+
+def by_message(rng: random.Random, word: Word) -> tuple[Word, list[str]]:
+    """The word's steps as single messages: after the first, each changes the inputs or the output."""
+    steps, topics = [{**word.steps[0], "in.arrived a": True}], ["io"]
+    for step in word.steps[1:]:
+        topics.append(rng.choice("io"))
+        changed = ("in.a", "in.x") if topics[-1] == "i" else ("out.b",)
+        steps.append({**steps[-1], **{n: step[n] for n in changed}, "in.arrived a": topics[-1] == "i"})
+    return Word(steps, word.times), topics
+
+
+def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
+    """How many clauses of a random word were judged; of which of them the monitor tells the first breach, or its time,
+    otherwise than the definitions over all positions."""
+    depth, singly = rng.choice((1, 2, 2, 3)), rng.random() < 0.5
+    term, trigger, word, topics = formula(rng, depth), formula(rng, depth - 1), word_of(rng), ["io"] * 7
+    if singly:
+        word, topics = by_message(rng, word)
+    operator = rng.choice((Past.WITHIN, Past.FOR, Past.UNTIL))
+    limit = None if operator is Past.UNTIL else Limit("", Literal(Fraction(rng.randrange(4)), REAL), False)
+    wanted = tuple(formula(rng, 1) for _ in range(2 if operator is Past.UNTIL else 1))
+    response = History(operator, wanted, BOOL, limit)
+    meaning, judged, wrong = Meaning(word), 0, list[str]()
+    for whole in (term, Implies(trigger, response)):
+        about, asked = free_variables(whole), free_variables(trigger)
+        of_inputs = whole is not term and bool(asked) and asked <= {A, X}
+        every = of_inputs or any(h.operator is Past.ARRIVED for h in histories(whole))
+        if timed(whole) is None or B not in about or not about & {A, X} or every != singly:
+            continue
+        monitor = Monitor(replace(known, node=replace(known.node, guarantees=(_guarantee(whole),))))
+        told: list[Violation] = []
+        for step, time, topic in zip(word.steps, word.times, topics, strict=True):
+            parts = {"i": {"a": step["in.a"], "x": int(step["in.x"])}, "o": {"b": step["out.b"]}}
+            for each in topic:
+                told += monitor.step({"topic": each, "time": time, **parts[each]})
+        if monitor.tallies["g"].reason:  # refused by name
+            continue
+        places = range(len(meaning.positions))
+        first = (
+            next((p for p in places if not meaning.value(term, p)), None)
+            if whole is term
+            else meaning.broken(trigger, response)
+        )
+        expected = [] if first is None else [str(meaning.positions[first].start)]
+        judged += 1
+        if [v.time for v in told][:1] != expected:
+            wrong.append(f"{show_term(whole, 'rcl')}: {told[:1]} for {expected} of {word}, {topics}")
+    return judged, wrong
+
+
+def _guarantee(formula: Term) -> Clause:
+    return Clause(ClauseKind.GUARANTEE, "g", 1, formula)
+
+
+@pytest.mark.parametrize(
+    ("seed", "words"), [(0, 40), pytest.param(1, 300, marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_verdicts_are_what_the_definitions_over_timed_words_say(seed: int, words: int, make_system: Make) -> None:
+    known = found(make_system(HEAD, {"in.a": "a", "in.x": "x", "out.b": "b"}))
+    rng = random.Random(seed)
+    results = [disagreement(known, rng) for _ in range(words)]
+    assert [fault for _, wrong in results for fault in wrong] == []
+    assert sum(judged for judged, _ in results) > words / 4
