@@ -32,6 +32,7 @@ from avow.language.terms import (
     Negative,
     Not,
     Or,
+    Past,
     Quantified,
     Quantifier,
     SequenceRange,
@@ -51,10 +52,10 @@ def with_value(claim: Term) -> Term:
     """The claim, and that it has a value. The same of what it gives is that again."""
     if any(isinstance(part, History) for part in subterms(claim)):
         claim = _at_their_steps(claim)
-        if isinstance(claim, Implies) and any(map(_is_response, subterms(claim.right))):
-            return Implies(with_value(claim.left), claim.right, claim.span)
+        if any(map(_is_response, subterms(claim))):
+            return _responding(claim)
     needed = _needed(claim)
-    if needed == TRUE or demanded(claim) is not claim or _is_response(claim):
+    if needed == TRUE or demanded(claim) is not claim:
         return claim
     return And((*_parts(needed), *_parts(claim)), claim.span)
 
@@ -65,6 +66,16 @@ def _at_their_steps(term: Term) -> Term:
     if isinstance(term, History):
         parts = tuple(with_value(part) if part.sort == BOOL else part for part in parts)
     return term if parts == term.children else term.rebuild(parts)
+
+
+def _responding(claim: Term) -> Term:
+    """A response stays where it stands: a condition of it that has no value did not come about."""
+    match claim:
+        case Implies(left=left, right=right):
+            return Implies(with_value(left), _responding(right), claim.span)
+        case Quantified(body=body):
+            return claim.rebuild((_responding(body),))
+    return claim
 
 
 def _is_response(term: Term) -> bool:
@@ -150,6 +161,9 @@ def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> 
             asked = [Compare(sign, right, Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
             if not any(_follows(each, facts) for each in asked):
                 yield asked[0]
+        case History(operator=Past.PREVIOUS | Past.CHANGED) if atom.arguments[0].sort != BOOL:
+            yield from _risks_before(atom, sequences, facts)
+            return
     for part in atom.children:
         if isinstance(atom, History) and part.sort == BOOL:
             continue  # its own conditions stand in it
@@ -157,6 +171,17 @@ def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> 
             yield from _parts(defined(part, sequences, facts))
         else:
             yield from _risks(part, sequences, facts)
+
+
+def _risks_before(atom: History, sequences: Collection[Variable] | None, facts: Facts) -> Iterator[Term]:
+    """What a value of the step before needs: that it was one there. What holds now says nothing of that step."""
+    value, *initial = atom.arguments
+    if not initial:  # `changed` compares it with the value of now
+        yield from _parts(defined(value, sequences, facts))
+    before = defined(value, sequences)
+    first = defined(initial[0], sequences) if initial else TRUE
+    if (before, first) != (TRUE, TRUE):
+        yield History(Past.PREVIOUS, (before, first), BOOL, None, atom.span)
 
 
 def _parts(term: Term) -> tuple[Term, ...]:

@@ -13,6 +13,7 @@ from typing import assert_never
 
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
 from avow.language.contract import Clause, Node
+from avow.language.definedness import defined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, Sort
 from avow.language.terms import (
     FALSE,
@@ -117,7 +118,7 @@ class Records:
         amount = self._amount(term)
         match term.operator:
             case Past.PREVIOUS:
-                value, first = parts
+                value, first = _with_any_value(parts[0]), parts[1]
                 if not free_variables(first):
                     return self._cell(term, value, first, term.sort).read
                 before = self._cell(term, value, some_value(term.sort), term.sort).read
@@ -127,7 +128,7 @@ class Records:
             case Past.FELL:
                 return conjunction((negation(parts[0]), self._cell(term, parts[0], FALSE).read))
             case Past.CHANGED:
-                before = self._cell(term, parts[0], some_value(parts[0].sort)).read
+                before = self._cell(term, _with_any_value(parts[0]), some_value(parts[0].sort)).read
                 return conjunction((negation(self._is_first()), negation(equal(parts[0], before))))
             case Past.ONCE if amount is None:
                 return self._kept(term, BOOL, FALSE, lambda before: disjunction((parts[0], before)))
@@ -247,6 +248,13 @@ _ZERO, _NONE, _ONE = Literal(0, NATURAL), Literal(-1, INTEGER), Literal(1, NATUR
 def _if(condition: Term, then: Term, otherwise: Term) -> Term:
     sort = then.sort if then.sort == otherwise.sort else INTEGER
     return Conditional(condition, then, otherwise, sort)
+
+
+def _with_any_value(term: Term) -> Term:
+    """What is kept of a term for the next step: some value where the term has none, so that every run can be judged.
+    A claim that looks at it is not met, whatever it is (`avow.language.definedness`)."""
+    has, otherwise = defined(term), some_value(term.sort)
+    return term if term.sort == BOOL or has == TRUE or otherwise is None else _if(has, term, otherwise)
 
 
 def _plus_one(term: Term) -> Term:

@@ -142,6 +142,38 @@ def test_what_is_exported_has_the_invariants_of_the_plan(tmp_path: Path) -> None
     assert {"g.hoare", "invariant-1.first.smt2", "invariant-1.hoare", "invariant-1.pre.smt2"} <= set(made)
 
 
+def test_a_value_of_the_step_before_had_to_be_one_there(tmp_path: Path) -> None:
+    """At the step after one with m == 0 the claim has no value, whatever quotient a solver thinks of."""
+    clause = "guarantee g ( p or abs(previous(1 / m, 1)) >= 0 )"
+    rcl = f"node n {{ inputs( p : BOOL ) outputs( m : NATURAL ) topics() {clause} }}"
+    program = "IF p THEN\n  m := 0\nELSE\n  m := {}\n"
+    found = settle(job(tmp_path, program.format(1), rcl))["g"]
+    assert found.verdict is Verdict.REFUTED, found.summary
+    assert found.counterexample is not None
+    assert [dict(step)["in.p"] for step in found.counterexample.trace] == ["TRUE", "FALSE"]
+    right = job(tmp_path, "m := 2\n", rcl, invariants="previous(m != 0.0, TRUE)")
+    assert settle(right)["g"].verdict is Verdict.PROVED
+
+
+def test_what_is_remembered_for_each_value_of_a_variable(tmp_path: Path) -> None:
+    """A program that says ok at all steps but the first: true clauses may be proved, and false ones never are."""
+    said = {
+        "no": "forall(i in Id | (not ok and in.k == i) -> not previous(once(in.k == i), FALSE))",
+        "yes": "forall(i in Id | (in.k == i and previous(once(in.k == i), FALSE)) -> ok)",
+        "first": "forall(i in Id | (in.k == i and ok) -> previous(once(in.k == i), FALSE))",
+        "twice": "forall(i in Id | in.k == i -> counted(in.k == i since FALSE) < 3)",
+        "soon": "forall(i in Id | in.k == i -> within[1 steps](not ok))",
+        "next": "forall(i in Id | in.k == i -> next(ok and in.k != i))",
+    }
+    clauses = " ".join(f"guarantee {name} ( {text} )" for name, text in said.items())
+    rcl = f"node n {{ inputs( k : {{a, b, c}} ) outputs( ok : BOOL ) topics() {clauses} }}".replace("Id", "{a, b, c}")
+    invariant = "forall(i in {a, b, c} | previous(once(in.k == i), FALSE) -> s)"
+    work = job(tmp_path, "MEMORY s : BOOL := FALSE\nok := s\ns := TRUE\n", rcl, invariants=invariant)
+    found = {name: o.verdict for name, o in settle(work).items()}
+    assert {name for name, verdict in found.items() if verdict is Verdict.PROVED} == {"no", "yes"}, found
+    assert Verdict.ERROR not in found.values()
+
+
 # -- generated contracts against every run ---------------------------------------------------------------------------
 
 

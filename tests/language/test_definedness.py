@@ -201,6 +201,27 @@ def test_clauses_say_so() -> None:
         ("b -> within[3 steps](1 / x > 2)", "in.b -> within[3 steps](in.x != 0 and 1 / in.x > 2)"),
         ("1 / x > 2 -> within[3 steps](b)", "(in.x != 0 and 1 / in.x > 2) -> within[3 steps](in.b)"),
         ("once(x != 0 -> 1 / x > 2)", "once(in.x != 0 -> 1 / in.x > 2)"),
+        # a value of the step before was one there, whatever holds now
+        ("previous(1 / x, 1) > 2", "previous(in.x != 0, TRUE) and previous(1 / in.x, 1) > 2"),
+        ("previous(x, 1 / x) > 2", "previous(TRUE, in.x != 0) and previous(in.x, 1 / in.x) > 2"),
+        (
+            "x != 0 -> previous(1 / x, 1) > 2",
+            "(in.x != 0 -> previous(in.x != 0, TRUE)) and (in.x != 0 -> previous(1 / in.x, 1) > 2)",
+        ),
+        (
+            "previous(previous(1 / x, 1), 2) > 2",
+            "previous(previous(in.x != 0, TRUE), TRUE) and previous(previous(1 / in.x, 1), 2) > 2",
+        ),
+        (
+            "x != 0 -> changed(1 / x)",
+            "(in.x != 0 -> previous(in.x != 0, TRUE)) and (in.x != 0 -> changed(1 / in.x))",
+        ),
+        ("once(previous(1 / x, 1) > 2)", "once(previous(in.x != 0, TRUE) and previous(1 / in.x, 1) > 2)"),
+        # a response stays one under a quantifier
+        (
+            "forall(j in NATURAL | 1 / j > x -> within[3 steps](1 / j > 2))",
+            "forall(j in NATURAL | (j != 0.0 and 1 / j > in.x) -> within[3 steps](j != 0.0 and 1 / j > 2))",
+        ),
     ],
 )
 def test_what_speaks_of_other_steps_has_its_conditions_there(text: str, said: str) -> None:
@@ -208,3 +229,4 @@ def test_what_speaks_of_other_steps_has_its_conditions_there(text: str, said: st
     assert contract is not None, found
     (clause,) = contract.nodes[0].guarantees
     assert show_term(clause.formula, "rcl") == said
+    assert with_value(clause.formula) == clause.formula
