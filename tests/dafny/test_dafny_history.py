@@ -59,7 +59,7 @@ def claims(made: Generated, said: Sequence[Said], run: Sequence[Step]) -> list[s
 
 
 def disagreements(seed: int, spoil: tuple[str, str] = ("", "")) -> list[str]:
-    """The runs of which Dafny does not prove what the definitions say."""
+    """The runs of which Dafny does not prove what the definitions say; `spoil` puts another text in the contract's."""
     rng = random.Random(seed)
     said: list[Said] = [response(rng) if k % 2 else (formula(rng, 2), None) for k in range(GUARANTEES)]
     made = generated(said)
@@ -91,6 +91,5 @@ def test_advance_is_what_the_definitions_say(seed: int) -> None:
 
 @pytest.mark.needs_dafny
 @pytest.mark.nightly
-@pytest.mark.parametrize("spoil", [("_next(in_", "_next(in_")])
-def test_a_history_that_moves_on_otherwise_is_found(spoil: tuple[str, str]) -> None:
-    assert disagreements(0, spoil) != []
+def test_a_history_that_stands_still_is_found() -> None:
+    assert disagreements(0, (": History { History(", ": History { h } // ")) != []
