@@ -83,7 +83,8 @@ def translators(plugins: tuple[str, ...] = ()) -> dict[str, Backend]:
 
 
 _trusted: list[bool] = []
-"""Not empty: this process may import what a plan names under ``plugins``."""
+"""Not empty: this process may import what a plan names under ``plugins``. Of the process, as imports are: what one run
+imported is there for all."""
 
 
 def trust_plugins() -> None:

@@ -166,8 +166,10 @@ def _say(term: Term) -> str:
             return f"({_say(left)} xor {_say(right)})"
         case Operation(operator=Builtin.MOD, arguments=(left, right)):
             return f"({_say(left)} mod {_say(right)})"
-        case Operation(operator=operator, arguments=arguments):
+        case Operation(operator=Builtin.ABS | Builtin.MIN | Builtin.MAX | Builtin.DIV as operator, arguments=arguments):
             return f"{operator}({', '.join(map(_say, arguments))})"
+        case Operation(operator=operator):
+            raise _Beyond(f"`{operator}`")
         case History(operator=Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"
         case History(operator=Past.HELD | Past.ONCE as operator, arguments=(inner,), limit=Limit(steps=True) as limit):

@@ -105,7 +105,7 @@ CONTEXT = "context {\n  ${1:Name} : ${2:{low, high\\}};\n}"
 def _complete() -> None:
     missing = [word for word in (*Builtin, *Past) if word not in FORMS]
     if missing:
-        raise TypeError(f"no form for {missing}")
+        raise TypeError(f"no form in avow/lsp/vocabulary.py for {missing}")
 
 
 _complete()

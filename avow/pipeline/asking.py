@@ -55,6 +55,8 @@ def run(
 
 
 _desks: dict[tuple[int, str], Desk] = {}
+"""Process and folder → where its works are asked; no folder: whatever can be sent elsewhere. Of the process, as where
+works go is chosen before a run begins, and a desk's threads serve runs that follow one another."""
 _lock = threading.Lock()
 
 

@@ -7,6 +7,9 @@ Python. The server runs nothing but imports, has one thread, and ends with the p
 
 It is of one process, folder and environment: where any of them is another, another server is started. Systems other
 than Linux, and machines on which the server does not start, use a new Python for each work.
+
+What is known of servers stands in this module, and not in a run's object: a server is of the process, runs that follow
+one another in it share it, and it ends with the process.
 """
 
 from __future__ import annotations

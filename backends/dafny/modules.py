@@ -56,7 +56,8 @@ def _complete() -> None:
     unkept = set(_FUNCTIONS) - RESERVED
     if missing or unkept:
         raise TypeError(
-            f"Dafny functions without a text: {sorted(missing)}; names that are not reserved: {sorted(unkept)}"
+            f"Dafny functions without a text in modules.py: {sorted(missing)}; "
+            f"their names that names.py does not reserve: {sorted(unkept)}"
         )
 
 

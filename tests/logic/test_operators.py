@@ -160,6 +160,12 @@ def test_every_operator_is_described() -> None:
     assert [name for name in Builtin if f"`{name}(" not in page] == []
 
 
+@pytest.mark.parametrize("file", ["contracts.py", "language.py", "oracle.py"])
+def test_every_operator_is_drawn_where_translators_are_compared(file: str) -> None:
+    text = (Path(__file__).parents[1] / "differential" / file).read_text("utf-8")
+    assert [name for name in Builtin if f'"{name}"' not in text] == [], f"draw it in tests/differential/{file}"
+
+
 @pytest.mark.parametrize("name", Builtin)
 def test_a_definition_means_what_the_operator_means(name: Builtin) -> None:
     """Passes that take formulas apart take the definition for the operator."""
