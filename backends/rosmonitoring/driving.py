@@ -22,9 +22,23 @@ if TYPE_CHECKING:
 @click.option("--replay", is_flag=True, help="Compare what it publishes with what TRACE has on its topics.")
 @click.option("--messages", type=click.IntRange(1, 100_000), default=200, show_default=True, help="Without TRACE.")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write inputs and publications, as a trace.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of generated messages.")
+@click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0, 2**31 - 1),
+    help="Where random choices start: the same seed, the same answer.",
+)
+@click.option("--json", "as_json", is_flag=True, help="For machines: what was heard, published, raised, and differs.")
 def command(
-    system: str, node: str, trace: Path | None, replay: bool, messages: int, output: Path | None, seed: int
+    system: str,
+    node: str,
+    trace: Path | None,
+    replay: bool,
+    messages: int,
+    output: Path | None,
+    seed: int,
+    as_json: bool,
 ) -> int:
     """Run the callback class that the plan of SYSTEM (a folder, or a name under contracts/) declares as NODE, in
     virtual time and without ROS.
@@ -36,6 +50,7 @@ def command(
     Code 1 where the class raises, or publishes otherwise than the recording; 2 where it asks for something of ROS that
     is not driven, or where what it publishes hangs on a clock or on chance.
     """
+    from avow.base.files import write
     from avow.base.workspace import system_folder
     from avow.stepping.callbacks import driver, unusable
     from avow.system.load import load_system
@@ -55,22 +70,30 @@ def command(
             raise unusable(f"{trace} has no message on a topic that {node} subscribes to: {topics}")
     run = found.run(events, *((times[0], times[-1]) if times else (0, 0)))
     if output is not None:
-        output.write_text("".join(f"{line}\n" for line in _lines(found, events, run)), encoding="utf-8")
-    click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
-    if run.wrong:
-        click.echo(f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}")
-        return 1
-    if not replay:
-        return 0
-    if not run.said and not any(event.topic in run.spoken for event, _ in recorded):
-        click.echo("nothing was published, and nothing is recorded: there is nothing to compare")
-        return 1
-    different = tuple(_different(found, recorded, run))
-    for text in different:
-        click.echo(text)
-    if not different:
-        click.echo("the recording has the same")
-    return 1 if different else 0
+        write(output, "".join(f"{line}\n" for line in _lines(found, events, run)))
+    raised = (
+        (f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}",) if run.wrong else ()
+    )
+    different: tuple[str, ...] = ()
+    if replay and not raised:
+        silent = not run.said and not any(event.topic in run.spoken for event, _ in recorded)
+        nothing = "nothing was published, and nothing is recorded: there is nothing to compare"
+        different = (nothing,) if silent else tuple(_different(found, recorded, run))
+    if as_json:
+        told = {
+            "node": node,
+            "heard": len(events),
+            "published": len(run.said),
+            "raised": raised,
+            "different": different,
+        }
+        click.echo(json.dumps(told, indent=2))
+    else:
+        same = ("the recording has the same",) if replay and not raised and not different else ()
+        click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
+        for text in (*raised, *different, *same):
+            click.echo(text)
+    return 1 if raised or different else 0
 
 
 def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:

@@ -27,6 +27,7 @@ NO_QUESTIONS = {
         "check",
         "diff",
         "doctor",
+        "drive",
         "explain",
         "fretish",
         "fmt",
