@@ -31,6 +31,7 @@ from avow.language.terms import (
     And,
     Arithmetic,
     Compare,
+    Conditional,
     EnumValue,
     Iff,
     Implies,
@@ -216,6 +217,13 @@ class _TermReader:
                 return self.members[name]
         if z3.is_to_real(expr):
             return _widened(self.term(expr.children()[0]))
+        if z3.is_app_of(expr, z3.Z3_OP_ITE) and z3.is_arith(expr):
+            condition, *branches = expr.children()
+            then, otherwise = map(self.term, branches)
+            sort = REAL if z3.is_real(expr) else INTEGER
+            if sort == REAL:
+                then, otherwise = _widened(then), _widened(otherwise)
+            return Conditional(self.formula(condition), then, otherwise, sort)
         for test, operator in ((z3.is_add, "+"), (z3.is_sub, "-"), (z3.is_mul, "*")):
             if test(expr):
                 first, *rest = (self.term(part) for part in expr.children())

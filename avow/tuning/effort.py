@@ -100,9 +100,9 @@ OFFERS_EFFORT = 3_000
 OFFER_STEP_EFFORT = 500
 """For one question of an offer: six of them fit into the time for all."""
 
-ELIMINATION_STEPS = 100_000
-"""Z3's steps to eliminate variables for an offer; the tests' offers took 4,000 at most. Z3 counts there, but keeps no
-limit: what took more is thrown away, so that no machine decides what is offered."""
+ELIMINATION_STEPS = 250_000
+"""Z3's steps to eliminate variables; the tests' offers took 4,000 at most, two rounds of a game over a limit in seconds
+180,000. Z3 counts there, but keeps no limit: what took more is thrown away, so that no machine decides the answer."""
 
 ELIMINATION_SECONDS = 4.0
 """Processor time after which an elimination hangs: its steps allowed take a tenth of this at most."""

@@ -6,8 +6,8 @@ import pytest
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction
-from avow.language.terms import And, Iff, Term
-from avow.solving.quantifier_elimination import remedy
+from avow.language.terms import And, Iff, Quantified, Term
+from avow.solving.quantifier_elimination import eliminated, remedy
 from avow.solving.questions import entails
 
 from .contracts import contract, formula
@@ -65,6 +65,20 @@ def test_it_reads_back_what_it_shows() -> None:
     assert found is not None
     assert isinstance(found.assumption, And)
     assert entails([say(show_term(found.assumption, "rcl"))], found.assumption).verdict is Verdict.PROVED
+
+
+def test_conditions_within_numbers_are_read_back() -> None:
+    """As limits in seconds leave them: an age that is there, or none."""
+    term = say("forall(y in REAL | y > (if in.b then in.r else 3) -> y > (if in.r > 1 then 2 else in.k))")
+    found = eliminated(term)
+    assert found is not None
+    assert not any(isinstance(part, Quantified) for part in parts_of(found))
+    assert entails({"h": found}, term).verdict is Verdict.PROVED
+    assert entails({"h": term}, found).verdict is Verdict.PROVED
+
+
+def parts_of(term: Term) -> list[Term]:
+    return [term, *(part for child in term.children for part in parts_of(child))]
 
 
 def test_what_takes_too_many_steps_is_thrown_away_on_every_machine(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -100,6 +100,9 @@ def realizable(text: str) -> Verdict:
         ("G( once[1 s](s) )", Verdict.PROVED),  # what is put out stays so
         ("G( once[1 s](rose(s)) )", Verdict.REFUTED),
         ("steps( at most 1 s ) A( TRUE ) G( once[2 s](rose(s)) )", Verdict.PROVED),
+        ("G( s <=> held[2 s](in.r) )", Verdict.REFUTED),  # it would have to change in a silence
+        ("G( s <=> once[2 s](in.r) )", Verdict.REFUTED),
+        ("G( held[2 s](in.r) -> s )", Verdict.PROVED),
     ],
 )
 def test_known_answers(clauses: str, expected: Verdict) -> None:
