@@ -1,5 +1,4 @@
-"""The kernel proper: the conditions of `SoundFromAnyBeginning` (avow/calculus/proofs/kernel.dfy), held against a
-certificate.
+"""The kernel proper: `SoundFromAnyBeginning` (avow/calculus/proofs/kernel.dfy), held against a certificate.
 
 Entries that are well formed (`Formed`) and valid (`Valid`, `Begins`: each question is written from the claims as they
 are now), and that rest on no others, are a closed part (`Closed`). Of a claim in it, the given entries that it names,
@@ -87,12 +86,11 @@ class Kernel:
         if self._claim(entries[goal]).kind is Kind.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
             raise Refused("a requirement rests on what only a derived contract may assume")
         answered = [answer for i in ((goal,) if alone else part) for answer in answers[i]]
-        taken = {answer.together for answer in answered if answer.together}
-        hypotheses = sorted({*needed, *(Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for n in taken)})
-        told = [FORMAT, entries[goal].digest, *map(astuple, hypotheses), sorted({answer.digest for answer in answered})]
+        needed |= {Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for a in answered if (n := a.together)}
+        told = [FORMAT, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
         return Established(
             goal=entries[goal].digest,
-            hypotheses=tuple(hypotheses),
+            hypotheses=tuple(sorted(needed)),
             shown=tuple((entries[i].node, entries[i].digest) for i in sorted(part) if entries[i].how is How.SHOWN),
             key=sha256(json.dumps(told)),
             vacuous=any(answer.vacuous for answer in answered),
@@ -227,14 +225,16 @@ class Kernel:
             yield self._asked(asked, Said.UNSAT, f"{called}: no first value for every constant input that is allowed")
 
     def _together(self, claim: Statement, question: Question) -> tuple[str, ...]:
-        """The nodes whose values a question takes as of one step, where that is more than the wires say. Along a chain,
-        where each value is read by one node, the question follows one message on its way, and its steps are that
-        message's, whatever else happens meanwhile. It does not where a claim speaks of values of two nodes, a value is
-        read in two places, or a value of the step before is."""
+        """The nodes of whose steps a question makes one, where that is more than the wires say. Along a chain, where
+        each value is read by one node, it follows one message on its way, whatever else happens meanwhile. It does not
+        where a claim speaks of values of two nodes, a value is read in two places, a value of the step before is, or a
+        node off the chain says something of its own steps: its pace, or what it remembers of the environment."""
         used = [(claim, 0), *self._used(question.uses)]
         before = question.initials or any(back or any(p.back for p in each.sources) for each, back in used)
         reads = {(node, each.node) for each, _ in used for node in each.nodes - {each.node}}
-        joined = any(len(each.nodes - {each.node}) > 1 for each, _ in used)
         nodes = {node for each, _ in used for node in each.nodes}
-        chain = not before and not joined and len(reads) == len({node for node, _ in reads})
-        return () if chain or len(nodes) < 2 else tuple(sorted(nodes))
+        own = {s.node for s, _ in used if s.kind is Kind.GUARANTEE or (s.kind is Kind.ASSUMPTION and s.sources)}
+        if off := own - nodes - {claim.node}:
+            nodes |= off | ({claim.node} - {""})
+        joined = any(len(s.nodes - {s.node}) > 1 for s, _ in used) or len(reads) > len(dict(reads))
+        return tuple(sorted(nodes)) if (before or joined or off) and len(nodes) > 1 else ()
