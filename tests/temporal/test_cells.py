@@ -205,6 +205,19 @@ def test_what_no_first_steps_can_break_is_left_out_and_leaves_no_cell() -> None:
     assert records.cells == []
 
 
+@pytest.mark.parametrize(
+    ("said", "last"), [("previous(1 / n, 1) <= previous(1 / n, 2)", True), ("not changed(1 / n)", False)]
+)
+def test_a_value_of_the_step_before_had_to_be_one_there(said: str, last: bool) -> None:
+    """The claim is not met at the step after one where `1 / n` had no value, and every step is judged."""
+    contract, found = check_text(f"{_HEAD} guarantee( a or ({said}) ) }}", "n.rcl")
+    assert contract is not None, found
+    run: list[Step] = [
+        {"in.a": a, "in.n": n, "out.b": True} for a, n in ((True, 0), (False, 1), (False, 1), (False, 0))
+    ]
+    assert judged(contract.nodes[0].guarantees[0].formula, run) == [True, False, True, last]
+
+
 _HEAD = "node n { inputs( a : BOOL, n : NATURAL ) outputs( b : BOOL ) topics() "
 
 
