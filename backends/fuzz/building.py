@@ -15,6 +15,7 @@ from avow.isolation.observed import Observed, recorded
 from .reading import Reading
 from .tables import TABLES, Drawable, native, tables
 from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
+from .unseen import WATCHED, Line, Unseen, own, unseen
 
 _INSTALL = "sudo apt install clang"
 LINK = "avow-adapter.hpp"
@@ -37,7 +38,10 @@ _SANITIZED = (
     "-no-pie",
     "-fno-sanitize-recover=all",
     "-fsanitize=address,undefined",
+    "-D_GLIBCXX_ASSERTIONS",
 )
+_PLAIN = ("-O2",)
+_FILLED = ("-ftrivial-auto-var-init=pattern", "-DAVOW_FILLED")
 _FUZZED = ("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-coverage=trace-cmp")
 
 
@@ -51,6 +55,8 @@ class Built:
 
     program: Path
     read: tuple[Path, ...]
+    linked: str = ""
+    """What the linker said of the functions that are watched."""
 
 
 def clang() -> Tool:
@@ -76,30 +82,64 @@ def sanitized(reading: Reading, folder: Path, seconds: float) -> Built:
 
 def plain(reading: Reading, folder: Path, seconds: float) -> Built:
     """The program whose answers are judged. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, "replay.cpp", ("-O2",), "replay", seconds)
+    return _build(reading, folder, "replay.cpp", _PLAIN, "replay", seconds)
 
 
-def _build(reading: Reading, folder: Path, main: str, flags: tuple[str, ...], name: str, seconds: float) -> Built:
+def filled(reading: Reading, folder: Path, seconds: float) -> Built:
+    """The plain program, in which variables and memory that nothing was written to hold other bytes. Raises NotBuilt
+    and ToolMissing."""
+    return _build(reading, folder, "replay.cpp", (*_PLAIN, *_FILLED), "filled", seconds)
+
+
+def looked_into(reading: Reading, folder: Path, linked: str, seconds: float) -> Unseen:
+    """What no run shows of the source; `linked` as the plain build has it. Raises NotBuilt and ToolMissing."""
+    alone = _preprocessed(reading, folder, _PLAIN, seconds)
+    fuzzing = _preprocessed(reading, folder, (*_SANITIZED, *_FUZZED), seconds)
+    found = unseen(alone, fuzzing, linked)
+    return Unseen(*(plainly(said, reading, folder) for said in (found.undeclared, found.faults)))
+
+
+def _preprocessed(reading: Reading, folder: Path, flags: tuple[str, ...], seconds: float) -> list[Line]:
+    lines: list[Line] = []
+    for source in (folder / "replay.cpp", *reading.sources):
+        done = _clang(_there(), [*_COMMON, *flags, *_includes(reading, folder), "-E", str(source)], folder, seconds)
+        if done.code != 0:
+            raise NotBuilt(_first(done, reading, folder))
+        lines += own(done.stdout, folder, reading.adapter)
+    return lines
+
+
+def _there() -> Tool:
     tool = clang()
     if tool.path is None:
         raise ToolMissing(f"clang++ is not here ({_INSTALL})")
-    includes = [f"-I{folder}", "-iquote", str(reading.adapter.parent), *(f"-I{path}" for path in reading.include)]
+    return tool
+
+
+def _includes(reading: Reading, folder: Path) -> list[str]:
+    around = [f"-I{folder}", "-iquote", str(reading.adapter.parent), *(f"-I{path}" for path in reading.include)]
+    return [*around, f'-DADAPTER="{LINK}"']
+
+
+def _build(reading: Reading, folder: Path, main: str, flags: tuple[str, ...], name: str, seconds: float) -> Built:
+    tool = _there()
     objects: list[str] = []
     read: list[Path] = []
     for k, source in enumerate((folder / main, *reading.sources)):
         object_file = folder / f"{name}-{k}.o"
         listed = folder / f"{name}-{k}.d"
-        words = [*_COMMON, *flags, *includes, f'-DADAPTER="{LINK}"', "-MMD", "-MF", str(listed)]
+        words = [*_COMMON, *flags, *_includes(reading, folder), "-MMD", "-MF", str(listed)]
         done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, seconds)
         if done.code != 0 or not object_file.is_file():
             raise NotBuilt(_first(done, reading, folder))
         objects.append(str(object_file))
         read += _listed(listed, folder)
     program = folder / name
-    done = _clang(tool, [*flags, *objects, "-o", str(program), "-lpthread"], folder, seconds)
+    watched = [f"-Wl,-y,{name}" for name in WATCHED]
+    done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, seconds)
     if done.code != 0 or not program.is_file():
         raise NotBuilt(_first(done, reading, folder))
-    return Built(program, tuple(dict.fromkeys(read)))
+    return Built(program, tuple(dict.fromkeys(read)), done.stdout + done.stderr)
 
 
 def _clang(tool: Tool, words: list[str], folder: Path, seconds: float) -> Completed:

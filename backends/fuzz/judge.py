@@ -106,16 +106,17 @@ def _read(channel: int) -> str:
 
 
 def asked(question: dict[str, Any]) -> dict[str, Any]:
-    """The runs, each on a node of its own; and once more in the other order, by another process: what comes of chance,
-    of the clock, or of the runs before is no answer to a run."""
+    """The runs, each on a node of its own; and once more in the other order, by another process, of a build in which
+    what nothing was written to holds other bytes: what comes of chance, of the clock, of such bytes, or of the runs
+    before is no answer to a run."""
     end = time.monotonic() + question["seconds"]
     runs: list[list[str]] = question["runs"]
-    first, faults, program = _all(question, runs, end)
+    first, faults, program = _all(question, Path(question["program"]), runs, end)
     silent = bool(program.silent)
     unsteady = None
-    if question["twice"] and not faults:
+    if question["twin"] and not faults:
         order = [k for k in reversed(range(len(first))) if not first[k]["crash"]]
-        again, faults, twin = _all(question, [runs[k] for k in order], end)
+        again, faults, twin = _all(question, Path(question["twin"]), [runs[k] for k in order], end)
         silent = bool(twin.silent)
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
@@ -130,8 +131,10 @@ def asked(question: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _all(question: dict[str, Any], runs: list[list[str]], end: float) -> tuple[list[dict[str, Any]], str, Program]:
-    program = Program(Path(question["program"]), SUBJECT_PATIENCE, Path(question["root"]))
+def _all(
+    question: dict[str, Any], path: Path, runs: list[list[str]], end: float
+) -> tuple[list[dict[str, Any]], str, Program]:
+    program = Program(path, SUBJECT_PATIENCE, Path(question["root"]))
     found: list[dict[str, Any]] = []
     crashes = 0
     fault = ""

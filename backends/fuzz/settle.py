@@ -21,6 +21,7 @@ from avow.base.plain import ALLOWS_MORE
 from avow.base.process import ToolMissing
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.drive.steps import coded, plain
+from avow.evidence.obligation import ProgramClaim
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import Observed, from_json
@@ -31,6 +32,7 @@ from .drawn import Drawn, Step, command
 from .reading import Reading, load
 from .tables import drawable
 from .tuning import HANGS, LONGEST_RUN, MOST_CRASHES, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
+from .unseen import Unseen
 from .verdicts import Bench, Broken, Counts, Misused
 
 TOOL = "libfuzzer"
@@ -104,7 +106,9 @@ class Work:
         built = [
             building.fuzzed(reading, self.folder, self._left()),
             building.plain(reading, self.folder, self._left()),
+            building.filled(reading, self.folder, self._left()),
         ]
+        unseen = building.looked_into(reading, self.folder, built[1].linked, self._left())
         self.observed.update(dict.fromkeys(building.observed(reading, tuple(built))))
         bench = Bench(reading)
         kept = self.folder / "kept"
@@ -114,7 +118,7 @@ class Work:
         found = [Drawn(data, made, reading.single) for data in (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2))]
         drawn = [one.steps(reading.asked, reading.steps) for one in found]
         runs = _different([*self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
-        answer = self._asked(built[1].program, runs, twice=True)
+        answer = self._asked(built[1].program, runs, built[2].program)
         judged = 0
         for run, reply in zip(runs, answer["runs"], strict=False):
             bench.judge(run, reply)
@@ -122,14 +126,14 @@ class Work:
         self._confirm(bench, built[1].program)
         if answer["unsteady"] is not None and not bench.broken:
             said = bench.words(runs[answer["unsteady"]])
-            raise Unanswered(Verdict.UNKNOWN, f"undeclared input: asked again, it answers otherwise ({said})")
+            why = "asked again, where what nothing was written to holds other bytes, it answers otherwise"
+            raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({said})")
         fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
         if not faults and campaign["done"] < reading.runs and not bench.crash:
             raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
         apart = bench.apart(self._special(bench, built[1].program)) if judged else []
-        return bench.outcomes(
-            Counts(campaign["done"], len(runs), judged, self.limits.seed), fault, bool(faults), tuple(apart)
-        )
+        counts = Counts(campaign["done"], len(runs), judged, self.limits.seed)
+        return tuple(_doubted(o, unseen) for o in bench.outcomes(counts, fault, bool(faults), tuple(apart)))
 
     # -- the steps of it ---------------------------------------------------------------------------------
 
@@ -195,10 +199,10 @@ class Work:
     def _kept_apart(self, answer: dict[str, Any]) -> None:
         self.isolation = min(self.isolation, Isolation(answer["isolation"]), key=lambda level: level.rank)
 
-    def _asked(self, program: Path, runs: Sequence[list[Step]], *, twice: bool = False) -> dict[str, Any]:
+    def _asked(self, program: Path, runs: Sequence[list[Step]], twin: Path | None = None) -> dict[str, Any]:
         words = [[command(self.reading.asked, step) for step in run] for run in runs]
         root = str(self.job.root.resolve())
-        question = {"what": "runs", "program": str(program), "root": root, "runs": words, "twice": twice}
+        question = {"what": "runs", "program": str(program), "root": root, "runs": words, "twin": str(twin or "")}
         answer = self._ask({**question, "crashes": MOST_CRASHES})
         self._kept_apart(answer)
         self.observed.update(dict.fromkeys(from_json(answer["observed"])))
@@ -273,6 +277,13 @@ class Work:
         asked = bench.special()
         replies = self._asked(program, [run for run, _, _ in asked])["runs"] if asked else []
         return [(run, name, word, reply) for (run, name, word), reply in zip(asked, replies, strict=False)]
+
+
+def _doubted(outcome: Outcome, unseen: Unseen) -> Outcome:
+    """A good answer, where what no run shows does not keep it from being given."""
+    faultless = outcome.obligation.endswith(f"/{ProgramClaim.FAULTLESS}")
+    why = unseen.undeclared or (unseen.faults if faultless else "")
+    return replace(outcome, verdict=Verdict.UNKNOWN, summary=why) if why and outcome.verdict.supports else outcome
 
 
 def _files(folder: Path, prefix: str, most: int) -> list[bytes]:

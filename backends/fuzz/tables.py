@@ -58,7 +58,7 @@ def drawable(reading: Reading) -> Drawable:
     integers = [w for w in (*range(4), -1, *whole) if -(2**63) <= w < 2**63]
     lengths = [n + d for n in (math.floor(w) for w in written) if 0 <= n <= 64 for d in (-1, 0, 1) if n + d >= 0]
     return Drawable(
-        tuple(dict.fromkeys(reals))[:255],
+        (*tuple(dict.fromkeys(reals))[:254], -0.0),
         tuple(dict.fromkeys(integers))[:255],
         tuple(dict.fromkeys((0, 1, 2, 3, 5, 8, 50, *lengths)))[:255],
     )

@@ -113,7 +113,9 @@ class Bench:
                 if held is None:
                     each.undecided += 1
                 elif not held:
-                    why = step[-1].wrong or f"guarantee {name} does not hold of these"
+                    zeros = [n for n, v in run[at].items() if str(v) == "-0.0"]
+                    signed = f" ({', '.join(f'in.{n}' for n in zeros)} is -0.0)" if zeros else ""
+                    why = step[-1].wrong or f"guarantee {name} does not hold of these{signed}"
                     self.broken[name] = Broken(
                         run[: at + 1], step, f"{why}: there is no output"[:400] if step[-1].wrong else why
                     )
@@ -202,6 +204,9 @@ class Bench:
         ]
         if odd:
             raise Misused(f"the adapter gives {odd[0]} as another type than the contract's")
+        wide = [name for name, data in answer["value"]["d"] if self.reading.single and not _single(data)]
+        if wide:
+            raise Misused(f"the adapter gives {wide[0]} as a double that is no float: numbers: float32")
 
     def _begins(self, held: Mapping[str, Any]) -> bool:
         """Whether what the constructor makes of memory meets what is assumed of memory alone."""
@@ -399,6 +404,20 @@ def _of(data: Any, sort: Sort | None) -> bool:
         case EnumSort(), str():
             return True
     return False
+
+
+def _single(data: Any) -> bool:
+    """Whether an output has float32 numbers only."""
+    from .drawn import as_single
+
+    match data:
+        case {"l": list(items)}:
+            return all(map(_single, items))
+        case {"f": str(text)}:
+            value = float.fromhex(text)
+            return not math.isfinite(value) or as_single(value) == value
+        case _:  # no REAL
+            return True
 
 
 def _simple(sort: Sort) -> Any:

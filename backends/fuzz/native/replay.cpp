@@ -10,6 +10,9 @@
 #include <cstring>
 #include <dirent.h>
 #include <exception>
+#ifdef AVOW_FILLED
+#include <malloc.h>
+#endif
 #include <memory>
 #include <pthread.h>
 #include <sstream>
@@ -34,6 +37,9 @@ void looked(const char* end) {
 
 // Before any constructor of the node's file: what it looks at from there on is told by whoever traces this process.
 void begun(int count, char** words, char**) {
+#ifdef AVOW_FILLED
+  mallopt(M_PERTURB, 0xa5);
+#endif
   if (count > 3) {
     mark = words[3];
     looked("begin");
