@@ -93,10 +93,13 @@ FAULTS = {
 }
 
 
-QUICK = ("leaving too early",)
+MARKS = dict.fromkeys(FAULTS, (pytest.mark.slow,)) | {
+    "leaving too early": (),
+    "the mission resumed": (pytest.mark.nightly,),
+}
 
 
-@pytest.mark.parametrize("fault", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FAULTS])
+@pytest.mark.parametrize("fault", [pytest.param(fault, marks=MARKS[fault]) for fault in FAULTS])
 def test_seeded_faults_are_caught(rover, tmp_path, fault):
     change, caught = FAULTS[fault]
     outcomes = settle(rover(*REPAIRED, {"states": 30_000}, program=change), tmp_path)

@@ -48,7 +48,7 @@ def literal(found: Value, sort: Sort) -> str:
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [0])
 def test_dafny_and_the_evaluator_agree(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
