@@ -112,6 +112,7 @@ def test_seeded_faults_are_caught(rover, tmp_path, fault):
         assert 0 <= counterexample.loop < len(counterexample.trace)
 
 
+@pytest.mark.slow
 def test_the_published_agent(rover, tmp_path):
     """Every instance of G1 is vacuous, since going(i) goes before inspected(i) comes; G2 and G3 are false."""
     job = rover(*PUBLISHED)

@@ -71,6 +71,7 @@ def test_spin_says_of_the_program_what_ajpf_says(tmp_path, folder, name):
     assert not found
 
 
+@pytest.mark.slow
 @pytest.mark.needs_spin
 @pytest.mark.parametrize(
     ("make", "seed", "semantics", "fair"),

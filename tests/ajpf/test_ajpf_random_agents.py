@@ -112,6 +112,7 @@ def test_no_agent_meets_a_claim_and_its_denial(tmp_path: Path, seeds: range) -> 
     assert {("checked", "refuted", False), ("refuted", "checked", False)} <= set(told), told
 
 
+@pytest.mark.slow
 @pytest.mark.needs_spin
 @pytest.mark.parametrize("seed", some(range(3), 1))
 def test_spin_agrees_on_random_agents(tmp_path: Path, seed: int) -> None:

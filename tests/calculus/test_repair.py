@@ -169,6 +169,7 @@ def test_a_requirement(tmp_path: Path) -> None:
     assert kinds["guarantee"]["of"] == "a"
 
 
+@pytest.mark.slow
 def test_deep_formulas_do_no_harm(tmp_path: Path) -> None:
     deep = "in.x == 0"
     for k in range(1, 35):

@@ -33,6 +33,7 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_examples_pass(place: Path) -> None:
     """The one in the folder, and the one on the page."""
     page = (EXAMPLES.parent / "adding-a-backend.md").read_text()
@@ -75,6 +76,7 @@ def test_pytest_loads_the_plugin() -> None:
     assert declared["pytest11"] == {"avow": PLUGIN}
 
 
+@pytest.mark.slow
 def test_by_name_in_an_environment_where_it_is_installed(place: Path) -> None:
     """The backend as an installed package of its own; its suite, and no other test, runs."""
     made = place / "site" / "rows_backend-1.dist-info"

@@ -438,6 +438,7 @@ def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
     assert found.verdict in {Verdict.TESTED, Verdict.UNKNOWN, Verdict.ERROR}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "code"), some([("", 0), ("r < 250", 1)], 1))
 def test_what_was_exported_runs_as_its_command_is_printed(tmp_path: Path, old: str, code: int) -> None:
     wanted = job(tmp_path, STEP.replace(old, "r <= 250") if old else STEP)

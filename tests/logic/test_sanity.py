@@ -218,6 +218,7 @@ def test_the_published_agent_is_not_realizable(published: dict[str, dict[str, Sa
     assert len(result.clauses) == 2
 
 
+@pytest.mark.slow
 def test_the_published_radiation_sensor_says_nothing(published: dict[str, dict[str, SanityResult]]) -> None:
     found = published["radiationSensor"]
     assert found["not-tautological-G1"].verdict is Verdict.REFUTED

@@ -331,7 +331,7 @@ def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     table.write_text("\n".join(rows) + "\n")
     moved = changed(before, keys(folder))
     methods = {method for name, method in moved if "/guarantee/" in name}
-    assert methods == {"ajpf", "hypothesis", "rosmonitoring"}
+    assert methods == {"ajpf", "driven", "hypothesis", "rosmonitoring"}  # `driven` is hypothesis too
     assert all((name, method) in moved for name, method in before if method in methods)
     assert {name for name, method in moved if name.startswith("system/requirement/")}, (
         "temporal requirements look at it"

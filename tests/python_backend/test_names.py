@@ -106,6 +106,7 @@ TRICKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRICKS)
 def test_what_a_name_means_is_what_python_takes_it_for(name: str, tmp_path: Path) -> None:
     found = Example(TRICKS[name], RCL, "N", PARAMETERS).settled(tmp_path)["one"]

@@ -210,6 +210,7 @@ node n {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(12), 3))
 def test_whatever_a_path_leads_to_is_looked_at(seed: int, make_system: Callable[..., System], tmp_path: Path) -> None:
     """Items from the front and from the end, fields within fields, under `data`, of the event's own names; topics with

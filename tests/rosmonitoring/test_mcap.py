@@ -84,6 +84,7 @@ def _installed() -> None:
     pytest.importorskip("mcap")
 
 
+@pytest.mark.slow
 def test_each_judgement_is_there_and_its_margin_agrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     limits(tmp_path)
     trace = written(tmp_path, pairs(400))

@@ -88,6 +88,7 @@ def test_on_ros_1_a_wrong_command_is_withheld(tmp_path: Path) -> None:
     assert commands.count("/command_mon") > commands.count("/command") > 0
 
 
+@pytest.mark.slow
 def test_on_the_bus_a_wrong_command_is_withheld_and_its_record_is_no_evidence(tmp_path: Path) -> None:
     record = tmp_path / "run.jsonl"
     done = drive("--fault", "ignore_orange", "--seconds", "40", "--enforce", "--record", str(record))

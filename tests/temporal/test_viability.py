@@ -163,6 +163,7 @@ def runs(assumed: Term, promised: list[Term], length: int) -> list[list[Step]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(2000, 2300), 12))
 def test_what_is_said_of_a_clause_is_so_in_every_run(seed: int) -> None:
     """A tautology is one whatever else is promised, and an output of no matter matters at no later step either."""
@@ -222,6 +223,7 @@ def allowed_steps(node: Node, depth: int) -> list[list[Step]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(150), 6))
 def test_determined_and_needed_against_all_runs(seed: int) -> None:
     node = node_of(*drawn(seed))
