@@ -55,7 +55,11 @@ def _library() -> dict[str, bytes]:
         for name in ("package.json", "package-lock.json"):
             shutil.copy(HERE / name, place)
         command = [npm, "ci", "--omit=dev", "--ignore-scripts", "--no-audit", "--no-fund"]
-        done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False, timeout=600)
+        try:
+            done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False, timeout=120)
+        except subprocess.TimeoutExpired:
+            print("note: npm did not get the library within two minutes")
+            return {}
         if done.returncode:
             print(f"note: npm could not get the library: {done.stderr.strip()[-300:]}")
             return {}
