@@ -96,6 +96,7 @@ FAULTS = {
 MARKS = dict.fromkeys(FAULTS, (pytest.mark.slow,)) | {
     "leaving too early": (),
     "the mission resumed": (pytest.mark.nightly,),
+    "danger ignored on arrival": (pytest.mark.nightly,),
 }
 
 

@@ -76,7 +76,8 @@ ENDINGS = {
 }
 
 
-@pytest.mark.parametrize("name", some(ENDINGS, 1))
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ENDINGS)
 def test_no_output_refutes(name: str, tmp_path: Path) -> None:
     head, body = ENDINGS[name]
     text = head + LIMITER.adapter.replace("{ out.real", f"{{ {body} out.real")
@@ -156,7 +157,8 @@ MISFITS = {
 }
 
 
-@pytest.mark.parametrize("step", some(MISFITS, 1))
+@pytest.mark.nightly
+@pytest.mark.parametrize("step", MISFITS)
 def test_an_adapter_that_does_not_fit(step: str, tmp_path: Path) -> None:
     found = replace(LIMITER, adapter=adapter("Limiter", "", f"(void)in; (void)out; {step}")).outcomes(tmp_path)
     assert not any(o.verdict.supports for o in found.values()), {o.verdict: o.summary for o in found.values()}

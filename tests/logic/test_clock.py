@@ -206,7 +206,7 @@ print(solve({c.name: c.formula for c in of.clauses}, effort=300).status, spent()
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_question_takes_the_same_steps_in_every_process() -> None:
     """Whatever the order of Python's sets: so that a verdict does not change with the process that it is found in."""
     said = {
