@@ -13,8 +13,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from avow.base import process
 from avow.isolation import judge
@@ -42,42 +43,10 @@ def campaign(question: dict[str, Any]) -> dict[str, Any]:
     os.write(nonces, nonce.encode() + b"\n")
     os.close(nonces)
     command = [str(folder / "fuzz"), *question["options"], f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
-    environment = {
-        **_OPTIONS,
-        "PATH": os.environ.get("PATH", os.defpath),
-        "AVOW_CHANNEL": str(theirs),
-        "AVOW_NONCE": str(source),
-        "HOME": str(kept),
-        "TMPDIR": str(kept),
-        "LC_ALL": "C.UTF-8",
-    }
     if level is Isolation.SEALED:
         command = sealed(command, (folder, Path(question["root"])), _SCRATCH, (kept,))
-    with tempfile.TemporaryFile() as log:
-        started = subprocess.Popen(
-            command,
-            cwd=kept,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=log,
-            env=environment,
-            start_new_session=True,
-            pass_fds=(theirs, source),
-        )
-        process.watch(started.pid)
-        os.close(theirs)
-        os.close(source)
-        try:
-            code: int | None = started.wait(question["seconds"])
-        except subprocess.TimeoutExpired:
-            code = None
-        process.kill_tree(started.pid)
-        started.wait()
-        process.unwatch(started.pid)
-        left = process.end_orphans()
-        said = _read(ours)
-        log.seek(0)
-        text = log.read(1 << 20).decode("utf-8", "replace")
+    told = {"AVOW_CHANNEL": str(theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
+    code, left, said, text = _ended(command, kept, question["seconds"], ours, (theirs, source), told)
     words = said.split()
     closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
@@ -91,6 +60,45 @@ def campaign(question: dict[str, Any]) -> dict[str, Any]:
         "log": text[-20_000:],
         "isolation": level.value,
     }
+
+
+def _ended(
+    command: list[str],
+    cwd: Path,
+    seconds: float,
+    ours: int,
+    theirs: Sequence[int],
+    told: Mapping[str, str],
+    held: Sequence[IO[bytes]] = (),
+) -> tuple[int | None, bool, str, str]:
+    """Run a build with sanitizers to its end, and end all that it leaves. Its exit code (None: its time was up),
+    whether it left something, what came through the channel `ours`, and its log. `theirs` are closed here, `held` stay
+    open."""
+    with tempfile.TemporaryFile() as log:
+        started = subprocess.Popen(
+            command,
+            cwd=cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
+            start_new_session=True,
+            pass_fds=(*theirs, *(file.fileno() for file in held)),
+        )
+        process.watch(started.pid)
+        for end in theirs:
+            os.close(end)
+        try:
+            code: int | None = started.wait(seconds)
+        except subprocess.TimeoutExpired:
+            code = None
+        process.kill_tree(started.pid)
+        started.wait()
+        process.unwatch(started.pid)
+        left = process.end_orphans()
+        said = _read(ours)
+        log.seek(0)
+        return code, left, said, log.read(1 << 20).decode("utf-8", "replace")
 
 
 def _read(channel: int) -> str:
@@ -162,7 +170,7 @@ def shown(question: dict[str, Any]) -> dict[str, Any]:
     level = available()
     program = Path(question["program"])
     ours, theirs = os.pipe()
-    with tempfile.TemporaryFile() as lines, tempfile.TemporaryFile() as log:
+    with tempfile.TemporaryFile() as lines:
         for k, command in enumerate(("N", *question["runs"][0])):
             lines.write(f"{k}|{command}\n".encode())
         lines.flush()
@@ -170,29 +178,9 @@ def shown(question: dict[str, Any]) -> dict[str, Any]:
         command = [str(program), str(lines.fileno()), str(theirs), "/avow-unmarked", "alone"]
         if level is Isolation.SEALED:
             command = sealed(command, (program.parent, Path(question["root"])), _SCRATCH)
-        started = subprocess.Popen(
-            command,
-            cwd=question["root"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=log,
-            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), "LC_ALL": "C.UTF-8"},
-            start_new_session=True,
-            pass_fds=(theirs, lines.fileno()),
+        code, _, said, text = _ended(
+            command, Path(question["root"]), question["seconds"], ours, (theirs,), {}, (lines,)
         )
-        process.watch(started.pid)
-        os.close(theirs)
-        try:
-            code: int | None = started.wait(question["seconds"])
-        except subprocess.TimeoutExpired:
-            code = None
-        process.kill_tree(started.pid)
-        started.wait()
-        process.unwatch(started.pid)
-        process.end_orphans()
-        said = _read(ours)
-        log.seek(0)
-        text = log.read(1 << 20).decode("utf-8", "replace")
     replies: list[Any] = []
     for line in said.splitlines():
         try:

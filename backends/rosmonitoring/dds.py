@@ -130,16 +130,7 @@ class Dds:
         self._spoken.append(writer)
 
         def say(statuses: Sequence[Status]) -> None:
-            made = [
-                {
-                    "level": status.level,
-                    "name": status.name,
-                    "message": status.text,
-                    "hardware_id": system,
-                    "values": [{"key": key, "value": value} for key, value in status.values],
-                }
-                for status in statuses
-            ]
+            made = [status.message(system) for status in statuses]
             header = {"stamp": divmod(time.time_ns(), 10**9), "frame_id": ""}
             writer.write(filled(types, DIAGNOSTICS, kind, {"header": header, "status": made}))
 

@@ -90,16 +90,7 @@ class Rosbridge:
 
         def say(statuses: Sequence[Status]) -> None:
             now = time.time_ns()
-            made = [
-                {
-                    "level": status.level,
-                    "name": status.name,
-                    "message": status.text,
-                    "hardware_id": system,
-                    "values": [{"key": key, "value": value} for key, value in status.values],
-                }
-                for status in statuses
-            ]
+            made = [status.message(system) for status in statuses]
             stamp = {"secs": now // 10**9, "nsecs": now % 10**9}
             self._say({"op": "publish", "topic": topic, "msg": {"header": {"stamp": stamp}, "status": made}})
 
