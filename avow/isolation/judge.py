@@ -18,37 +18,56 @@ from typing import Any
 from avow.base import process
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
+from avow.tuning.running import CHANNEL_PATIENCE
+from avow.tuning.sizes import CHANNEL_KEPT
+
+
+class Channel:
+    """A pipe that is read while its other end, `theirs`, is written to: who writes more than a pipe holds would wait
+    for us, and we for its end."""
+
+    def __init__(self) -> None:
+        self._ours, self.theirs = os.pipe()
+        self._parts: list[bytes] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        size = 0
+        while part := os.read(self._ours, 1 << 16):
+            size += len(part)
+            if size <= CHANNEL_KEPT:
+                self._parts.append(part)
+
+    def close(self) -> bytes | None:
+        """What came, once who wrote has ended and `theirs` is closed; what is beyond all measure is left out. None
+        where somebody still holds the other end."""
+        self._reader.join(CHANNEL_PATIENCE)
+        if self._reader.is_alive():
+            return None
+        os.close(self._ours)
+        return b"".join(self._parts)
 
 
 def ask(
     script: str, arguments: Sequence[str], *, cwd: Path, seconds: float, megabytes: int, env: Mapping[str, str]
 ) -> tuple[Completed, dict[str, Any] | None]:
     """Run ``python script FD arguments…``; the judge writes its answer with `say`. Raises ToolMissing."""
-    ours, theirs = os.pipe()
-    parts: list[bytes] = []
-
-    def read() -> None:
-        while part := os.read(ours, 1 << 16):
-            parts.append(part)
-
-    reader = threading.Thread(target=read, daemon=True)
-    reader.start()
+    channel = Channel()
     try:
         done = process.run(
-            [sys.executable, "-P", script, str(theirs), *arguments],
+            [sys.executable, "-P", script, str(channel.theirs), *arguments],
             cwd=cwd,
             seconds=seconds,
             megabytes=megabytes,
             env={"PYTHONPATH": absolute_only(), **env},
-            pass_fds=(theirs,),
+            pass_fds=(channel.theirs,),
         )
     finally:
         process.end_orphans()
-        os.close(theirs)
-        reader.join(5.0)
-        if not reader.is_alive():
-            os.close(ours)
-    answer = _answer(b"".join(parts)) if done.code == 0 and not reader.is_alive() else None
+        os.close(channel.theirs)
+        said = channel.close()
+    answer = _answer(said) if done.code == 0 and said is not None else None
     if answer is not None and answer.pop(_ENDED, False):
         process.ended_with(-signal.SIGKILL)
     return done, answer

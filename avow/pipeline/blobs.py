@@ -2,7 +2,8 @@
 
 Each part stands once in a table and is referred to by its place there, so that equal data has equal bytes, however its
 parts are shared in memory, and depth costs nothing. Places in files are left out, and paths are relative to the
-system's folder: neither is anything that an answer may depend on. Only the classes listed here are made again.
+system's folder: neither is anything that an answer may depend on. Only the classes that a slice is made of, by the
+types that its fields declare, are written and made again.
 """
 
 from __future__ import annotations
@@ -10,30 +11,18 @@ from __future__ import annotations
 import dataclasses
 import enum
 import functools
-import inspect
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
-from avow.base import diagnostics, verdict
 from avow.base.diagnostics import Span
-from avow.calculus import providers
-from avow.formulas import finite, values
-from avow.language import contract, operator_names, sorts, terms
-from avow.pipeline import slices
-from avow.ros import names
-from avow.sanity import claims
-from avow.system import plan
+from avow.pipeline.slices import Slice
 
 _NOWHERE = Span("", 1, 1, 1, 1)
-_MODULES: tuple[ModuleType, ...] = (
-    *(sorts, operator_names, terms, contract, plan, names, values, finite, claims, providers, slices),
-    *(diagnostics, verdict),
-)
+_PLAIN = (str, int, bool, float, type(None), Fraction, Path, Span, Any)
 
 
 class Garbled(ValueError):  # noqa: N818 - it says what they are
@@ -91,15 +80,15 @@ def _is_place(name: str) -> bool:
 
 
 def _children(value: Any) -> Iterable[object]:
-    if isinstance(value, enum.Enum | Fraction | Path | int | float):
+    kind: type = type(value)
+    if kind is _classes().get(kind.__name__):
+        return () if issubclass(kind, enum.Enum) else (getattr(value, name) for name in _fields(kind))
+    if kind in (Fraction, int, float) or isinstance(value, Path):
         return ()
     if isinstance(value, Mapping):
         return (part for pair in value.items() for part in pair)
     if isinstance(value, tuple | list):
         return value
-    if dataclasses.is_dataclass(value) and type(value).__name__ in _classes():
-        kind: Any = type(value)
-        return (getattr(value, name) for name in _fields(kind))
     raise TypeError(f"{type(value).__name__} is no data of a work")
 
 
@@ -141,7 +130,10 @@ def _value(reference: Any, made: list[Any]) -> Any:
 def _made(entry: Any, made: list[Any], root: Path) -> Any:
     match entry:
         case ["e", str(name), value]:
-            return _enums()[name](value)
+            kind = _classes()[name]
+            if dataclasses.is_dataclass(kind):
+                raise Garbled(f"{name} has parts")
+            return kind(value)
         case ["q", str(numerator), str(denominator)]:
             return Fraction(int(numerator), int(denominator))
         case ["p", str(path)]:
@@ -179,20 +171,18 @@ def _places(kind: Any) -> dict[str, Any]:
 
 
 @functools.cache
-def _classes() -> dict[str, Any]:
-    return _of(lambda kind: dataclasses.is_dataclass(kind) and kind is not Span)
-
-
-@functools.cache
-def _enums() -> dict[str, type[enum.Enum]]:
-    return _of(lambda kind: issubclass(kind, enum.Enum))
-
-
-def _of(wanted: Callable[[type], bool]) -> dict[str, Any]:
+def _classes() -> Mapping[str, Any]:
+    """Name → dataclass or enumeration, of all that a slice can hold."""
     found: dict[str, Any] = {}
-    for module in _MODULES:
-        for name, kind in vars(module).items():
-            if inspect.isclass(kind) and kind.__module__ == module.__name__ and wanted(kind):
-                assert name not in found, name
-                found[name] = kind
+    left: list[Any] = [Slice]
+    while left:
+        kind = left.pop()
+        if not isinstance(kind, type):  # a union, or a container of others
+            left.extend(get_args(kind))
+        elif kind not in _PLAIN and kind is not found.get(kind.__name__):
+            assert kind.__name__ not in found, f"a slice holds two classes named {kind.__name__}"
+            assert dataclasses.is_dataclass(kind) or issubclass(kind, enum.Enum), f"a slice holds a {kind.__name__}"
+            found[kind.__name__] = kind
+            if dataclasses.is_dataclass(kind):
+                left.extend(get_type_hints(kind).values())
     return found

@@ -12,6 +12,9 @@ CONFORMANCE_PATIENCE = 60.0
 SUBJECT_PATIENCE = 10.0
 """Seconds that a subject may take for one answer: a robot's step takes milliseconds, its first import seconds."""
 
+CHANNEL_PATIENCE = 5.0
+"""Seconds that the last of a channel may take once its writer has ended; after that, somebody else holds it."""
+
 CLUSTER_CONNECT = 30.0
 """Seconds to reach a cluster's scheduler, which may just be starting."""
 

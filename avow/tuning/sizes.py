@@ -11,6 +11,9 @@ REQIF_BYTES = 200_000_000
 OUTPUT_KEPT = 4_000_000
 """Characters of output kept: a tool that prints without end must not fill the memory."""
 
+CHANNEL_KEPT = 64_000_000
+"""Bytes kept of what comes through a judge's channel: a subject that writes without end must not fill the memory."""
+
 SOURCE_SHOWN = 20_000_000
 """Bytes of a file that are looked at for the lines to show."""
 

@@ -13,9 +13,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from avow.base import process
 from avow.isolation import judge
@@ -38,15 +38,15 @@ def campaign(question: dict[str, Any]) -> dict[str, Any]:
     level = available()
     folder, kept = Path(question["folder"]), Path(question["kept"])
     nonce = secrets.token_hex(16)
-    ours, theirs = os.pipe()
+    channel = judge.Channel()
     source, nonces = os.pipe()
     os.write(nonces, nonce.encode() + b"\n")
     os.close(nonces)
     command = [str(folder / "fuzz"), *question["options"], f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
     if level is Isolation.SEALED:
         command = sealed(command, (folder, Path(question["root"])), _SCRATCH, (kept,))
-    told = {"AVOW_CHANNEL": str(theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
-    code, left, said, text = _ended(command, kept, question["seconds"], ours, (theirs, source), told)
+    told = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
+    code, left, said, text = _ended(command, kept, question["seconds"], channel, told, source)
     words = said.split()
     closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
@@ -66,14 +66,12 @@ def _ended(
     command: list[str],
     cwd: Path,
     seconds: float,
-    ours: int,
-    theirs: Sequence[int],
+    channel: judge.Channel,
     told: Mapping[str, str],
-    held: Sequence[IO[bytes]] = (),
+    given: int,
 ) -> tuple[int | None, bool, str, str]:
-    """Run a build with sanitizers to its end, and end all that it leaves. Its exit code (None: its time was up),
-    whether it left something, what came through the channel `ours`, and its log. `theirs` are closed here, `held` stay
-    open."""
+    """Run a build with sanitizers to its end, and end all that it leaves; `given` is a descriptor that it reads. Its
+    exit code (None: its time was up), whether it left something, what came through the channel, and its log."""
     with tempfile.TemporaryFile() as log:
         started = subprocess.Popen(
             command,
@@ -83,11 +81,10 @@ def _ended(
             stderr=log,
             env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
             start_new_session=True,
-            pass_fds=(*theirs, *(file.fileno() for file in held)),
+            pass_fds=(channel.theirs, given),
         )
         process.watch(started.pid)
-        for end in theirs:
-            os.close(end)
+        os.close(channel.theirs)
         try:
             code: int | None = started.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -96,21 +93,9 @@ def _ended(
         started.wait()
         process.unwatch(started.pid)
         left = process.end_orphans()
-        said = _read(ours)
+        said = channel.close() or b""
         log.seek(0)
-        return code, left, said, log.read(1 << 20).decode("utf-8", "replace")
-
-
-def _read(channel: int) -> str:
-    parts: list[bytes] = []
-    os.set_blocking(channel, False)
-    try:
-        while len(parts) < 100 and (part := os.read(channel, 1 << 16)):
-            parts.append(part)
-    except BlockingIOError:  # somebody still holds the other end
-        pass
-    os.close(channel)
-    return b"".join(parts).decode("utf-8", "replace")
+        return code, left, said.decode("utf-8", "replace"), log.read(1 << 20).decode("utf-8", "replace")
 
 
 def asked(question: dict[str, Any]) -> dict[str, Any]:
@@ -169,18 +154,16 @@ def shown(question: dict[str, Any]) -> dict[str, Any]:
     """One run by the program with sanitizers: its answers as far as they go, and the report with which it ends."""
     level = available()
     program = Path(question["program"])
-    ours, theirs = os.pipe()
+    channel = judge.Channel()
     with tempfile.TemporaryFile() as lines:
         for k, command in enumerate(("N", *question["runs"][0])):
             lines.write(f"{k}|{command}\n".encode())
         lines.flush()
         lines.seek(0)
-        command = [str(program), str(lines.fileno()), str(theirs), "/avow-unmarked", "alone"]
+        command = [str(program), str(lines.fileno()), str(channel.theirs), "/avow-unmarked", "alone"]
         if level is Isolation.SEALED:
             command = sealed(command, (program.parent, Path(question["root"])), _SCRATCH)
-        code, _, said, text = _ended(
-            command, Path(question["root"]), question["seconds"], ours, (theirs,), {}, (lines,)
-        )
+        code, _, said, text = _ended(command, Path(question["root"]), question["seconds"], channel, {}, lines.fileno())
     replies: list[Any] = []
     for line in said.splitlines():
         try:

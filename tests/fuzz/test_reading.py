@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
+import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from avow.backends.fuzz import BACKEND, building
+from avow.backends.fuzz.judge import _ended
 from avow.base.tools import Tool
 from avow.base.verdict import Verdict
+from avow.isolation import judge
 from fuzz.cpp_nodes import LIMITER, SCAN, WATCHDOG
 
 
@@ -49,3 +53,11 @@ def test_what_does_not_fit_is_told_before_anything_runs(cpp: object, code: str, 
 def test_every_file_that_is_included_is_named(tmp_path: Path) -> None:
     job = WATCHDOG.written(tmp_path)
     assert {path.name for path in BACKEND.files(job)} == {"adapter.hpp", "nodes.hpp", "params.yaml"}
+
+
+def test_what_is_longer_than_a_pipe_holds_comes_through(tmp_path: Path) -> None:
+    channel = judge.Channel()
+    script = f"import os\nleft = b'x' * 1_000_000\nwhile left: left = left[os.write({channel.theirs}, left):]"
+    with tempfile.TemporaryFile() as given:
+        code, left, said, _ = _ended([sys.executable, "-c", script], tmp_path, 60, channel, {}, given.fileno())
+    assert (code, left, len(said)) == (0, False, 1_000_000)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import enum
 import json
 import subprocess
 import sys
@@ -83,6 +85,13 @@ def works(folder: Path) -> list[Work]:
 
 def request(work: Work, folder: Path) -> Request:
     return request_of(Workspace(folder.parent.parent), work, work.obligations, folder)
+
+
+def test_what_no_slice_declares_is_not_sent(folder: Path) -> None:
+    kinds = [dataclasses.make_dataclass("Stranger", []), dataclasses.make_dataclass("Not", [("body", object)])]
+    for value in (kinds[0](), kinds[1](TRUE), enum.Enum("Builtin", ["A"]).A, {1}, b""):  # type: ignore[attr-defined]
+        with pytest.raises(TypeError, match="is no data of a work"):
+            encode(value, folder)
 
 
 def test_a_slice_comes_back_as_it_was_sent_and_gives_the_same_keys(folder: Path) -> None:
