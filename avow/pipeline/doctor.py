@@ -15,7 +15,6 @@ _PACKAGES = (
     ("logic", "z3-solver", "pip install z3-solver", False),
     ("second opinion", "cvc5", "pip install 'avow[cvc5]'", True),
     ("PDF report", "typst", "pip install typst", True),
-    ("bag files", "rosbags", "pip install 'avow[bags]'", True),
     ("live monitoring", "websockets", "pip install 'avow[monitor]'", True),
     ("ROS 2 over DDS", "cyclonedds", "pip install 'avow[dds]'", True),
     ("verdicts as MCAP", "mcap", "pip install 'avow[monitor]'", True),

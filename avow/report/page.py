@@ -72,6 +72,7 @@ def environment() -> Environment:
         "mutation": wording.mutation,
         "details_text": wording.details_text,
         "outline": wording.outline,
+        "overhead": wording.overhead,
         "protocol": wording.protocol,
         "rerun": wording.rerun,
         "short": short,

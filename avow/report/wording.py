@@ -132,7 +132,16 @@ def within(view: ObligationView, status: Status, most: int = 160) -> str:
 
 def protocol(evidence: Evidence) -> str:
     """How measured runs were made, in the plan's words; empty where nothing was measured."""
-    match evidence.details.get("protocol"):
+    return _text(evidence, "protocol")
+
+
+def overhead(evidence: Evidence) -> str:
+    """What a method costs the running robot, as somebody has measured it; empty where nobody has."""
+    return _text(evidence, "overhead")
+
+
+def _text(evidence: Evidence, key: str) -> str:
+    match evidence.details.get(key):
         case str(text):
             return " ".join(text.split())
     return ""
@@ -306,7 +315,7 @@ def outline(evidence: Evidence) -> str:
 
 def details_text(evidence: Evidence) -> str:
     """Whatever else a method left in its details, as indented text."""
-    shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol", "timeline"}
+    shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol", "overhead", "timeline"}
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.ros.sources import message_files
 from avow.system.paths import inside
@@ -52,13 +54,21 @@ class RosMonitoringBackend(Backend):
         "runs; that the mapping reads the messages rightly is a person's judgement."
     )
 
+    def tools(self) -> tuple[Tool, ...]:
+        try:
+            version: str | None = metadata.version("rosbags")
+        except metadata.PackageNotFoundError:
+            version = None
+        return (Tool("rosbags", version, None, "pip install 'avow[bags]'", package="rosbags"),)
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .memory import unmonitored
         from .options import setup
+        from .overhead import overheads
         from .told import readings, unholdable
 
         found, faults = setup(job.system, job.node, job.method.options)
-        problems = [*faults, *readings(found, job.method.options.at("mapping"))]
+        problems = [*faults, *readings(found, job.method.options.at("mapping")), *overheads(job)[1]]
         for at, name in enumerate(_traces(job)):
             path = inside(job.root, name)
             if path is None or not path.exists():
@@ -81,7 +91,7 @@ class RosMonitoringBackend(Backend):
 
     def files(self, job: Job) -> tuple[Path, ...]:
         found: list[Path] = []
-        for name in _traces(job):
+        for name in (*_traces(job), *(entry["data"] for entry in job.options.get("overhead", ()))):
             path = inside(job.root, name)
             if path is not None and path.is_dir():
                 found += sorted(p for p in path.rglob("*") if p.is_file())
@@ -146,6 +156,7 @@ class RosMonitoringBackend(Backend):
             outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
             return Report(outcomes, "avow monitor", __version__)
         from .engine import Monitor
+        from .overhead import overheads
         from .watched import Fault
 
         deadline = time.monotonic() + limits.seconds
@@ -158,9 +169,12 @@ class RosMonitoringBackend(Backend):
             _draw(job, run)
             runs.append(run)
         logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
+        cost, _ = overheads(job)
         outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o), _excuse(job, runs)) for o in job.obligations)
         for obligation, outcome in zip(job.obligations, outcomes, strict=True):
             outcome.details["rml"] = refused.get(obligation.name, "translated")
+            if cost:
+                outcome.details["overhead"] = cost
             if drawn := _timelines(job, found, runs, obligation):
                 outcome.details["timeline"] = drawn
         return Report(outcomes, "avow monitor", __version__, (), logs)
@@ -194,6 +208,8 @@ class _Run:
         self.name = name
         self.monitor = monitor
         self.digest = ""
+        self.missing = ""
+        """Which package reads it, where there is none."""
         self.trouble = ""
         self.unknown = ""
         self.violations: list[Violation] = []
@@ -267,6 +283,8 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
                 break
         run.note(whole.finish())
     except Rejected as error:
+        lacking = [d for d in error.diagnostics if d.code == "MON202"]
+        run.missing = "; ".join(f"{name}: {d.message}; install it with: {d.hint}" for d in lacking)
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
         run.trouble = "; ".join(f"{where}: {message.replace(str(path), name)}" for where, message in told)
@@ -368,7 +386,10 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
     def answer(verdict: Verdict, summary: str) -> Outcome:
         return Outcome(obligation, verdict, summary, bound=bound)
 
-    trouble = next((run.trouble for run in runs if run.trouble), "")
+    missing = next((run.missing for run in runs if run.missing), "")
+    trouble = next((run.trouble for run in runs if run.trouble and not run.missing), "")
+    if missing and not trouble:
+        return answer(Verdict.NOT_RUN, missing)
     if trouble:
         return answer(Verdict.ERROR, trouble)
     if backwards:

@@ -43,6 +43,12 @@ CODES = register(
         "From which field of the topic's messages a variable is read, as the definition or the plan decides.",
         "Nothing is to be done where it is the field that is meant; otherwise name another under `mapping`.",
     ),
+    declare(
+        "MON108",
+        "no measurement",
+        "A table of what monitors cost (`overhead`) is not there, or holds something else.",
+        "Write a row for each run: which monitors ran, and the seconds until each place.",
+    ),
     declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
     declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
     declare(

@@ -116,6 +116,25 @@ SCHEMA: dict[str, Any] = {
             "maximum": 1,
             "description": "the share of what was published that has to be decided (default 1)",
         },
+        "overhead": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["data", "how", "machine", "date"],
+                "properties": {
+                    "data": {
+                        "type": "string",
+                        "description": "a table (CSV) with a row for each run: its `monitors` (none, all, or a node's "
+                        "name), and the seconds until the robot had reached each place",
+                    },
+                    "how": {"type": "string", "minLength": 1, "description": "what was measured, and how"},
+                    "machine": {"type": "string", "minLength": 1, "description": "the machine that it was measured on"},
+                    "date": {"type": "string", "pattern": "^[0-9]{4}-[0-9]{2}-[0-9]{2}$"},
+                },
+            },
+            "description": "what monitors cost the running robot, as it was measured: shown with the evidence",
+        },
         "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
         "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},
         "warning": {"type": "integer", "minimum": 0, "description": "the ROS monitor's warning level (default 1)"},

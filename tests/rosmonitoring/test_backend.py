@@ -39,7 +39,8 @@ def discharge(system: System, name: str, folder: Path) -> dict[str, Outcome]:
 def test_it_is_a_backend() -> None:
     assert isinstance(BACKEND, Backend)
     jsonschema.Draft202012Validator.check_schema(dict(BACKEND.options_schema))
-    assert BACKEND.tools() == ()
+    (tool,) = BACKEND.tools()
+    assert (tool.name, tool.present, tool.optional) == ("rosbags", True, True)
 
 
 def test_importing_it_is_light() -> None:
@@ -175,3 +176,65 @@ def test_a_trace_outside_the_system_is_a_fault(make_system: Callable[..., System
     for name in ("../secret.jsonl", "/etc/passwd", "absent.jsonl"):
         faults = BACKEND.check(job_for(make_system(SYSTEM, traces=[name]), "n"))
         assert any(d.code == "MON102" and d.span is not None for d in faults)
+
+
+MONITOR = """
+node n {
+  inputs( a : REAL )
+  outputs( v : REAL )
+  topics( std_msgs/Float64 v matches(out.v) )
+  guarantee low ( out.v <= 120 )
+}
+"""
+
+
+def test_a_bag_is_not_run_without_the_package_that_reads_it(
+    make_system: Callable[..., System], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system = make_system(MONITOR, {"out.v": "data"}, traces=["run.bag", "run.jsonl"])
+    (system.plan.root / "run.bag").write_bytes(b"#ROSBAG V2.0")
+    (system.plan.root / "run.jsonl").write_text('{"topic": "v", "time": 1, "data": 3.5}\n', encoding="utf-8")
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    outcome = discharge(system, "n", tmp_path)["low"]
+    assert outcome.verdict is Verdict.NOT_RUN
+    assert outcome.summary == (
+        "run.bag: reading bags needs the package rosbags; install it with: pip install 'avow[bags]'"
+    )
+    # what another trace refutes stays refuted
+    (system.plan.root / "run.jsonl").write_text('{"topic": "v", "time": 1, "data": 121}\n', encoding="utf-8")
+    assert discharge(system, "n", tmp_path)["low"].verdict is not Verdict.NOT_RUN
+
+
+COST = "monitors,WP1,the door\nnone,10,20.0\nnone,10,20.2\nn,10,20.1\nall,11,30.15\nother,1,1\n"
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        (COST, ""),
+        ("WP1,monitors\n1,none\n", "its first column is `monitors`, each other one a place that the robot reaches"),
+        ("monitors,WP1\nall,1\n", "no run without monitors (`none`)"),
+        ("monitors,WP1\nnone,nan\n", "'nan' is no number of seconds above 0"),
+        ("monitors,WP1\nnone\n", "cost.csv: 1 cells where 2 are wanted"),
+        (None, "there is no such file in the system's folder"),
+    ],
+)
+def test_what_monitors_cost_is_shown_as_it_was_measured(
+    table: str | None, told: str, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    entry = {"data": "cost.csv", "how": "on a bench", "machine": "two cores", "date": "2026-11-22"}
+    system = make_system(MONITOR, {"out.v": "data"}, traces=["run.jsonl"], overhead=[entry])
+    (system.plan.root / "run.jsonl").write_text('{"topic": "v", "time": 1, "data": 3.5}\n', encoding="utf-8")
+    if table is not None:
+        (system.plan.root / "cost.csv").write_text(table, encoding="utf-8")
+    wrong = [d.message for d in BACKEND.check(job_for(system, "n")) if d.code == "MON108"]
+    assert wrong == ([f"overhead: cost.csv: {told}"] if told else [])
+    assert system.plan.root / "cost.csv" in BACKEND.files(job_for(system, "n"))
+    said = discharge(system, "n", tmp_path)["low"].details.get("overhead")
+    assert said == (
+        None
+        if told
+        else "on a bench, on two cores, 2026-11-22: 20.10 s to the door without monitors, the mean of 2 runs; "
+        "20.10 s (+0.00 %) with this node's, of 1; on the way +0.00 % WP1; "
+        "30.15 s (+50.00 %) with all of them, of 1; on the way +10.00 % WP1"
+    )

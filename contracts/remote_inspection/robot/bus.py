@@ -18,9 +18,12 @@ class Bus:
         self.taps = []
         self.waiting = deque()
         self.now = 0.0
+        self.speaker = ""
+        self.publishers = {}
 
     def announce(self, topic):
-        """Nothing has to be made known in one process."""
+        """Nothing has to be made known in one process, but a record says whose a topic is."""
+        self.publishers[topic] = self.speaker
 
     def hear(self, topic, act):
         self.listeners.setdefault(topic, []).append(act)

@@ -18,7 +18,7 @@ sys.path.insert(0, str(HERE))
 
 import faults  # noqa: E402
 from bus import TICK, Bus  # noqa: E402
-from wiring import FIELDS, NODES, PARAMETERS, Simulation  # noqa: E402
+from wiring import DEFINITION, FIELDS, NODES, PARAMETERS, TYPE, Simulation  # noqa: E402
 
 
 class Faulty(Bus):
@@ -49,8 +49,9 @@ def drive(fault=None, seconds=400.0, tap=None, sources=None):
     if tap is not None:
         bus.tap(tap)
     chosen = parameters(fault, sources)
-    for start in NODES.values():
+    for bus.speaker, start in NODES.items():
         start(bus, chosen)
+    bus.speaker = "world"
     world = Simulation(bus, TICK, chosen)
     done = []
     bus.hear("at", lambda message: done.append(message["posX"]))
@@ -69,10 +70,38 @@ def event(topic, at, message):
     return {"topic": topic, "time": at, **{field: message[field] for field in FIELDS[topic]}}
 
 
+def written(path, events, publishers):
+    """Write events as JSON lines or, by the file's name, as a ROS 1 bag with the messages' definition, as `rosbag
+    record` would on a graph. The same events, the same bag."""
+    if path.suffix != ".bag":
+        path.write_text("".join(json.dumps(one) + "\n" for one in events), encoding="utf-8")
+        return
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    kind = TYPE.replace("/", "/msg/")
+    store.register(get_types_from_msg(DEFINITION, kind))
+    make = store.types[kind]
+    path.unlink(missing_ok=True)
+    writer = Writer(path)
+    writer.set_compression(Writer.CompressionFormat.BZ2)
+    nothing = {"command": "", "posX": 0.0, "posY": 0.0, "id": 0, "radiation": 0.0, "level": "", "phase": ""}
+    to = {}
+    with writer:
+        for one in events:
+            topic, at = one["topic"], one["time"]
+            if topic not in to:
+                by = f"/{publishers[topic.removesuffix('_mon')]}"
+                to[topic] = writer.add_connection(f"/{topic}", kind, typestore=store, callerid=by, latching=1)
+            message = make(**{**nothing, **{name: one[name] for name in nothing if name in one}})
+            writer.write(to[topic], round(at * 1e9), store.serialize_ros1(message, kind))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fault", choices=faults.NAMES)
-    parser.add_argument("--record", type=Path, help="write every message, as JSON lines")
+    parser.add_argument("--record", type=Path, help="write every message: JSON lines, or a ROS 1 bag (.bag)")
     parser.add_argument("--seconds", type=float, default=400.0)
     parser.add_argument("--enforce", action="store_true", help="what would break a guarantee is not delivered")
     parser.add_argument("--unmonitored", action="store_true")
@@ -84,18 +113,18 @@ def main():
 
     running = None if given.unmonitored else session(load_system(HERE))
     gates = filtered(monitor.setup for monitor in running.monitors) if given.enforce else ()
-    lines = []
+    said = []
     found = []
 
     def tap(topic, at, message):
         line = json.dumps(event(topic, at, message))
         if topic in gates:
-            lines.append(json.dumps(event(topic, at, message) | {"topic": raw(topic)}))
+            said.append(event(topic, at, message) | {"topic": raw(topic)})
             new, passed = running.offer(parse_event(line))
         else:
             new, passed = ([] if running is None else running.step(parse_event(line))), True
         if passed:
-            lines.append(line)
+            said.append(event(topic, at, message))
         for violation in new:
             found.append(violation)
             if len(found) <= 10:
@@ -107,11 +136,11 @@ def main():
     if running is not None:
         found += running.finish()
     if given.record is not None:
-        given.record.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
+        written(given.record, said, bus.publishers)
     spent = time.process_time() - started
     if running is not None and running.withheld:
         print(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
-    print(f"{len(lines)} messages, {bus.now:.1f} s simulated in {spent:.2f} s: {len(found)} violations")
+    print(f"{len(said)} messages, {bus.now:.1f} s simulated in {spent:.2f} s: {len(found)} violations")
     return 1 if found else 0
 
 

@@ -1,14 +1,18 @@
 """What monitors cost, as the paper measures it: the time to each waypoint and back to the door, with and without them.
 
-    python contracts/remote_inspection/robot/overhead.py [RUNS]         # processor time, on a bus (30)
-    python contracts/remote_inspection/robot/overhead.py --ros1 RUNS    # the robot's own time, on ROS 1
+    python contracts/remote_inspection/robot/overhead.py [RUNS] [--write FILE]         # on a bus (30)
+    python contracts/remote_inspection/robot/overhead.py --ros1 RUNS [--write FILE]    # the robot's own time, on ROS 1
 
-On the bus the simulated time is the same; what differs is how long this machine takes for it. On ROS 1 each node is a
-process, as is `avow monitor --live ros1`; the time is that of the messages in which navigation says that it is there.
+On the bus, the time is the simulated one and what the processor has taken until then, as if all took turns on one
+processor: without monitors, with those of each node, with all. On ROS 1 each node is a process, as is `avow monitor
+--live ros1` with all monitors; the time is that of the messages in which navigation says that it is there. `--write`
+keeps the times of every run, as the plan's `overhead` takes them.
 """
 
 import argparse
+import csv
 import json
+import math
 import os
 import resource
 import signal
@@ -23,16 +27,25 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 from drive import drive, event  # noqa: E402
+from wiring import NODES, PLACES  # noqa: E402
 
+from avow.backends.rosmonitoring.overhead import ALL, NONE  # noqa: E402
 from avow.backends.rosmonitoring.session import session  # noqa: E402
 from avow.backends.rosmonitoring.traces import parse_event  # noqa: E402
 from avow.system.load import load_system  # noqa: E402
 
 
-def run(system=None):
-    """(processor time since the start at each arrival), and the simulated time."""
-    running = session(system) if system is not None else None
-    times = []
+def place(message):
+    """The waypoint at which a message says that the rover is."""
+    at = message["posX"], message["posY"]
+    number = min(PLACES, key=lambda number: math.dist(PLACES[number], at))
+    return f"WP{number}" if number else "the door"
+
+
+def run(system=None, nodes=()):
+    """Place → the time of the first arrival there: the simulated one, and what the processor has taken until then."""
+    running = session(system, nodes) if system is not None else None
+    times = {}
     started = time.process_time()
 
     def tap(topic, at, message):
@@ -40,26 +53,25 @@ def run(system=None):
             for violation in running.step(parse_event(json.dumps(event(topic, at, message)))):
                 raise AssertionError(violation.text())
         if topic == "at":
-            times.append(time.process_time() - started)
+            times.setdefault(place(message), at + time.process_time() - started)
 
-    bus = drive(tap=tap)
-    return [*times, time.process_time() - started], bus.now
+    drive(tap=tap)
+    return times
 
 
 def watch():
     """On ROS 1: the time of each arrival since the first reading of the sensors, up to the door, as JSON."""
     from ros1 import Bus
-    from wiring import DOOR
 
     bus = Bus("watch")
-    started, times, phase = [], [], []
+    started, times, phase = [], {}, []
     bus.hear("sensors", lambda message: started or started.append(time.monotonic()))
     bus.hear("phase", lambda message: phase.append(message["phase"]))
 
     def arrived(message):
         if started:
-            times.append(time.monotonic() - started[0])
-        if phase and phase[-1] == "leaving" and message["posX"] == DOOR[0]:
+            times.setdefault(place(message), time.monotonic() - started[0])
+        if phase and phase[-1] == "leaving" and place(message) == "the door":
             bus.rospy.signal_shutdown("it is back")
 
     bus.hear("at", arrived)
@@ -105,41 +117,51 @@ def on_ros_1(monitored):
     return times, spent
 
 
-def table(bare, watched, unit):
-    print("arrival   bare          monitored     overhead")
-    for k in range(min(map(len, [*bare, *watched]))):
-        one, other = (statistics.mean(times[k] for times in all_) for all_ in (bare, watched))
-        times = f"{one * unit[0]:10.2f} {unit[1]} {other * unit[0]:10.2f} {unit[1]}"
-        print(f"{k:>5}   {times} {100 * (other / one - 1):8.2f} %")
+def table(found):
+    """Without monitors, and with each sort of them: mean times to each place."""
+    print(f"{'':<10}" + "".join(f"{sort:>20}" for sort in found))
+    for at in found[NONE][0]:
+        means = [statistics.mean(times[at] for times in runs) for runs in found.values()]
+        print(f"{at:<10}" + "".join(f"{mean:10.3f} s{100 * (mean / means[0] - 1):+6.2f} %" for mean in means))
+
+
+def write(path, found):
+    places = list(found[NONE][0])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["monitors", *places])
+        for sort, runs in found.items():
+            rows.writerows([sort, *(f"{times[at]:.5g}" for at in places)] for times in runs)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("runs", type=int, nargs="?", default=30)
     parser.add_argument("--ros1", action="store_true")
+    parser.add_argument("--write", type=Path, help="keep the times of every run, as a table")
     parser.add_argument("--watch", action="store_true", help="be the node that takes the times")
     given = parser.parse_args()
-    bare, watched = [], []
     if given.watch:
         watch()
-    elif given.ros1:
+        return
+    found = {}
+    if given.ros1:
         for _ in range(given.runs):
-            bare.append(on_ros_1(monitored=False)[0])
+            found.setdefault(NONE, []).append(on_ros_1(monitored=False)[0])
             times, spent = on_ros_1(monitored=True)
-            watched.append(times)
-        table(bare, watched, (1, "s "))
+            found.setdefault(ALL, []).append(times)
+        table(found)
         print(f"processor time of the monitor and of the node that takes the times: {spent:.1f} s in the last run")
     else:
         system = load_system(HERE)
+        sorts = {NONE: (), **{name: (system, [name]) for name in NODES}, ALL: (system,)}
         run(), run(system)
         for _ in range(given.runs):
-            times, simulated = run()
-            bare.append(times)
-            watched.append(run(system)[0])
-        table(bare, watched, (1000, "ms"))
-        one, other = (statistics.mean(times[-1] for times in all_) for all_ in (bare, watched))
-        share = 100 * (other - one) / simulated
-        print(f"of the {simulated:.1f} s of the mission the monitors need {(other - one) * 1000:.0f} ms: {share:.2f} %")
+            for sort, what in sorts.items():
+                found.setdefault(sort, []).append(run(*what))
+        table(found)
+    if given.write is not None:
+        write(given.write, found)
 
 
 if __name__ == "__main__":

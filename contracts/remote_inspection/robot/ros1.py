@@ -27,11 +27,10 @@ sys.path.append("/usr/lib/python3/dist-packages")  # where Debian has rospy; las
 import faults  # noqa: E402
 from bus import TICK  # noqa: E402
 from drive import parameters  # noqa: E402
-from wiring import FIELDS, NODES, TYPE, Simulation  # noqa: E402
+from wiring import DEFINITION, FIELDS, NODES, TYPE, Simulation  # noqa: E402
 
 FILTERED = {"agent": ("/command",)}
 """As in the plan: what these say there comes to the monitor first."""
-DEFINITION = (HERE / "msg/rover/msg/Snapshot.msg").read_text(encoding="utf-8")
 
 
 class Bus:

@@ -11,8 +11,9 @@ from nodes.radiation_sensor import RadiationSensor
 from world import World
 
 HERE = Path(__file__).parent
-TYPE = "rover/Snapshot"
+TYPE = "gazebo_radiation_plugins/Snapshot"
 """What every topic carries, as in the paper: a topic uses the fields that it needs."""
+DEFINITION = (HERE / "msg/gazebo_radiation_plugins/msg/Snapshot.msg").read_text(encoding="utf-8")
 
 FIELDS = {
     "sensors": ("posX", "posY"),
@@ -25,7 +26,6 @@ FIELDS = {
     "command": ("command", "posX", "posY", "id"),
     "phase": ("phase",),
 }
-LATCHED = ("command", "radiationStatus", "at", "inspected")
 
 
 def waypoints():

@@ -14,7 +14,7 @@
 
 namespace rover {
 
-struct Snapshot {  // msg/rover/msg/Snapshot.msg
+struct Snapshot {  // msg/gazebo_radiation_plugins/msg/Snapshot.msg
   std::string command;
   double posX = 0;
   double posY = 0;
@@ -32,7 +32,7 @@ namespace message_traits {
 template <> struct IsMessage<rover::Snapshot> : TrueType {};
 
 template <> struct DataType<rover::Snapshot> {
-  static const char* value() { return "rover/Snapshot"; }
+  static const char* value() { return "gazebo_radiation_plugins/Snapshot"; }
   static const char* value(const rover::Snapshot&) { return value(); }
 };
 
