@@ -435,6 +435,15 @@ _LINTS = (
         "node cannot see to it.",
         "assume(out.status == low) guarantee(out.status != high)",
     ),
+    _lint(
+        "RCL417",
+        "calculated position",
+        "A quantified position of a sequence is calculated with (`s(i + 1)`). What compares elements `s(i)`, `s(j)` of "
+        "quantified positions is decided; of elements at calculated positions solvers mostly say `unknown`. Where the "
+        "order matters and not the neighbour, take two positions.",
+        "node n { inputs(s : <REAL>) outputs(b : BOOL) topics() guarantee(b <=> forall(i in <1 upto length(s) - 1> | "
+        "s(i - 1) <= s(i))) }",
+    ),
 )
 
 CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}

@@ -25,12 +25,14 @@ from avow.language.spelling import similar
 from avow.language.terms import (
     TRUE,
     And,
+    Arithmetic,
     Compare,
     Conditional,
     EnumValue,
     History,
     Implies,
     In,
+    Index,
     Literal,
     Or,
     Past,
@@ -204,6 +206,13 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         for unused in _unused(clause.formula):
             message = f"`{unused.name}` is quantified and never used"
             yield _warning("RCL407", message, unused.span, "remove it, or tie it to what was meant")
+        for position in _calculated(clause.written or clause.formula):
+            yield _warning(
+                "RCL417",
+                f"the position `{show_term(position, 'rcl')}` is calculated, and claims about it are mostly `unknown`",
+                position.span,
+                "if the order matters, take two positions: `forall(i, j in indices(s) | i < j -> s(i) <= s(j))`",
+            )
         for mismatch in mismatches(clause, elements):
             yield _warning(mismatch.code, mismatch.message, clause.sentence_span, mismatch.hint)
     yield from _looked_up(node)
@@ -228,8 +237,8 @@ def _looked_up(node: Node) -> Iterator[Diagnostic]:
         )
 
 
-def _variables(term: Term) -> set[tuple[Role, str]]:
-    return {(t.role, t.name) for t in subterms(term) if isinstance(t, Variable)}
+def _variables(term: Term, *roles: Role) -> set[tuple[Role, str]]:
+    return {(t.role, t.name) for t in subterms(term) if isinstance(t, Variable) and t.role in (roles or Role)}
 
 
 def _now(term: Term) -> Term:
@@ -245,6 +254,13 @@ def _unused(term: Term) -> Iterator[Variable]:
         if isinstance(part, Quantified):
             used = {name for role, name in _variables(part.body) if role is Role.BOUND}
             yield from (v for v in part.variables if v.name not in used)
+
+
+def _calculated(term: Term) -> Iterator[Term]:
+    """The positions of elements that are calculated from quantified ones."""
+    for part in subterms(term):
+        if isinstance(part, Index) and isinstance(part.index, Arithmetic) and _variables(part.index, Role.BOUND):
+            yield part.index
 
 
 def _always(term: Term) -> bool:

@@ -4,7 +4,8 @@ A search hands over what it found: alternatives for the outputs (`Proof`), or va
 search concluded is taken from it. Of a proof it is checked
 
 - that the constants in the alternatives exist whatever the inputs: each axiom only names what there is (Hilbert's
-  epsilon, the least natural number, the integer part), of a constant that nothing before it mentions;
+  epsilon, the least natural number, the integer part, the best of finitely many positions), of a constant that nothing
+  before it mentions;
 - that the contract's own assumptions exclude that every alternative fails what was shown: a fresh question to the
   solver. An alternative's terms are put into the formulas first; a function, or a value that was found, has its meaning
   in the question. `unsat` says so for every result that operations may have outside their domains;
@@ -214,7 +215,12 @@ def _conservative(proof: Proof, given: Mapping[Variable, Value]) -> bool:
     seen = set[Variable]()
     least = list[Term]()
     for axiom in found.axioms:
+        extreme = found.extremes.get(axiom)
         match axiom:
+            case Implies() if extreme is not None:
+                if axiom != extreme.axiom() or not extreme.exists(seen):
+                    return False
+                new = {extreme.constant}
             case Implies(left=Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=guard), right=chosen):
                 block = tuple(v for v in next(blocks, ()) if isinstance(v, Variable))
                 sorts = [v.sort for v in block]

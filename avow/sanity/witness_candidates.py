@@ -7,7 +7,7 @@ all inputs.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -50,6 +50,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.sanity.extremes import Extreme, bounded, measures
 from avow.tuning.bounds import NUMBERS_PAIRED
 from avow.tuning.sizes import REWRITTEN_DEPTH
 
@@ -71,6 +72,8 @@ class Candidates:
     axioms: list[Term] = field(default_factory=list)
     least: list[Term] = field(default_factory=list)
     """Axioms too, that not every question needs: a natural number that is chosen is the least one that there is."""
+    extremes: dict[Term, Extreme] = field(default_factory=dict)
+    """What some of the axioms say: the position that is chosen is the first of the best."""
     values: dict[Variable, list[Term]] = field(default_factory=dict)
     lower: dict[Variable, list[Definition]] = field(default_factory=dict)
     upper: dict[Variable, list[Definition]] = field(default_factory=dict)
@@ -157,6 +160,8 @@ def _visit(
         case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
             for item in body.items if isinstance(body, And) else (body,):
                 guards = [negation(o) for o in _alternatives(item) if not found.mentions(o)]
+                for constant in _extremes(found, variables, guards, item, known):
+                    _visit(found, item, {**known, variables[0]: constant}, conditions, (*open_variables, *variables))
                 inner = _choose(found, variables, guards, known)
                 _visit(found, item, inner, conditions, (*open_variables, *variables))
         case Quantified(variables=variables, body=body):
@@ -207,6 +212,26 @@ def _choose(
         for constant in fresh.values():
             _add(found, constant)
     return {**inner, **fresh}
+
+
+def _extremes(
+    found: Candidates, variables: Sequence[Variable], guards: Sequence[Term], item: Term, known: Mapping[Variable, Term]
+) -> Iterator[Variable]:
+    """Constants for the positions that are decisive where a demand of all of them compares outputs with numbers."""
+    if len(variables) > 1:
+        return
+    (position,) = variables
+    guard = substitute(conjunction(guards), dict(known))
+    if not bounded(position, guard):
+        return
+    for measure, greatest, last in measures(position, item, frozenset(found.outputs)):
+        constant = Variable(Role.BOUND, f"{position.name} ({len(found.constants) + 1})", NATURAL)
+        found.constants.append(constant)
+        choice = Extreme(constant, position, guard, substitute(measure, dict(known)), greatest, last)
+        found.axioms.append(choice.axiom())
+        found.extremes[found.axioms[-1]] = choice
+        found.chosen.setdefault(NATURAL, []).append(constant)
+        yield constant
 
 
 def _remember(found: Candidates, term: Term, known: Mapping[Variable, Term]) -> None:

@@ -12,11 +12,11 @@ from avow.language.spelling import distance, similar
 NODE = """\
 context {{ Stat : {{red, orange, green}}; }}
 node n {{
-  inputs( r : REAL, s : Stat, k : NATURAL, b : BOOL )
+  inputs( r : REAL, s : Stat, k : NATURAL, b : BOOL, w : <REAL> )
   outputs( t : Stat )
   topics( float64 r matches(in.r), string s matches(in.s), int32 k matches(in.k), bool b matches(in.b),
-          string t matches(out.t) )
-  assume( r > 0 and k > 0 )
+          float64 w matches(in.w), string t matches(out.t) )
+  assume( r > 0 and k > 0 and length(w) > 0 )
   {}
   guarantee( (b and s == red) -> t == red )
 }}
@@ -36,6 +36,8 @@ def test_a_tidy_node_has_none() -> None:
 @pytest.mark.parametrize(
     ("clause", "expected"),
     [
+        ("assume( forall(i in <1 upto length(w) - 1> | w(i - 1) <= w(i)) )", ["RCL417"]),
+        ("assume( forall(i, j in indices(w) | i < j -> w(i) <= w(j)) and (k > 1 -> w(k - 1) > 0) )", []),
         ("assume( b and r > 1 -> k > 2 )", ["RCL401"]),
         ("assume( b or r > 1 -> k > 2 )", ["RCL401"]),
         ("assume( b -> r > 1 or k > 2 )", []),  # the same either way

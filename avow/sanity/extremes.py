@@ -1,0 +1,119 @@
+"""The least and the greatest that a finite part of a sequence has: what witnesses of "the minimum of the scan" are.
+
+Of the positions that meet a guard with an upper bound there are finitely many. If there is one then there is one at
+which a number is least (greatest), and of these a first one. No first-order term says which; a constant with this as
+its axiom does, and with it the rest is about universally quantified positions only, which solvers decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Set
+from dataclasses import dataclass
+
+from avow.formulas.formula import free_variables, substitute
+from avow.formulas.traversal import subterms
+from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, RealSort
+from avow.language.terms import (
+    And,
+    Arithmetic,
+    Compare,
+    Implies,
+    In,
+    Negative,
+    Not,
+    Quantified,
+    Quantifier,
+    SequenceRange,
+    SequenceTerm,
+    Term,
+    Variable,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Extreme:
+    """`constant` is the first (last) of the positions that meet the guard at which `measure` is least (greatest)."""
+
+    constant: Variable
+    position: Variable
+    guard: Term
+    measure: Term
+    greatest: bool
+    last: bool
+
+    def axiom(self) -> Term:
+        """That it is, if some position meets the guard."""
+        at = {self.position: self.constant}
+        here = substitute(self.measure, at)
+        low, high = (self.measure, here) if self.greatest else (here, self.measure)
+        one, two = (self.constant, self.position) if self.last else (self.position, self.constant)
+        best = Implies(
+            self.guard, And((Compare("<=", low, high), Implies(Compare("<", one, two), Compare("<", low, high))))
+        )
+        some = Quantified(Quantifier.EXISTS, (self.position,), self.guard)
+        return Implies(some, And((substitute(self.guard, at), Quantified(Quantifier.FORALL, (self.position,), best))))
+
+    def exists(self, taken: Set[Variable]) -> bool:
+        """Whether there is such a position, whatever the inputs: it is chosen after what is `taken`, and finitely many
+        positions are to be chosen from."""
+        known = taken | free_variables(self.guard) | free_variables(self.measure)
+        return (
+            self.constant.sort == NATURAL
+            and self.constant not in known
+            and self.constant != self.position
+            and isinstance(self.measure.sort, RealSort | IntegerSort | NaturalSort)
+            and bounded(self.position, self.guard)
+        )
+
+
+def bounded(position: Variable, guard: Term) -> bool:
+    """Whether finitely many natural numbers at most meet a guard, by one of its parts."""
+    if position.sort != NATURAL:
+        return False
+    match guard:
+        case And(items=items):
+            return any(bounded(position, item) for item in items)
+        case (
+            Compare(operator="<" | "<=", left=left, right=bound) | Compare(operator=">" | ">=", left=bound, right=left)
+        ):
+            return left == position and position not in free_variables(bound)
+        case (
+            Not(body=Compare(operator=">" | ">=", left=left, right=bound))
+            | Not(body=Compare(operator="<" | "<=", left=bound, right=left))
+        ):
+            return left == position and position not in free_variables(bound)
+        case In(item=item, collection=SequenceRange() | SequenceTerm() as collection):
+            return item == position and position not in free_variables(collection)
+        case _:  # it may be so all the same
+            return False
+
+
+def measures(position: Variable, demand: Term, outputs: Set[Variable]) -> Iterator[tuple[Term, bool, bool]]:
+    """The numbers at a position with which a demand, whose negations are pushed in, compares an output, whether the
+    greatest one is decisive, and whether the last one is: a guess, which only suggests."""
+    parts = list(subterms(demand))
+    denied = {part.body for part in parts if isinstance(part, Not)}
+    found: list[tuple[Term, bool]] = []
+    for atom in parts:
+        match atom:
+            case Compare(operator="<" | "<=" | ">" | ">=" as operator, left=left, right=right):
+                if free_variables(atom) & outputs:
+                    less = (operator[0] == "<") != (atom in denied)
+                    found += [*_numbers(position, left, outputs, less), *_numbers(position, right, outputs, not less)]
+            case _:  # no order: no extreme decides
+                continue
+    last = (position, True) in found
+    yield from ((measure, greatest, last) for measure, greatest in dict.fromkeys(found))
+
+
+def _numbers(position: Variable, side: Term, outputs: Set[Variable], greatest: bool) -> Iterator[tuple[Term, bool]]:
+    """The largest terms in one that are numbers, know the position and no output."""
+    known = free_variables(side)
+    if position not in known:
+        return
+    if not known & outputs and isinstance(side.sort, RealSort | IntegerSort | NaturalSort):
+        yield side, greatest
+        return
+    flips = isinstance(side, Negative) or (isinstance(side, Arithmetic) and side.operator == "-")
+    for child in side.children:
+        yield from _numbers(position, child, outputs, greatest != (flips and child == side.children[-1]))
