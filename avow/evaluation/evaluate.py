@@ -51,10 +51,10 @@ def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
 
     A function's table must not be changed after it was given: an index of it may be kept.
     """
-    compiler = Compiler(domains or {}, _SEARCHES)
-    code = _guarded(lambda: compiler.code(rename_apart(term)))
-    fill = _filler(compiler)
-    return lambda valuation: _guarded(lambda: code(fill(valuation)))
+    compiler = Compiler(domains or {}, SEARCHES)
+    code = guarded(lambda: compiler.code(rename_apart(term)))
+    fill = filler(compiler)
+    return lambda valuation: guarded(lambda: code(fill(valuation)))
 
 
 def compile_counterexample(term: Term) -> Callable[[Mapping[str, Value]], dict[str, Value] | None]:
@@ -62,20 +62,20 @@ def compile_counterexample(term: Term) -> Callable[[Mapping[str, Value]], dict[s
 
     The result, and compiling, raise NotEvaluable. Other formulas have no bound variables to name: always None.
     """
-    compiler = Compiler({}, _SEARCHES)
+    compiler = Compiler({}, SEARCHES)
     if not isinstance(term, Quantified) or term.quantifier is not Quantifier.FORALL:
         return lambda valuation: None
-    apart = _guarded(lambda: rename_apart(term))
+    apart = guarded(lambda: rename_apart(term))
     assert isinstance(apart, Quantified)
-    search = _guarded(lambda: Search(compiler, apart.variables, apart.body, False))
-    names, fill = tuple(v.name for v in term.variables), _filler(compiler)
+    search = guarded(lambda: Search(compiler, apart.variables, apart.body, False))
+    names, fill = tuple(v.name for v in term.variables), filler(compiler)
 
     def find(valuation: Mapping[str, Value]) -> dict[str, Value] | None:
         for witness in search.witnesses(fill(valuation)):
             return dict(zip(names, witness, strict=True))
         return None
 
-    return lambda valuation: _guarded(lambda: find(valuation))
+    return lambda valuation: guarded(lambda: find(valuation))
 
 
 class _Searches:
@@ -95,10 +95,10 @@ class _Searches:
         return Plan(compiler, parts, variables, frozenset(), complete=False)
 
 
-_SEARCHES = _Searches()
+SEARCHES = _Searches()
 
 
-def _filler(compiler: Compiler) -> Callable[[Mapping[str, Value]], Env]:
+def filler(compiler: Compiler) -> Callable[[Mapping[str, Value]], Env]:
     names = tuple(compiler.free.items())
     size = compiler.size
 
@@ -114,7 +114,7 @@ def _filler(compiler: Compiler) -> Callable[[Mapping[str, Value]], Env]:
     return fill
 
 
-def _guarded(action: Callable[[], Any]) -> Any:
+def guarded(action: Callable[[], Any]) -> Any:
     try:
         return action()
     except RecursionError:
@@ -123,6 +123,6 @@ def _guarded(action: Callable[[], Any]) -> Any:
 
 def free_names(term: Term) -> frozenset[str]:
     """The qualified names that a valuation must hold for the term."""
-    compiler = Compiler({}, _SEARCHES)
+    compiler = Compiler({}, SEARCHES)
     compiler.code(rename_apart(term))
     return frozenset(compiler.free)

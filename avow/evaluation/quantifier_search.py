@@ -10,13 +10,13 @@ that cannot treat it either, `NotEvaluable` says which variable it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
 from avow.evaluation.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.evaluation.patterns import pattern, patterns
+from avow.evaluation.table_rows import Lookup, Step, Unrestricted, rows
 from avow.evaluation.unrestricted_variables import leftover_steps
 from avow.formulas.renaming import bound_names
 from avow.language.operators import FLIPPED, OPPOSITE
@@ -35,27 +35,14 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import DISJUNCTION_DEPTH, ROWS_WITHOUT_INDEX, VALUES_ENUMERATED
+from avow.tuning.bounds import DISJUNCTION_DEPTH, VALUES_ENUMERATED
 
 Doubt = NotEvaluable | None
 """What comes with a candidate: None where it surely satisfies the body, else why that could not be found out."""
 
 
-class Unrestricted(NotEvaluable):
-    """Met at run time: a table's default makes infinitely many points satisfy a part."""
-
-
 class Incomplete(NotEvaluable):
     """Candidates could not all be enumerated; those that were are not all there are."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """Binds `binds` to each value that can satisfy one part; lower ranks yield fewer candidates."""
-
-    rank: int
-    binds: frozenset[str]
-    run: Callable[[Env], Iterable[object]]
 
 
 class Search:
@@ -117,12 +104,21 @@ class Search:
             if unrestricted:
                 yield from self._without_tables(at).solutions(env)
 
+    def all(self, env: Env) -> dict[tuple[Any, ...], None]:
+        """All assignments, each once; of values that nothing names, one stands for the others. Raises NotEvaluable."""
+        found: dict[tuple[Any, ...], None] = {}
+        for reason in self._solutions(env):
+            if reason is not None:
+                raise reason
+            found[tuple([env[s] for s in self._slots])] = None
+        return found
+
     def _without_tables(self, at: int) -> Plan:
         """For values of functions under which no table restricts anything."""
         if at not in self._fallbacks:
             parts, variables = self._branches[at]
             self._fallbacks[at] = Plan(
-                self._compiler, parts, variables, frozenset(), complete=True, unique=self._unique, restrict=False
+                self._compiler, parts, variables, frozenset(), complete=True, unique=self._unique, tables=False
             )
         return self._fallbacks[at]
 
@@ -151,14 +147,14 @@ class Plan:
         *,
         complete: bool,
         unique: bool = False,
-        restrict: bool = True,
+        tables: bool = True,
         depth: int = 0,
     ) -> None:
         """`complete`: bind every variable, else only those that parts restrict. `unique`: bind also variables that no
-        part mentions, since it matters how many values they have. `restrict`: look for parts that do."""
+        part mentions, since it matters how many values they have. `tables`: functions' tables restrict variables."""
         self._compiler = compiler
         self._depth = depth
-        self._restricts = restrict
+        self._tables = tables
         self._true = true_defaults
         by_name = {v.name: v for v in variables}
         mentioned = frozenset[str]().union(*(p.names for p in parts))
@@ -221,7 +217,7 @@ class Plan:
 
     def _restriction(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, Variable]) -> Step | None:
         found: list[Step] = []
-        for part in pending if self._restricts else ():
+        for part in pending:
             step = self._restrict(part, unbound)
             if step is not None:
                 if step.rank == 0:
@@ -246,14 +242,15 @@ class Plan:
         match term:
             case Quantified(quantifier=Quantifier.UNIQUE) if positive:
                 return self._cover(((term.body, True),), unbound, term.variables)
-            case Apply(sort=BoolSort()) if not bound_names(term.function):
+            case Apply(sort=BoolSort()) if self._tables and not bound_names(term.function):
                 return self._points(term, positive, unbound)
             case Compare(operator=operator) if operator == ("==" if positive else "!="):
-                return self._equation(term.left, term.right, unbound) or self._equation(term.right, term.left, unbound)
+                found = self._equation(term.left, term.right, unbound) or self._equation(term.right, term.left, unbound)
             case In() if positive:
-                return self._membership(term, unbound)
-            case _:  # restricts no variable to finitely many values
-                return None
+                found = self._membership(term, unbound)
+            case _:  # only by what functions have elsewhere
+                found = None
+        return found or (rows(self._compiler, part, unbound) if self._tables else None)
 
     def _cover(
         self, options: Sequence[tuple[Term, bool]], unbound: set[str], variables: Sequence[Variable] = ()
@@ -269,7 +266,9 @@ class Plan:
                 self._compiler.bind(variable)
             wanted = [Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
             wanted += occurring(parts, unbound)
-            plan = Plan(self._compiler, parts, wanted, self._true, complete=False, depth=self._depth + 1)
+            plan = Plan(
+                self._compiler, parts, wanted, self._true, complete=False, tables=self._tables, depth=self._depth + 1
+            )
             common &= plan.bound
             plans.append(plan)
         if not common:
@@ -300,7 +299,7 @@ class Plan:
             return None
         match, function = matching, self._compiler.code(term.function)
         known = tuple(k for k, a in enumerate(term.arguments) if not bound_names(a) & unbound)
-        lookup = _Lookup(known, tuple(self._compiler.code(term.arguments[k]) for k in known))
+        lookup = Lookup(known, tuple(self._compiler.code(term.arguments[k]) for k in known))
 
         def run(env: Env) -> Iterator[None]:
             value = function(env)
@@ -327,7 +326,7 @@ class Plan:
                     yield None
 
             return Step(0, frozenset(unbound - free), once)
-        if isinstance(right, Apply) and not bound_names(right.function):
+        if self._tables and isinstance(right, Apply) and not bound_names(right.function):
             return self._preimage(right, known, unbound)
         return None
 
@@ -415,29 +414,6 @@ class Plan:
                 yield None
 
         return Step(3, frozenset((variable.name,)), run)
-
-
-class _Lookup:
-    """The points of a table that agree with the arguments already known: by an index, where that pays.
-
-    The index of the last table is kept: a map stays the same from one evaluation to the next. Tables do not change.
-    """
-
-    def __init__(self, known: tuple[int, ...], codes: tuple[Code, ...]) -> None:
-        self._known = known
-        self._codes = codes
-        self._table: Any = None
-        self._index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
-
-    def rows(self, table: Mapping[Any, Any], env: Env) -> Iterable[tuple[Any, Any]]:
-        if not self._known or len(table) <= ROWS_WITHOUT_INDEX:
-            return list(table.items())
-        if table is not self._table:
-            index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
-            for key, value in table.items():
-                index.setdefault(tuple([key[k] for k in self._known]), []).append((key, value))
-            self._table, self._index = table, index
-        return self._index.get(tuple([code(env) for code in self._codes]), ())
 
 
 def _integers(low: int, high: int) -> range:

@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from avow.evaluation.evaluate import NotEvaluable, compile_term
-from avow.formulas.values import Value
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.evaluation.tables import compile_table
+from avow.formulas.values import FunctionValue, Value
 from avow.temporal.cell import Cell
+from avow.tuning.bounds import INSTANCES
 
 
 class Keeper:
     """The cells of some formulas over a run, of which only the last step is kept. A value that cannot be had (by a
-    division by zero, say) is none for whatever reads it later. Raises NotEvaluable where a cell keeps something for
-    each of infinitely many values."""
+    division by zero, say) is none for whatever reads it later; neither is a table with more than so many `instances`.
+    Raises NotEvaluable."""
 
-    def __init__(self, cells: Sequence[Cell]) -> None:
-        for cell in cells:
-            if cell.parameters:
-                raise NotEvaluable(f"something is remembered for each value of {cell.parameters[0].name}")
-        self._cells = {cell.before.qualified: compile_term(cell.now) for cell in cells}
+    def __init__(self, cells: Sequence[Cell], instances: int = INSTANCES) -> None:
+        self._cells = {
+            cell.before.qualified: compile_table(cell.now, cell.parameters, instances)
+            if cell.parameters
+            else _plain(compile_term(cell.now))
+            for cell in cells
+        }
         self._initial = {
-            cell.before.qualified: compile_term(cell.initial)({}) for cell in cells if cell.initial is not None
+            cell.before.qualified: FunctionValue({}, value) if cell.parameters else value
+            for cell in cells
+            if cell.initial is not None
+            for value in (compile_term(cell.initial)({}),)
         }
         self.memory: Mapping[str, Value] = {}
         """The value of each cell that has one, by the name of its variable."""
+        self.why = ""
+        """Why a cell had no value, the first time."""
         self.restart()
 
     def restart(self) -> None:
@@ -39,7 +48,11 @@ class Keeper:
         valuation, left = self.at(ports), dict[str, Value]()
         for name, now in self._cells.items():
             try:
-                left[name] = now(valuation)
-            except NotEvaluable:
-                continue
+                left[name] = now(valuation, self.memory.get(name))
+            except NotEvaluable as error:
+                self.why = self.why or error.reason
         self.memory = left
+
+
+def _plain(now: Evaluator) -> Callable[[Mapping[str, Value], Value | None], Value]:
+    return lambda valuation, before: now(valuation)

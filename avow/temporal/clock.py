@@ -23,6 +23,7 @@ from avow.language.terms import (
     RESPONSES,
     TRUE,
     And,
+    Apply,
     Arithmetic,
     Builtin,
     Compare,
@@ -159,8 +160,12 @@ class Timed(Records):
 
     def instants(self, formula: Lasting) -> tuple[Mapping[Side, Term], tuple[Term, ...]]:
         """Of a formula in the silence after a step, over what that has left: its values so many seconds (`ELAPSED`)
-        after the step, and when it may change."""
-        return {side: formula.silent(Instant(ELAPSED, side)) for side in Side}, _closed(formula)
+        after the step, and when it may change: for each value of a quantified variable, which is then only an argument
+        of what is remembered. Raises Unsaid."""
+        for at in formula.breaks:
+            if any(v.role is Role.BOUND for v in free_variables(_unapplied(at))):
+                raise Unsaid("limits in seconds that hang on a quantified variable")
+        return {side: formula.silent(Instant(ELAPSED, side)) for side in Side}, formula.breaks
 
     def throughout(self, formula: Lasting) -> Term:
         """That a formula is true all through the silence before a step. Raises Unsaid."""
@@ -379,6 +384,13 @@ def _closed(formula: Lasting) -> tuple[Term, ...]:
         if any(v.role is Role.BOUND and v not in own for v in free_variables(at)):
             raise Unsaid("limits in seconds under a quantifier, inside another")
     return formula.breaks
+
+
+def _unapplied(term: Term) -> Term:
+    """The term without what functions that have kept something are given."""
+    if isinstance(term, Apply) and isinstance(term.function, Variable) and term.function.name.find(CELL) >= 0:
+        return term.function
+    return term.rebuild(tuple(map(_unapplied, term.children))) if term.children else term
 
 
 def _sorted(breaks: tuple[Term, ...]) -> tuple[Term, ...]:

@@ -66,11 +66,15 @@ def _demanded(trigger: Term, response: History) -> Term:
 
 
 def pending(formula: Term) -> Term | None:
-    """When a clause that is a response demands something of steps to come, as a formula of the past; None where it is
-    no response, or one that no first steps can break."""
-    if (found := _response(_unquantified(formula))) is None:
+    """When a clause that is a response demands something of steps to come (of any values of its quantified variables),
+    as a formula of the past; None where it is no response, or one that no first steps can break."""
+    if (found := responding(formula)) is None:
         return None
-    trigger, response = conjunction(found[0]), found[1]
+    waits = _waits(conjunction(found[1]), found[2])
+    return None if waits is None else _somewhere(found[0], waits)
+
+
+def _waits(trigger: Term, response: History) -> Term | None:
     match response.operator:
         case Past.NEXT:
             return trigger
@@ -126,17 +130,17 @@ def responding(formula: Term) -> tuple[tuple[Variable, ...], tuple[Term, ...], H
 
 
 def fulfilled(formula: Term) -> Term | None:
-    """When a clause ``T -> within[…](R)`` is met, as a formula of the past; None of other clauses."""
-    found = _response(_unquantified(formula))
-    if found is None or found[1].operator is not Past.WITHIN:
+    """When a clause ``T -> within[…](R)`` is met (of any values of its quantified variables), as a formula of the past;
+    None of other clauses."""
+    found = responding(formula)
+    if found is None or found[2].operator is not Past.WITHIN:
         return None
-    trigger, wanted = conjunction(found[0]), found[1].arguments[0]
+    trigger, wanted = conjunction(found[1]), found[2].arguments[0]
     unmet = negation(wanted)
     waiting = History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL)
-    return conjunction((wanted, disjunction((trigger, History(Past.PREVIOUS, (waiting, FALSE), BOOL)))))
+    met = conjunction((wanted, disjunction((trigger, History(Past.PREVIOUS, (waiting, FALSE), BOOL)))))
+    return _somewhere(found[0], met)
 
 
-def _unquantified(formula: Term) -> Term:
-    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
-        formula = formula.body
-    return formula
+def _somewhere(outer: tuple[Variable, ...], formula: Term) -> Term:
+    return Quantified(Quantifier.EXISTS, outer, formula) if outer else formula

@@ -201,3 +201,10 @@ LIMITS_NESTED = 2
 
 CLOCKED_SIZE = 1_500
 """Operators of what is made of a clause with limits in seconds, at most: what people write has some fifty."""
+
+INSTANCES = 1_000
+"""Values of a quantified variable for which something is remembered along a run: each step looks at all of them."""
+
+TABLE_ROUNDS = 4
+"""Rounds in which a remembered function is made exact: the first finds its points, the second that there are no others;
+where values elsewhere differ, no number of rounds is enough."""

@@ -89,7 +89,7 @@ class Monitor:
         if answers is not None and answers.by != "arrival":
             self.pairing = Pairing(answers)
         elif remembers(self.setup.node):
-            self._so_far = SoFar()
+            self._so_far = SoFar(self.setup.leeway.jitter)
         wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
         for clause in node.clauses:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NoReturn
 
@@ -22,16 +22,17 @@ from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.terms import Literal, Quantified, Role, Term, Variable, histories, timed
-from avow.temporal.ages import CLOCK, ELAPSED, Side
+from avow.temporal.ages import CLOCK
 from avow.temporal.cell import CELL, Cell, Unsaid
 from avow.temporal.clock import Timed, is_arrival, longest_limit
 from avow.temporal.responses import due, fulfilled, in_the_past, pending
 
 from .coverage import Tally
 from .options import Setup
+from .pace import Leeway
 from .pairing import time_of
 from .rules import Choice, Fields, Previous
-from .tuning import GRACE, JITTER
+from .silence import Silence, moments
 from .watched import Fault, Watched, trigger_of
 
 
@@ -54,53 +55,12 @@ class _Unknown:
 numbers.Rational.register(_Unknown)  # a Fraction of it asks for its numerator
 
 
-@dataclass(slots=True)
-class Silence:
-    """What a clause with limits in seconds is like between steps, and when its steps were."""
-
-    holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
-    """Whether it holds so many seconds (`ELAPSED`) after a step."""
-    breaks: tuple[Callable[[Mapping[str, Value]], Value], ...]
-    period: Fraction | None
-    """Of a clause that says that steps come every so many seconds."""
-    latest: Fraction | None = None
-    """When its latest step was."""
-    elapsed: Fraction = Fraction(0)
-    """The time from the latest step to the next, which is being judged."""
-    told: bool = False
-    """That it was broken since, has been told."""
-    spared: Fraction | None = None
-    """Where the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
-    arrived: set[str] = field(default_factory=set)
-    """The inputs of which a message came since."""
-
-    def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
-        """How long after the latest step silence breaks the clause; None where it never does. Raises NotEvaluable."""
-
-        def at(side: Side, elapsed: Fraction) -> bool:
-            return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
-
-        if not at(Side.AFTER, Fraction(0)):
-            return Fraction(0)
-        times = {Fraction(t) for each in self.breaks if isinstance(t := each(memory), int | Fraction)}
-        for time in sorted(t for t in times if t > 0):
-            if not at(Side.AT, time) or not at(Side.AFTER, time):
-                return time
-        return None
-
-    def passed(self, now: Fraction) -> None:
-        """A step comes."""
-        self.elapsed = max(now - self.latest, Fraction(0)) if self.latest is not None else Fraction(0)
-        if self.period is not None and abs(self.elapsed - self.period) <= JITTER:
-            self.elapsed = self.period
-
-
 class Memory:
     """What one clause remembers."""
 
     def __init__(
         self, cells: tuple[Cell, ...], formula: Term, waiting: Term | None, silence: Silence | None,
-        arrivals: tuple[Variable, ...],
+        arrivals: tuple[Variable, ...], leeway: Leeway,
     ) -> None:  # fmt: skip
         self.formula = formula
         """The clause as a formula of one step."""
@@ -116,16 +76,25 @@ class Memory:
         """Its steps are answers of the node."""
         self.stepped = 0
         """The event of its latest step."""
+        self.judged: Mapping[str, Value] = {}
+        """The valuation of that step."""
         self.silence = silence
         self._arrivals = {v.qualified: port_of(v) for v in arrivals}
         self._arrived = set[str]()
-        self._keeper = Keeper(cells)
+        self._keeper = Keeper(cells, leeway.instances)
+        self._leeway = leeway
         self._waiting = None if waiting is None else compile_term(waiting)
         self._cells = {cell.before.qualified for cell in cells}
         whole = not any(_quantified(term) for term in (formula, *(cell.now for cell in cells)))
         plain = (BOOL, INTEGER, NATURAL, REAL)
         self._open = {c.before.qualified for c in cells if c.sort in plain} if whole else set[str]()
         """What may be unknown in a formula that is evaluated: where it does not matter, the formula is decided."""
+
+    @property
+    def unknown(self) -> str:
+        """Why something of what it remembers has no value; empty where all has one."""
+        missing = self._cells - self._keeper.memory.keys()
+        return (self._keeper.why or "what the steps before have left is not known") if missing else ""
 
     def known(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """A step's valuation, of what is known."""
@@ -156,7 +125,7 @@ class Memory:
         if silence is None or silence.told or silence.latest is None or self.lost:
             return None
         deadline = self.deadline
-        if deadline is None or now <= deadline + GRACE:
+        if deadline is None or now <= deadline + self._leeway.grace:
             return None
         silence.told = True
         return deadline
@@ -179,7 +148,11 @@ class Memory:
         if silence is None:
             return
         silence.passed(now)
-        if (deadline := self.deadline) is not None and silence.latest is not None and now <= deadline + GRACE:
+        if (
+            (deadline := self.deadline) is not None
+            and silence.latest is not None
+            and now <= deadline + self._leeway.grace
+        ):
             allowed = deadline - silence.latest
             if silence.elapsed > allowed:
                 silence.spared, silence.elapsed = silence.elapsed, allowed
@@ -202,7 +175,7 @@ class Memory:
     def advance(self, values: Mapping[str, Value], event: int) -> None:
         """The step is over."""
         self.stepped = event
-        valuation = self.at(values)
+        self.judged = valuation = self.at(values)
         if self._waiting is not None:
             try:
                 self.open = bool(self._waiting(valuation))
@@ -222,7 +195,7 @@ class Memory:
         if self.silence is not None and self.silence.spared is not None:
             self.silence.elapsed, self.silence.spared = self.silence.spared, None
             if truth and watched.clause.kind is ClauseKind.GUARANTEE:
-                truth, watched.tally.reason = None, watched.tally.reason or LATE
+                truth, watched.tally.reason = None, watched.tally.reason or self._leeway.late
         if supposed:
             self.stepped = event
             self.forget()
@@ -237,7 +210,6 @@ class Memory:
         self._keeper.memory = {}
 
 
-LATE = f"an answer came after its deadline, by at most {GRACE * 1000} ms: it may have been on its way"
 UNSURE = "it is not known whether the assumptions have held so far"
 
 
@@ -245,6 +217,8 @@ UNSURE = "it is not known whether the assumptions have held so far"
 class SoFar:
     """Whether the assumptions of a node that remembers have held so far: it promises nothing once one was broken."""
 
+    jitter: Fraction
+    """By which a clock may go back."""
     broken: str = ""
     unsure: bool = False
     """A message of an assumption was not seen, or nobody could tell whether one held."""
@@ -254,7 +228,7 @@ class SoFar:
     def hears(self, now: Fraction, timed: Sequence[Watched]) -> None:
         """A message has come. Where times go back further than a clock does, a run begins anew for all clauses at once:
         were it for each at its own next step, an assumption broken between would be forgotten."""
-        if self.newest is not None and now < self.newest - JITTER:
+        if self.newest is not None and now < self.newest - self.jitter:
             self.broken, self.unsure, self.newest = "", False, now
             for watched in timed:
                 assert watched.steps is not None
@@ -309,9 +283,10 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
                 holds, breaks = records.instants(positions)
                 formula = positions.now
                 compiled = {side: compile_term(held) for side, held in holds.items()}
+                moved = tuple(map(moments, breaks))
                 period = clause.pace.amount if clause.pace is not None and clause.pace.relation == "==" else None
                 every = Fraction(period.value) if isinstance(period, Literal) else None
-                silence = Silence(compiled, tuple(map(compile_term, breaks)), every)
+                silence = Silence(compiled, moved, every, setup.leeway)
             else:
                 formula = records.clause(formula)
             trigger = fulfilled(clause.formula) or trigger_of(in_the_past(clause.formula))
@@ -322,9 +297,9 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
             raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
         read = {v for term in (formula, *(c.now for c in records.cells)) for v in free_variables(term)}
         arrivals = tuple(v for v in read if is_arrival(v))
-        steps = Memory(tuple(records.cells), formula, waiting, silence, arrivals)
+        steps = Memory(tuple(records.cells), formula, waiting, silence, arrivals, setup.leeway)
         steps.every = in_time and (bool(arrivals) or _answers_inputs(clause.formula))
-        names = {n for cell in records.cells for n in free_names(cell.now)}
+        names = {n for c in records.cells for n in free_names(c.now) - {p.name for p in c.parameters}}
         names |= free_names(waiting) if waiting is not None else set()
         names |= free_names(trigger) if trigger is not None else set()
         names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}

@@ -31,7 +31,7 @@ from .bags import Event, Origin, carried, is_bag
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
-from .pace import Rate
+from .pace import Leeway, Rate
 from .pairing import Answers
 from .reading import from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule
@@ -68,6 +68,7 @@ class Setup:
     """How many messages may have been lost; None: however many."""
     filtered: frozenset[str] = frozenset()
     """The topics (without their leading slash) whose messages a filter passes on only while nothing is broken."""
+    leeway: Leeway = field(default_factory=Leeway)
     shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     """Each output whose topic other nodes publish too: this node, and all of them, by their whole names."""
 
@@ -128,6 +129,7 @@ def setup(
         work.duration("max_age", data["max_age"]) if "max_age" in data else None,
         data.get("losses"),
         filtered,
+        work.leeway(data),
         work.shared,
     )
     return made, tuple(work.faults)
@@ -229,6 +231,14 @@ class _Work:
             observing.path(str(entry["output"])) if "output" in entry else usual,
             self.duration("answers.latency", entry.get("latency", "0 s")),
             self.duration("answers.jitter", entry.get("jitter", "0 s")),
+        )
+
+    def leeway(self, data: Mapping[str, Any]) -> Leeway:
+        own = Leeway()
+        return Leeway(
+            self.duration("grace", data["grace"]) if "grace" in data else own.grace,
+            self.duration("jitter", data["jitter"]) if "jitter" in data else own.jitter,
+            data.get("instances", own.instances),
         )
 
     def fresh(self, entry: Any) -> dict[str, Fraction]:

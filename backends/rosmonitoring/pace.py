@@ -10,9 +10,28 @@ from fractions import Fraction
 from typing import Any
 
 from avow.formulas.values import show
+from avow.tuning.bounds import INSTANCES
 
 from .pairing import time_of
-from .tuning import RATE_MESSAGES
+from .tuning import GRACE, JITTER, RATE_MESSAGES
+
+
+@dataclass(frozen=True, slots=True)
+class Leeway:
+    """What a monitor allows clocks and memory, where the plan says no other."""
+
+    grace: Fraction = GRACE
+    """Seconds after a deadline until silence is told."""
+    jitter: Fraction = JITTER
+    """Seconds by which times may go back, and regular steps come early or late."""
+    instances: int = INSTANCES
+    """Values of a quantified variable for which something is remembered."""
+
+    @property
+    def late(self) -> str:
+        """What is said of an answer that came within the grace."""
+        by = f"{float(self.grace * 1000):g} ms"
+        return f"an answer came after its deadline, by at most {by}: it may have been on its way"
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,6 +135,17 @@ SCHEMA: dict[str, Any] = {
             },
             "description": "what monitors cost the running robot, as it was measured: shown with the evidence",
         },
+        "grace": {**_DURATION, "description": "how long after a deadline silence is told (default 50 ms)"},
+        "jitter": {
+            **_DURATION,
+            "description": "by how much times may go back, and regular steps come early or late (default 10 ms)",
+        },
+        "instances": {
+            "type": "integer",
+            "minimum": 1,
+            "maximum": 100_000,
+            "description": "values of a quantified variable for which something is remembered (default 1000)",
+        },
         "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
         "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},
         "warning": {"type": "integer", "minimum": 0, "description": "the ROS monitor's warning level (default 1)"},

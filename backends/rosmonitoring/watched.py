@@ -97,7 +97,7 @@ class Watched:
             known = values if self.steps is None else self.steps.known(values)
             answer = judge(self.clause.formula, known, effort=JUDGE_EFFORT) if solver else None
             if answer is None and not self.tally.reason:
-                self.tally.reason = error.reason
+                self.tally.reason = (self.steps.unknown if self.steps is not None else "") or error.reason
             return answer
 
     def triggered(self, values: Mapping[str, Value]) -> bool:
@@ -156,7 +156,8 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
     bindings: dict[str, Value] = {}
     try:
         if snapshot.keys() >= set(watched.names):
-            bindings = watched.witness(snapshot) or {}
+            known = snapshot if watched.steps is None else watched.steps.judged
+            bindings = watched.witness(known) or {}
     except NotEvaluable:
         pass
     values = tuple((n, shorten(show(snapshot[n]))) for n in watched.names if n in snapshot)

@@ -259,7 +259,6 @@ def test_a_step_that_is_not_judged_is_not_forgotten(
     ("clause", "said", "options"),
     [
         ("guarantee g ( in.a -> eventually(out.b) )", "`eventually`", {}),
-        ("guarantee g ( forall(k in NATURAL | once(in.n == k) -> k >= 0 or out.b) )", "remembered for each value", {}),
         ("guarantee g ( once(in.a) -> out.b )", "by: arrival", {"answers": {"by": "stamp"}}),
     ],
 )

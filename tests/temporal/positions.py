@@ -7,10 +7,12 @@ from typing import Any
 
 from avow.language.terms import (
     And,
+    Apply,
     Compare,
     History,
     Iff,
     Implies,
+    In,
     Literal,
     Not,
     Or,
@@ -38,6 +40,10 @@ def value(term: Term, run: Sequence[Step], k: int) -> Any:
             return literal
         case Variable():
             return now[term.qualified]
+        case Apply(function=function, arguments=arguments):
+            return value(function, run, k)(*(value(a, run, k) for a in arguments))
+        case In(item=item, collection=collection):
+            return value(item, run, k) in value(collection, run, k).items
         case Not(body=body):
             return not value(body, run, k)
         case And(items=items):

@@ -1,0 +1,102 @@
+"""The points of functions' tables: where a part holds at none of the values that functions have elsewhere, only they
+are left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
+from avow.evaluation.disjunctions import Part
+from avow.evaluation.patterns import Match, patterns
+from avow.formulas.formula import digest
+from avow.formulas.renaming import bound_names
+from avow.language.terms import Apply, Not, Quantified, Role, Term, Variable
+from avow.tuning.bounds import ROWS_WITHOUT_INDEX
+
+
+class Unrestricted(NotEvaluable):
+    """Met at run time: a table's default makes infinitely many points satisfy a part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Binds `binds` to each value that can satisfy one part; lower ranks yield fewer candidates."""
+
+    rank: int
+    binds: frozenset[str]
+    run: Callable[[Env], Iterable[object]]
+
+
+class Lookup:
+    """The points of a table that agree with the arguments already known: by an index, where that pays.
+
+    The index of the last table is kept: a map stays the same from one evaluation to the next. Tables do not change.
+    """
+
+    def __init__(self, known: tuple[int, ...], codes: tuple[Code, ...]) -> None:
+        self._known = known
+        self._codes = codes
+        self._table: Any = None
+        self._index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
+
+    def rows(self, table: Mapping[Any, Any], env: Env) -> Iterable[tuple[Any, Any]]:
+        if not self._known or len(table) <= ROWS_WITHOUT_INDEX:
+            return list(table.items())
+        if table is not self._table:
+            index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
+            for key, value in table.items():
+                index.setdefault(tuple([key[k] for k in self._known]), []).append((key, value))
+            self._table, self._index = table, index
+        return self._index.get(tuple([code(env) for code in self._codes]), ())
+
+
+def rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None:
+    """Of a part in which the variables are arguments of functions only: at a point of one of these, it can hold."""
+    elsewhere: dict[Term, Variable] = {}
+    term = _elsewhere(part.term, unbound, elsewhere)
+    if not elsewhere or bound_names(term) & unbound:
+        return None
+    tables: list[tuple[Code, Match]] = []
+    left: set[str] | None = None
+    for apply in elsewhere:
+        assert isinstance(apply, Apply)
+        free = set(unbound)
+        match = patterns(compiler, apply.arguments, free)
+        if match is None or (left is not None and free != left):
+            return None
+        left = free
+        tables.append((compiler.code(apply.function), match))
+    if left is None or left == unbound:
+        return None
+    slots = tuple(compiler.bind(variable) for variable in elsewhere.values())
+    truth = compiler.code(term if part.positive else Not(term))
+
+    def run(env: Env) -> Iterator[None]:
+        found = [(function(env), match) for function, match in tables]
+        away = [*env, *[None] * (compiler.size - len(env))]  # a plan may be made when the environment has been
+        for slot, (value, _) in zip(slots, found, strict=True):
+            away[slot] = value.default
+        try:
+            if truth(away):
+                raise Unrestricted("functions have such values at infinitely many points")
+        except NotEvaluable as reason:
+            raise Unrestricted(reason.reason) from None
+        for value, match in found:
+            for key in list(value.table):
+                if match(env, key):
+                    yield None
+
+    return Step(2, frozenset(unbound - left), run)
+
+
+def _elsewhere(term: Term, unbound: set[str], found: dict[Term, Variable]) -> Term:
+    """The part with a variable for the value of each function that is given one of the variables."""
+    if isinstance(term, Quantified) or not bound_names(term) & unbound:
+        return term
+    if isinstance(term, Apply) and not bound_names(term.function):
+        if term not in found:
+            found[term] = Variable(Role.BOUND, f"elsewhere {digest(term)}", term.sort)
+        return found[term]
+    return term.rebuild(tuple(_elsewhere(child, unbound, found) for child in term.children))

@@ -1,0 +1,144 @@
+"""What is remembered for each value of a quantified variable, against the definitions over all steps of a run and all
+values up to a number that no step names."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.evaluation.running import Keeper
+from avow.formulas.values import FunctionValue, Sequence, Value
+from avow.language.load import check_text
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, NATURAL, FunctionSort, SequenceSort
+from avow.language.terms import Apply, Compare, In, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.temporal.cells import Records
+from avow.tuning.bounds import INSTANCES
+from temporal import positions, test_cells
+from temporal.positions import Step
+from temporal.test_cells import A, N, record
+
+K, L = (Variable(Role.BOUND, name, NATURAL) for name in "kl")
+F = Variable(Role.INPUT, "f", FunctionSort((NATURAL,), BOOL))
+G = Variable(Role.INPUT, "g", FunctionSort((NATURAL,), NATURAL))
+P = Variable(Role.INPUT, "p", FunctionSort((NATURAL, NATURAL), BOOL))
+S = Variable(Role.INPUT, "s", SequenceSort(NATURAL))
+NAMED, ALL = 4, 7
+"""Steps speak of numbers below the one; the definitions look at those below the other."""
+
+
+def atom(rng: random.Random, bound: tuple[Variable, ...]) -> Term:
+    i, j = rng.choice(bound), rng.choice(bound)
+    return rng.choice(
+        (
+            A,
+            Apply(F, (i,), BOOL),
+            Apply(F, (i,), BOOL),
+            Apply(P, (i, j), BOOL),
+            Compare(rng.choice(("==", "<=", ">")), Apply(G, (i,), NATURAL), N),
+            Compare("==", i, N),
+            In(i, S),
+        )
+    )
+
+
+def quantified(rng: random.Random, depth: int) -> Term:
+    bound = rng.choice(((K,), (K, L)))
+    variables = frozenset(bound)
+
+    def inside(depth: int) -> Term:
+        if depth == 0:
+            return atom(rng, bound)
+        return record(rng, lambda: inside(depth - 1)) if rng.random() < 0.7 else Not(inside(depth - 1))
+
+    kind = rng.choice((Quantifier.FORALL, Quantifier.EXISTS))
+    return Quantified(kind, tuple(v for v in bound if v in variables), inside(depth))
+
+
+def run_of(rng: random.Random, length: int = 6) -> list[Step]:
+    def some() -> list[int]:
+        return [n for n in range(NAMED) if rng.random() < 0.5]
+
+    def step() -> Step:
+        pairs = {(n, m): True for n in some() for m in some() if rng.random() < 0.5}
+        return {
+            "in.a": rng.random() < 0.5,
+            "out.b": rng.random() < 0.5,
+            "in.n": rng.randrange(NAMED),
+            "in.f": FunctionValue({(n,): True for n in some()}, False),
+            "in.g": FunctionValue({(n,): rng.randrange(NAMED) for n in some()}, 0),
+            "in.p": FunctionValue(pairs, False),
+            "in.s": Sequence(tuple(some())),
+        }
+
+    return [step() for _ in range(length)]
+
+
+def by_definition(term: Term, run: list[Step], k: int) -> bool:
+    assert isinstance(term, Quantified)
+    over = all if term.quantifier is Quantifier.FORALL else any
+    name, rest = term.variables[0].name, term.variables[1:]
+    inside: Callable[[list[Step]], bool] = lambda steps: (  # noqa: E731
+        by_definition(Quantified(term.quantifier, rest, term.body), steps, k)
+        if rest
+        else bool(positions.value(term.body, steps, k))
+    )
+    return over(inside([{**step, name: n} for step in run]) for n in range(ALL))
+
+
+def agreed(rng: random.Random) -> bool | str:
+    """Whether tables and definition say the same at each step, or a formula of which they do not; False where the
+    tables say nothing."""
+    term, run = quantified(rng, rng.randrange(1, 3)), run_of(rng)
+    try:
+        found = test_cells.judged(term, run)
+    except NotEvaluable:
+        return False
+    return found == [by_definition(term, run, k) for k in range(len(run))] or show_term(term, "rcl")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tables_are_what_the_definitions_say(seed: int) -> None:
+    rng = random.Random(seed)
+    found = [agreed(rng) for _ in range(60)]
+    assert [each for each in found if isinstance(each, str)] == []
+    assert found.count(True) > 50
+
+
+def said(clause: str, ports: str = "f : NATURAL --> BOOL, g : NATURAL --> REAL, s : <REAL>") -> Term:
+    text = f"node n {{ inputs( {ports} ) outputs( b : BOOL ) topics() guarantee( {clause} ) }}"
+    contract, found = check_text(text, "n.rcl")
+    assert contract is not None, found
+    return contract.nodes[0].guarantees[0].formula
+
+
+def test_each_item_of_an_array_has_its_own_past() -> None:
+    """An index that the array of the step before did not have, has no value before."""
+    near = said("forall(i in indices(in.s) | previous(in.s(i), in.s(i)) - 1 <= in.s(i) or in.s(i) == 0)")
+    run: list[Step] = [{"in.s": Sequence(tuple(items))} for items in ((5, 5), (5, 4), (4, 0), (1, 0), (1, 1))]
+    assert test_cells.judged(near, run) == [True, True, True, False, True]
+
+
+def test_more_values_than_are_kept_leave_it_undecided() -> None:
+    once = said("forall(i in NATURAL | once(f(i)) -> i != 3)")
+    records = Records()
+    now = records.clause(once)
+    keeper = Keeper(records.cells)
+    step: dict[str, Value] = {"in.f": FunctionValue({(4 + n,): True for n in range(INSTANCES)}, False)}
+    assert evaluate(now, keeper.at(step)) is True
+    keeper.advance(step)
+    assert len(next(iter(keeper.memory.values())).table) == INSTANCES  # type: ignore[union-attr]
+    keeper.advance({"in.f": FunctionValue({(3,): True}, False)})
+    with pytest.raises(NotEvaluable):
+        evaluate(now, keeper.at(step))
+
+
+def test_infinitely_many_values_that_differ_are_not_kept() -> None:
+    records = Records()
+    records.clause(said("forall(i in INTEGER | previous(i < x, FALSE) -> b)", "x : INTEGER"))
+    keeper = Keeper(records.cells)
+    keeper.advance({"in.x": 3, "out.b": True})
+    assert keeper.memory == {}
