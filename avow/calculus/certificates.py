@@ -193,7 +193,7 @@ class Certificates:
             goal.name,
             order,
             partial(_behind, into),
-            any(e.delayed for e in edges) or any(name in composition.frame.cells for name in nodes),
+            any(e.delayed for e in edges) or composition.frame.remembering(nodes),
             frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
             hints,
             frozenset(hopeless - hints.keys()),

@@ -112,8 +112,11 @@ class Composition:
         answers = self._answers.get(goal.name)
         return answers.settled if answers is not None else {}
 
-    def machine(self, seed: int = 0) -> Machine:
-        """The composed contracts as a transition system, made once. Raises CannotRun."""
+    def machine(self, seed: int = 0, of: str = "") -> Machine:
+        """The composed contracts as a transition system, made once; beside them what is remembered `of` a requirement.
+        Raises CannotRun."""
+        if of in self.frame.observed:
+            return Machine(world(self.frame), seed, of)
         if self._machine is None:
             self._machine = Machine(world(self.frame), seed)
         return self._machine
@@ -180,11 +183,13 @@ def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
     read, or a requirement of the whole system speaks of several nodes."""
     if any(e.delayed and {e.source.node, e.target.node} <= nodes for e in flat.graph.edges):
         return True
-    if len(nodes) > 1 and any(name in flat.cells for name in nodes):
+    if len(nodes) > 1 and flat.remembering(nodes):
         return True  # what was remembered is of one step
     contract = flat.system.contract
     if nodes != frozenset(flat.graph.nodes):
         return False
+    if len(nodes) > 1 and flat.observed:
+        return True
     formulas = (r for r in flat.system.plan.requirements if r.formula is not None)
     spoken = (ports_of(parse_state(r.formula or "", contract, r.formula_span)) for r in formulas)
     return any(len({v.name.partition(".")[0] for v in ports}) > 1 for ports in spoken)

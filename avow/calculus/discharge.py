@@ -151,7 +151,7 @@ class _Solver:
 
     def phases(self, condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
         """One question, or one about the first step and one about every later."""
-        remembering = any(name in self.frame.cells for name in self.selected)
+        remembering = self.frame.remembering(self.selected)
         return (Phase.INITIAL, Phase.LATER) if before or condition.delayed or remembering else (Phase.SAME_STEP,)
 
     def close(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
@@ -254,7 +254,7 @@ class _Solver:
                 if edge.delayed and edge.source.node in self.selected
             )
         )
-        remembering = any(name in self.frame.cells for name in self.selected)
+        remembering = self.frame.remembering(self.selected)
         everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier or remembering else ()
         first = before if condition.delayed else ()
         for attempt in ((near, first), (ancestors, first), (ancestors, earlier), (ancestors, everything)):

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused
 from avow.kernel.solvers import Said, Solvers
@@ -53,7 +54,7 @@ class Item:
         if self.claim.kind is Kind.ENVIRONMENT:
             return f"environment {self.claim.name}"
         if self.claim.kind is Kind.DEFINITION:
-            return f"memory {self.claim.node}.{self.claim.name}"
+            return f"memory {self.claim.called}"
         return f"{self.claim.node}.{self.claim.name}" if self.claim.node else self.claim.name
 
 
@@ -118,7 +119,7 @@ class Finder:
         own = set(self.nodes)
         found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Kind.ENVIRONMENT]
         for s in self.known.every:
-            if s.kind is Kind.DEFINITION and s.node in own:
+            if s.kind is Kind.DEFINITION and (s.node in own or self.remembered(s)):
                 found.append(Item(How.DEFINED, s))
             if s.node not in own or s.node not in self.known.assumptions:
                 continue
@@ -131,6 +132,10 @@ class Finder:
             elif s.kind is Kind.GUARANTEE:
                 found.append(Item(How.GUARANTEE, s))
         return found
+
+    def remembered(self, definition: Statement) -> bool:
+        """Whether it is what is remembered for one of the goals."""
+        return not definition.node and any(definition.name.startswith(f"{OBSERVED}{g.name}.") for g in self.goals)
 
     def established(self, ever: list[Item]) -> dict[Item, None]:
         """What can be shown, each from what comes before it at the same step and from anything of `ever` before."""
@@ -225,7 +230,7 @@ class Finder:
         if hint.depth > 1:
             return self.inductive(item, list(done), hint.depth)
         first = uses(hint.first)
-        marks = tuple(sorted(s.digest for s in self.initials() if f"{s.node}.{s.name}" in hint.initials))
+        marks = tuple(sorted(s.digest for s in self.initials() if s.called in hint.initials))
         return self.kept(item, ((first, marks),), step) if first is not None else None
 
     def same_step(self, item: Item, now: Sequence[Item]) -> _Proof | None:

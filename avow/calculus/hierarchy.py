@@ -20,11 +20,13 @@ from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, free_variables, substitute
-from avow.language.contract import Clause, ClauseKind, Node
+from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Role, Term, Variable
 from avow.system.folding import Face, Folded
+from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
+from avow.temporal.cell import CELL
 
 
 @dataclass(slots=True)
@@ -49,11 +51,33 @@ class Level(Frame):
     def environment(self, earlier: int = 0) -> dict[str, Term]:
         return self.flat.environment(earlier)
 
-    def memory(self, earlier: int = 0) -> dict[str, Term]:
-        return self.flat.memory(earlier)
+    def memory(self, earlier: int = 0, of: str = "") -> dict[str, Term]:
+        return self.flat.memory(earlier, of)
 
-    def blank(self) -> dict[str, Term]:
-        return self.flat.blank()
+    def blank(self, of: str = "") -> dict[str, Term]:
+        return self.flat.blank(of)
+
+    def remembering(self, nodes: Iterable[str]) -> bool:
+        return self.flat.remembering(self.leaves(nodes))
+
+    def behind(self, node: str, formula: Term) -> tuple[tuple[Variable, bool], ...]:
+        """What a node inside remembers is of ports of the subsystem, as it is seen from outside."""
+        face = self.faces.get(node)
+        if face is None:
+            return Frame.behind(self, node, formula)
+        ports = {value: variable for variable, value in self.mapping(node).items() if CELL not in variable.name}
+        found: dict[tuple[Variable, bool], None] = {}
+        for variable in ports_of(formula):
+            if CELL not in variable.name:
+                found[variable, False] = None
+                continue
+            at = self.meant(node, variable.name)
+            own = Variable(Role.INPUT, at.port, variable.sort)
+            for inner, _ in self.flat.behind(at.node, own):
+                value = self.flat.mapping(at.node).get(inner)
+                if value in ports:
+                    found[ports[value], True] = None
+        return tuple(found)
 
     def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
         return self.flat.initials(self.leaves(nodes))
@@ -65,8 +89,10 @@ class Level(Frame):
         return tuple(name for name in self.flat.graph.nodes if name in wanted)
 
     def meant(self, node: str, port: str) -> Endpoint:
-        """The port of a node inside that a subsystem's port stands for."""
+        """The port of a node inside that a subsystem's port stands for, or what that node remembers."""
         face = self.faces.get(node)
+        if face is not None and CELL in port:
+            return Endpoint(*port.split(".", 1))
         return face.ports[Endpoint(node, port)] if face is not None else Endpoint(node, port)
 
 
@@ -83,6 +109,7 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
         flat.constants,
         flat.cells,
         flat.shared,
+        flat.observed,
         nodes,
         flat=flat,
         faces=folded.faces,
@@ -90,13 +117,20 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
 
 
 def composed_node(frame: Frame, goal: Goal, face: Face) -> Node:
-    """The subsystem with its derived contract: clauses are called ``camera.sharp``, as the node inside calls them."""
+    """The subsystem with its derived contract: clauses are called ``camera.sharp``, as the node inside calls them; and
+    it reads what they remember (``camera.once#…``)."""
     flat = frame.flat if isinstance(frame, Level) else frame
-    ports: dict[Variable, Term] = {}
+    ports: dict[Variable, Variable] = {}
     for port in (*face.node.outputs, *face.node.inputs):
         at = face.ports[Endpoint(face.node.name, port.name)]
         find = flat.output if port.role is Role.OUTPUT else flat.input
         ports[find(at.node, at.port)] = port.variable
+    kept: list[Port] = []
+    for leaf, port in ((n, p) for n in flat.graph.nodes if n in face.inside for p in flat.node(n).inputs):
+        meant = flat.input(leaf, port.name)
+        if CELL in port.name and meant not in ports:
+            kept.append(Port(Role.INPUT, f"{leaf}.{port.name}", port.sort, port.type_name))
+            ports[meant] = kept[-1].variable
     clauses: dict[ClauseKind, list[Clause]] = {ClauseKind.ASSUMPTION: [], ClauseKind.GUARANTEE: []}
     guaranteed = (ClauseName(name, clause.name) for name in goal.nodes for clause in frame.node(name).guarantees)
     for kind, names in ((ClauseKind.ASSUMPTION, goal.root.assumed), (ClauseKind.GUARANTEE, guaranteed)):
@@ -107,6 +141,7 @@ def composed_node(frame: Frame, goal: Goal, face: Face) -> Node:
             clauses[kind].append(replace(original, kind=kind, name=str(name), position=number, formula=formula))
     return replace(
         face.node,
+        inputs=(*face.node.inputs, *kept),
         assumptions=tuple(clauses[ClauseKind.ASSUMPTION]),
         guarantees=tuple(clauses[ClauseKind.GUARANTEE]),
     )

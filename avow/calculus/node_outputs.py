@@ -29,7 +29,8 @@ from avow.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """A node to whose inputs no output answers. `genuine`: by its contract, not only among the scenario's values."""
+    """A node to whose inputs no output answers; without one, the environment, which can give nothing as it is assumed
+    to. `genuine`: by its contract, not only among the scenario's values."""
 
     node: str
     inputs: tuple[tuple[str, str], ...]
@@ -38,6 +39,8 @@ class Stuck:
 
     def text(self) -> str:
         given = ", ".join(f"{name} = {value}" for name, value in self.inputs)
+        if not self.node:
+            return f"no value of the scenario is as {', '.join(self.clauses)} has it"
         if not self.genuine:
             return f"no value of the scenario meets the guarantees of {self.node} at {given}"
         return f"no output of {self.node} meets {', '.join(self.clauses)} at {given}"

@@ -22,7 +22,7 @@ from avow.calculus.induction import deeper, steps
 from avow.calculus.model_checking import judge, refuting_run
 from avow.calculus.questions import Answer, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
-from avow.calculus.variables import Frame, system_term
+from avow.calculus.variables import Frame, Observed, system_term
 from avow.formulas.formula import digest, free_variables
 from avow.language.printer import show_term
 from avow.language.terms import Term
@@ -41,10 +41,15 @@ class FormulaQuestion:
     text: str
     digest: str
     support: tuple[str, ...]
+    unsaid: str = ""
+    """Why there is no formula of one step, where it speaks of others."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         """In short rounds first: what one way cannot show, at any length, another may in no time. A run over the plan's
         scenario that breaks the formula is looked for before anything takes long."""
+        if self.unsaid:
+            told = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
+            return Answer(Verdict.UNKNOWN, told)
         quick = min(QUICK_EFFORT, bounds.effort)
         answer = self.attempt(composition, replace(bounds, effort=quick))
         if answer.verdict is not Verdict.UNKNOWN:
@@ -67,7 +72,7 @@ class FormulaQuestion:
         if composition.frame.system.plan.scenario is None:
             return None, ""
         try:
-            machine = composition.machine(bounds.seed)
+            machine = composition.machine(bounds.seed, self.name)
         except CannotRun:
             return None, ""
         return refuting_run(machine, self.name, system_term(composition.frame, self.formula), bounds)
@@ -78,12 +83,13 @@ class FormulaQuestion:
         frame = composition.frame
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
         goal = system_term(frame, self.formula)
-        delayed = bool(frame.cells) or any(edge.delayed for edge in frame.graph.edges)
+        remembered = frame.memory(of=self.name)
+        delayed = bool(remembered) or any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
         for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
             if not clauses or (patient and delayed):
                 continue
-            last = self.ask(contracts(frame, clauses) | frame.environment() | frame.memory(), goal, bounds)
+            last = self.ask(contracts(frame, clauses) | frame.environment() | remembered, goal, bounds)
             if last.verdict is Verdict.PROVED:
                 return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
         if delayed:
@@ -99,7 +105,8 @@ class FormulaQuestion:
             return answer
         nodes = frame.graph.nodes
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
-        hypotheses = contracts(frame, everything) | frame.environment() | frame.memory() | dict(further or {})
+        hypotheses = contracts(frame, everything) | frame.environment() | frame.memory(of=self.name)
+        hypotheses |= dict(further or {})
         spoken = free_variables(goal)
         places = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
         places += environment(frame, nodes)
@@ -117,8 +124,8 @@ class FormulaQuestion:
         self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
     ) -> Answer:
         frame = composition.frame
-        now = contracts(frame, everything) | frame.environment() | frame.memory()
-        initial = frame.initials(frame.graph.nodes) | frame.blank()
+        now = contracts(frame, everything) | frame.environment() | frame.memory(of=self.name)
+        initial = frame.initials(frame.graph.nodes) | frame.blank(self.name)
         quick = replace(bounds, effort=min(QUICK_EFFORT, bounds.effort))
         first = self.ask(now | initial, goal, quick)
         if patient and first.verdict is Verdict.UNKNOWN:
@@ -126,7 +133,7 @@ class FormulaQuestion:
         if first.verdict is not Verdict.PROVED:
             return self.repaired(frame, goal, self.not_proved(first, "at the first step"), initial, Phase.INITIAL.value)
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
-        before = contracts(frame, everything, 1) | frame.environment(1) | frame.memory(1)
+        before = contracts(frame, everything, 1) | frame.environment(1) | frame.memory(1, self.name)
         later = first
         # Mostly it keeps itself; and the contracts of a step less make it quick.
         for earlier in (itself | before,) if patient else (itself, itself | before):
@@ -231,7 +238,9 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
         term = parse_state(requirement.formula, contract, requirement.formula_span)
         support = tuple(name for entry in requirement.supported_by for name in _expand(frame, entry))
         shown = show_term(system_term(frame, term))
-        return FormulaQuestion(requirement.id, term, shown, digest(term), tuple(dict.fromkeys(support)))
+        known = frame.observed.get(requirement.id, Observed(term))
+        named = tuple(dict.fromkeys(support))
+        return FormulaQuestion(requirement.id, known.formula, shown, digest(term), named, known.unsaid)
     if requirement.temporal is not None:
         formula = parse_property(requirement.temporal, contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))

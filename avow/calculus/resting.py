@@ -9,6 +9,7 @@ from avow.base.files import digest as sha256
 from avow.base.verdict import Hypothesis, HypothesisKind
 from avow.calculus.composition import Composition, argument
 from avow.calculus.questions import Answer
+from avow.calculus.variables import OBSERVED
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest
 from avow.kernel.certificate import How
@@ -95,8 +96,9 @@ class Resting:
     def together(self, nodes: Iterable[str], goal: str | None, *, optional: bool = False) -> tuple[Hypothesis, ...]:
         """Persistence and one output for each input, of a derivation over these nodes: the one in question, one for
         which the plan gives reasons, or any."""
-        wanted = frozenset(nodes)
-        composition = self.composition
+        wanted, composition = frozenset(nodes), self.composition
+        if any(name.startswith(OBSERVED) for name in wanted):
+            wanted = frozenset(composition.frame.graph.nodes)
         covering = [
             g
             for g in composition.goals

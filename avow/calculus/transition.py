@@ -20,7 +20,7 @@ from avow.calculus.node_outputs import Answerer, Doubts, Stuck, is_restricted, j
 from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term
-from avow.formulas.formula import substitute
+from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
@@ -69,9 +69,11 @@ class _Kept:
 class Machine:
     """The transition system of a composed system over its scenario. Raises CannotRun where it has none."""
 
-    def __init__(self, world: World, seed: int = 0) -> None:
+    def __init__(self, world: World, seed: int = 0, of: str = "") -> None:
         self.world = world
         self.frame = world.frame
+        self.of = of
+        """The requirement for which more is remembered than clauses say."""
         self.graph = world.frame.graph
         self.seed = seed
         self.doubts = Doubts()
@@ -86,10 +88,12 @@ class Machine:
         """What each node's inputs read."""
         self.incomplete.update(self._unspecified())
         self.constants: list[str] = []
+        self.cells = {called: self._kept(node, cell) for node, called, cell in self.frame.own_cells(of)}
+        """What each step leaves to the next of what clauses remember."""
+        self.supposed: dict[str, Holds] = {}
+        """What is assumed of the environment, of what is remembered too."""
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
-        self.cells = {f"{node}.{cell.name}": self._kept(node, cell) for node, cell in self.frame.own_cells()}
-        """What each step leaves to the next of what clauses remember."""
         self.freed = {node: f"{node}.broken{CELL}" for node in self.frame.cells}
         """Whether an assumption of a node that remembers has been broken: it promises nothing from then on."""
         self.remembered = (*self.constants, *map(str, self.memory), *self.cells, *self.freed.values())
@@ -159,12 +163,16 @@ class Machine:
                 self.constants.append(variable.qualified)
         if self.frame.timed:
             names[CLOCK.qualified] = self.world.lengths()
-        for name in self.frame.cells:
-            arrivals = (port.variable for port in self.frame.node(name).inputs if is_arrival(port.variable))
-            names.update((self.frame.input(name, v.name).qualified, (False, True)) for v in arrivals)
-        facts = [
-            judge(self.world, term, doubts=self.doubts, about=label) for label, term in self.frame.environment().items()
-        ]
+        arrivals = [(n, p.name) for n in self.frame.cells for p in self.frame.node(n).inputs if is_arrival(p.variable)]
+        arrivals += self.frame.observed[self.of].arrivals if self.of in self.frame.observed else ()
+        names.update((self.frame.input(name, event).qualified, (False, True)) for name, event in arrivals)
+        facts: list[Holds] = []
+        for label, term in self.frame.environment().items():
+            fact = judge(self.world, term, doubts=self.doubts, about=label)
+            if {v.name.removesuffix("@before") for v in free_variables(term)} & self.cells.keys():
+                self.supposed[label] = fact
+            else:
+                facts.append(fact)
         found: dict[tuple[object, ...], list[Values]] = {}
         for combination in product(*names.values()):
             values: Values = dict(zip(names, combination, strict=True))
@@ -247,8 +255,8 @@ class Machine:
     def _kept(self, node: str, cell: Cell) -> _Kept:
         """Raises CannotRun for what cannot be computed step by step."""
         if cell.parameters or cell.initial is None:
-            raise CannotRun(f"{node} remembers something for each of many values, or of an unspecified type")
-        now = compile_term(substitute(cell.now, self.frame.mapping(node)))
+            raise CannotRun(f"{node or self.of} remembers something for each of many values, or of an unspecified type")
+        now = compile_term(self.frame.placed(node, cell.now))
         return _Kept(compile_term(cell.initial)({}), now)
 
     def _remember(self, values: Values) -> tuple[object, ...]:
@@ -270,8 +278,15 @@ class Machine:
         return {f"{name}@before": values[name] for name in (*map(str, self.memory), *self.cells, *self.freed.values())}
 
     def _given(self, memory: tuple[object, ...]) -> tuple[Values, ...]:
-        """What the environment may give after a memory."""
-        return self._given_first.get(memory) or self.environment[memory[: len(self.constants)]]
+        """What the environment may give after a memory, with what that gives to the step; nothing where nothing is as
+        it is assumed to be."""
+        before = self._before(memory)
+        choices = self._given_first.get(memory) or self.environment[memory[: len(self.constants)]]
+        found = tuple(before | given for given in choices)
+        found = tuple(values for values in found if all(fact(values) for fact in self.supposed.values()))
+        if not found:
+            self.stuck.setdefault(memory, Stuck("", (), tuple(self.supposed), genuine=False))
+        return found
 
     def judge(self, formula: Term) -> Holds:
         """Whether a formula holds of a step, with quantifiers over the scenario's values. It raises Undecided."""
@@ -288,7 +303,9 @@ class Machine:
         steps: list[Step] = []
         seen: dict[tuple[object, ...], int] = {}
         for number in range(length):
-            values = self._before(memory) | random.choice(self._given(memory))
+            if not (choices := self._given(memory)):
+                return Walk(tuple(steps), self.stuck[memory])
+            values = random.choice(choices)
             broken: tuple[str, ...] = ()
             for name in self.order:
                 extended = self._extended(name, values, random)
@@ -326,9 +343,8 @@ class Machine:
                 yield Step(values, self._remember(values), step.broken)
 
     def _all_steps(self, memory: tuple[object, ...]) -> Iterator[Step]:
-        before = self._before(memory)
         for given in self._given(memory):
-            partial: list[tuple[Values, tuple[str, ...]]] = [({**before, **given}, ())]
+            partial: list[tuple[Values, tuple[str, ...]]] = [(given, ())]
             for name in self.order:
                 extended: list[tuple[Values, tuple[str, ...]]] = []
                 for values, broken in partial:

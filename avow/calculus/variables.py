@@ -6,23 +6,28 @@ earlier (what a delayed edge delivers); an input that no node provides is ``in.m
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 from avow.base.files import digest as sha256
-from avow.formulas.formula import digest, free_variables, substitute
-from avow.language.contract import Node, Port
+from avow.formulas.formula import digest, free_variables, rename, substitute
+from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, REAL, Sort
-from avow.language.terms import TRUE, Role, Term, Variable
-from avow.system.folding import leaves, own_inputs
+from avow.language.terms import TRUE, Role, Term, Variable, histories
+from avow.system.folding import own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
+from avow.system.temporal import parse_state
 from avow.temporal.ages import CLOCK
-from avow.temporal.cell import CELL, Cell
-from avow.temporal.cells import compile_node, remembers
-from avow.temporal.clock import GOES_ON, compile_timed, events, longest_limit, one_pace
+from avow.temporal.cell import CELL, Cell, Unsaid
+from avow.temporal.cells import Records, compile_node, remembers
+from avow.temporal.clock import GOES_ON, Timed, compile_timed, events, is_arrival, longest_limit, one_pace
+
+OBSERVED = "requirement "
+"""Begins the name of what is remembered for a requirement (``requirement R.once#…``), and that of no port."""
 
 SUFFIXES = ("", "@before", "@before@before")
 """Now, one step earlier, two steps earlier."""
@@ -77,6 +82,27 @@ def closest(parts: Iterable[Facts], goal: Term) -> dict[str, Term]:
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """A requirement that speaks of other steps: its formula as one of a step, over ``node.port`` and its cells. What it
+    remembers is remembered whatever the nodes do. `unsaid`: why there is no such formula."""
+
+    formula: Term
+    cells: tuple[Cell, ...] = ()
+    unsaid: str = ""
+
+    @property
+    def spoken(self) -> frozenset[Variable]:
+        """What the formula, and what it remembers, speak of."""
+        return free_variables(self.formula).union(*(free_variables(cell.now) for cell in self.cells))
+
+    @property
+    def arrivals(self) -> tuple[tuple[str, str], ...]:
+        """Nodes, and of which of their inputs it matters whether a message has arrived (``arrived scan#``)."""
+        names = (v.name.partition(".") for v in self.spoken if v.name.endswith(CELL) and ".arrived " in v.name)
+        return tuple(sorted((node, event) for node, _, event in names))
+
+
 @dataclass(slots=True)
 class Frame:
     """A system with its graph, and its formulas in system-level variables (each translated once)."""
@@ -90,11 +116,15 @@ class Frame:
     """Environment inputs (``in.map``, ``planner.map``) that keep their value."""
 
     cells: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
-    """Node → what its clauses remember; each is an input of the node, by the cell's name."""
+    """Node → what its clauses remember, and what the plan assumes of its inputs; each is an input of the node, by the
+    cell's name."""
 
     shared: dict[str, str] = field(default_factory=dict)
     """A cell (``log.earliest#…``) that keeps what another does → that one: where time matters, several nodes may look
-    at the age of the same."""
+    at the age of the same; and what a requirement remembers, a node may remember as well."""
+
+    observed: Mapping[str, Observed] = field(default_factory=dict)
+    """The requirements that speak of other steps."""
 
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
@@ -184,27 +214,29 @@ class Frame:
         """The name of the cell that keeps what a cell of a node does."""
         return self.shared.get(f"{node}.{cell}", f"{node}.{cell}")
 
-    def own_cells(self) -> tuple[tuple[str, Cell], ...]:
-        """Every cell, each kept once, with its node."""
-        found = ((node, cell) for node, cells in self.cells.items() for cell in cells)
-        return tuple((node, cell) for node, cell in found if f"{node}.{cell.name}" not in self.shared)
+    def own_cells(self, of: str = "") -> tuple[tuple[str, str, Cell], ...]:
+        """Every cell, each kept once, with its node and its name; those `of` a requirement have no node."""
+        found = [(node, f"{node}.{cell.name}", cell) for node, cells in self.cells.items() for cell in cells]
+        found += [("", cell.name, cell) for cell in (self.observed[of].cells if of in self.observed else ())]
+        return tuple(each for each in found if each[1] not in self.shared)
 
     def share(self) -> None:
-        """Cells that begin and go on alike are one."""
-        kept: dict[str, str] = {}
-        for node, cells in self.cells.items():
-            for cell in cells:
-                itself = Variable(Role.BOUND, "kept", cell.sort)
-                read = {v: self.input(node, v.name) for v in free_variables(cell.now) if v.role is Role.INPUT}
-                read |= {v: self.output(node, v.name) for v in free_variables(cell.now) if v.role is Role.OUTPUT}
-                now = substitute(cell.now, {**read, cell.before: itself})
-                names = "" if cell.initial is None else digest(cell.initial)
-                meaning = f"{digest(now)} {names} {len(cell.parameters)} {show_sort(cell.sort)}"
-                if (
-                    kept.setdefault(meaning, f"{node}.{cell.name}") != f"{node}.{cell.name}"
-                    and cell.initial is not None
-                ):
-                    self.shared[f"{node}.{cell.name}"] = kept[meaning]
+        """Cells that begin and go on alike are one: those of requirements and nodes, and where time matters all."""
+        for of in self.observed or ("",):
+            kept: dict[str, str] = {}
+            for node, called, cell in self.own_cells(of):
+                if cell.initial is None:
+                    continue
+                itself = {self.placed(node, cell.before): Variable(Role.BOUND, "kept", cell.sort)}
+                now = substitute(self.placed(node, cell.now), itself)  # type: ignore[arg-type]
+                meaning = f"{digest(now)} {digest(cell.initial)} {len(cell.parameters)} {show_sort(cell.sort)}"
+                other = kept.setdefault(meaning, called)
+                if other != called and (self.timed or not node):
+                    self.shared[called] = other
+
+    def placed(self, node: str, term: Term, earlier: int = 0) -> Term:
+        """A term over a node's ports (``node.port`` where there is no node) in system-level variables."""
+        return substitute(term, self.mapping(node, earlier)) if node else system_term(self, term, earlier)
 
     def entry(self, node: str, port: str) -> str:
         """What the plan calls an input from the environment: ``in.map``, or ``planner.map`` where it is set apart."""
@@ -220,15 +252,15 @@ class Frame:
             }
         return dict(self._environment[earlier])
 
-    def memory(self, earlier: int = 0) -> dict[str, Term]:
-        """What each step leaves to the next, as functions of its values, labelled ``memory navigation.once#…``."""
+    def memory(self, earlier: int = 0, of: str = "") -> dict[str, Term]:
+        """What each step leaves to the next, as functions of its values, labelled ``memory navigation.once#…``; also
+        what is remembered for a requirement (`of`)."""
         suffix = " one step before" if earlier else ""
         found = {
-            f"memory {node}.{cell.name}{suffix}": substitute(
-                cell.leaves(after := Variable(Role.BOUND, f"{node}.{cell.name} now", cell.sort)),
-                {**self.mapping(node, earlier), after: system_variable(f"{node}.{cell.name}", cell.sort, earlier)},
+            f"memory {called}{suffix}": self.placed(
+                node, cell.leaves(system_variable(called, cell.sort, earlier)), earlier
             )
-            for node, cell in self.own_cells()
+            for node, called, cell in self.own_cells(of)
         }
         for node in self.timed[:1]:
             clock = Variable(Role.INPUT, CLOCK.name + SUFFIXES[earlier], REAL)
@@ -237,16 +269,21 @@ class Frame:
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """The nodes to whose clauses the time between steps matters."""
-        return tuple(n for n in self.cells if any(port.variable == CLOCK for port in self.node(n).inputs))
+        """The nodes to whose clauses the time between steps matters; where it does to requirements only, any."""
+        found = tuple(n for n in self.cells if any(port.variable == CLOCK for port in self.node(n).inputs))
+        return found or self.graph.nodes[:1] if any(CLOCK in o.spoken for o in self.observed.values()) else found
 
-    def blank(self) -> dict[str, Term]:
-        """What is remembered before the first step."""
+    def blank(self, of: str = "") -> dict[str, Term]:
+        """What is remembered before the first step, also for a requirement (`of`)."""
         return {
-            f"initial {node}.{cell.name}": substitute(cell.begins(), self.mapping(node))
-            for node, cell in self.own_cells()
+            f"initial {called}": self.placed(node, cell.begins())
+            for node, called, cell in self.own_cells(of)
             if cell.initial is not None
         }
+
+    def remembering(self, nodes: Iterable[str]) -> bool:
+        """Whether what some of these nodes say is of other steps, too."""
+        return any(name in self.cells for name in nodes)
 
     def behind(self, node: str, formula: Term) -> tuple[tuple[Variable, bool], ...]:
         """The ports of a node that a formula speaks of, and whether of their values at earlier steps, by a cell."""
@@ -289,28 +326,66 @@ class Frame:
 def frame(system: System) -> Frame:
     """Raises Rejected where the plan's formulas are wrong."""
     graph = dataflow(system)
-    own = own_inputs(system, graph)
-    inside = {name for held in leaves(system.plan).values() for name in held}
+    assumed = environment_assumptions(system, graph)
+    required = {
+        r.id: term
+        for r in system.plan.requirements
+        if r.formula is not None and histories(term := parse_state(r.formula, system.contract, r.formula_span))
+    }
+    clauses = (c.formula for n in system.contract.nodes for c in n.clauses)
+    longest = longest_limit((*clauses, *(a.formula for a in assumed), *required.values()))
+    together = one_pace(system.contract.nodes)
     nodes: dict[str, Node] = {}
     cells: dict[str, tuple[Cell, ...]] = {}
-    together = one_pace(system.contract.nodes)
-    longest = longest_limit(c.formula for n in system.contract.nodes for c in n.clauses)
+    given: list[Assumed] = []
     for node in system.contract.nodes:
-        nodes[node.name] = node
-        # a subsystem's derived contract has no memory of its own: what speaks of other steps stays so, and open
-        if remembers(node) and node.name not in inside:
-            made = compile_timed(node, longest) if together else compile_node(node)
-            read = (*made.before, *events(made))
-            ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
-            # a promise that has no formula of one step is no hypothesis; an assumption that has none stays, and open
-            kept = tuple(replace(g, formula=TRUE) if g.name in made.unsaid else g for g in made.node.guarantees)
-            nodes[node.name] = replace(made.node, inputs=(*node.inputs, *ports), guarantees=kept)
-            cells[node.name] = made.cells
+        own = [a for a in assumed if a.node == node.name]
+        nodes[node.name], cells[node.name], said = _of_one_step(node, own, longest, together=together)
+        given += said
+    given.sort(key=lambda a: [each.port for each in assumed].index(a.port))
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
-    made_of = Frame(system, graph, environment_assumptions(system, graph), own, constants, cells, {}, nodes)
-    if made_of.timed:
-        made_of.share()
-    return made_of
+    observed = {name: observing(name, term, longest, together=together) for name, term in required.items()}
+    remembering = {name: kept for name, kept in cells.items() if kept}
+    own_names = own_inputs(system, graph)
+    made = Frame(system, graph, tuple(given), own_names, constants, remembering, {}, observed, nodes)
+    if made.timed or observed:
+        made.share()
+    return made
+
+
+def _of_one_step(
+    node: Node, assumed: Sequence[Assumed], longest: Fraction | None, *, together: bool
+) -> tuple[Node, tuple[Cell, ...], list[Assumed]]:
+    """A node whose clauses are of one step, its cells, and what the plan assumes of its inputs, of one step too."""
+    if not remembers(node) and not any(histories(a.formula) for a in assumed):
+        return node, (), list(assumed)
+    supposed = tuple(Clause(ClauseKind.ASSUMPTION, f"{a.port}{CELL}", 0, a.formula) for a in assumed)
+    whole = replace(node, assumptions=(*node.assumptions, *supposed))
+    made = compile_timed(whole, longest) if together else compile_node(whole)
+    read = (*made.before, *events(made))
+    ports = tuple(Port(Role.INPUT, v.name, v.sort, show_sort(v.sort)) for v in read)
+    # what has no formula of one step is no hypothesis; a node's assumption that has none stays, and open
+    said = {c.name: TRUE if c.name in made.unsaid else c.formula for c in made.node.clauses}
+    kept = tuple(replace(g, formula=said[g.name]) for g in made.node.guarantees)
+    known = made.node.assumptions[: len(node.assumptions)]
+    given = [replace(a, formula=said[each.name]) for a, each in zip(assumed, supposed, strict=True)]
+    return replace(node, inputs=(*node.inputs, *ports), assumptions=known, guarantees=kept), made.cells, given
+
+
+def observing(name: str, formula: Term, longest: Fraction | None, *, together: bool) -> Observed:
+    """A requirement that speaks of other steps, as one of a step. `together`: there is one time for all nodes."""
+    records = Timed(longest=longest) if together else Records()
+    try:
+        said = records.clause(formula)
+    except Unsaid as why:
+        return Observed(formula, unsaid=why.reason)
+    names = {cell.before: replace(cell.before, name=f"{OBSERVED}{name}.{cell.name}") for cell in records.cells}
+    spoken = free_variables(said).union(*(free_variables(cell.now) for cell in records.cells))
+    for event in (v for v in spoken if is_arrival(v)):
+        node, _, port = event.name.removeprefix("arrived ").partition(".")
+        names[event] = replace(event, name=f"{node}.arrived {port}")
+    cells = (replace(cell, before=names[cell.before], now=rename(cell.now, names)) for cell in records.cells)
+    return Observed(rename(said, names), tuple(cells))
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:
@@ -319,10 +394,19 @@ def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:
 
 
 def system_term(frame: Frame, formula: Term, earlier: int = 0) -> Term:
-    """A formula over ``node.port`` in system-level variables."""
+    """A formula over ``node.port``, and over what is remembered for a requirement, in system-level variables."""
     mapping: dict[Variable, Term] = {}
     for variable in free_variables(formula):
         node, _, port = variable.name.partition(".")
+        if variable.role is Role.BOUND:
+            continue
+        if variable == CLOCK:
+            mapping[variable] = Variable(Role.INPUT, CLOCK.name + SUFFIXES[earlier], REAL)
+            continue
+        if node.startswith(OBSERVED):
+            kept = frame.shared.get(variable.name, variable.name)
+            mapping[variable] = system_variable(kept, variable.sort, earlier + 1)
+            continue
         find = frame.input if variable.role is Role.INPUT else frame.output
         mapping[variable] = find(node, port, earlier)
     return substitute(formula, mapping)

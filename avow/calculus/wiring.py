@@ -11,10 +11,13 @@ from dataclasses import replace
 from avow.calculus.existence import beginning, circles, loops, situations, start_name
 from avow.calculus.variables import Frame
 from avow.kernel.statements import Kind, Place, Wiring
+from avow.language.sorts import BOOL, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
+from avow.system.plan import Requirement
 from avow.system.temporal import parse_state
 from avow.temporal.ages import CLOCK
+from avow.temporal.cell import CELL
 from avow.temporal.clock import GOES_ON, is_arrival
 
 
@@ -30,7 +33,8 @@ def wiring(frame: Frame) -> Wiring:
                 initials[edge.source.node, edge.source.port] = condition
     plan += [(Kind.ENVIRONMENT, a.node, a.port, a.formula) for a in frame.assumed]
     plan += [(Kind.INITIAL, node, port, term) for (node, port), term in initials.items()]
-    for name, cell in frame.own_cells():
+    every = dict.fromkeys(each for of in ("", *frame.observed) for each in frame.own_cells(of))
+    for name, _, cell in every:
         own = Variable(Role.OUTPUT, cell.name, cell.sort)
         plan.append((Kind.DEFINITION, name, cell.name, cell.leaves(own)))
         if cell.initial is not None:
@@ -38,7 +42,7 @@ def wiring(frame: Frame) -> Wiring:
     plan += [(Kind.DEFINITION, name, CLOCK.name, GOES_ON) for name in frame.timed[:1]]
     for r in system.plan.requirements:
         if r.formula is not None:
-            plan.append((Kind.REQUIREMENT, "", r.id, parse_state(r.formula, system.contract, r.formula_span)))
+            plan.append((Kind.REQUIREMENT, "", r.id, required(frame, r)))
     plan += [(Kind.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
     for group in circles(frame):
         for node, clause in ((name, g.name) for name in group for g in frame.node(name).guarantees):
@@ -62,20 +66,35 @@ def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
     for at in frame.graph.environment:
         name, sort = frame.entry(at.node, at.port), frame.node(at.node).input(at.port).sort
         found[Role.INPUT, at.node, at.port] = Place(name, None, 0, sort, name in frame.constants)
+    clock = Place(f"in.{CLOCK.name}", None, 0, CLOCK.sort)
+    found |= {(Role.INPUT, *at): clock for node in frame.timed for at in ((node, CLOCK.name), (CLOCK.name, ""))}
     for node in frame.cells:
-        for event in (port.variable for port in frame.node(node).inputs):
-            if event == CLOCK or is_arrival(event):
-                name = CLOCK.name if event == CLOCK else f"{node}.{event.name}"
-                found[Role.INPUT, node, event.name] = Place(f"in.{name}", None, 0, event.sort)
+        for event in (port.name for port in frame.node(node).inputs if is_arrival(port.variable)):
+            found[Role.INPUT, node, event] = Place(f"in.{node}.{event}", None, 0, BOOL)
+
+    def keep(at: tuple[str, str], called: str, owner: str, sort: Sort) -> None:
+        for role, back in ((Role.OUTPUT, 0), (Role.INPUT, 1)):
+            other, _, kept = frame.shared.get(called, "").partition(".")
+            found[role, *at] = found[role, other, kept] if other else Place(called, owner, back, sort)
+
     for node, cells in frame.cells.items():
         for cell in cells:
-            if (keeper := frame.shared.get(f"{node}.{cell.name}")) is not None:
-                other, _, kept = keeper.partition(".")
-                for role in (Role.OUTPUT, Role.INPUT):
-                    found[role, node, cell.name] = found[role, other, kept]
-                continue
             read = (found[v.role, node, v.name] for v, _ in frame.behind(node, cell.now))
-            owner = node if any(place.node for place in read) else ""
-            found[Role.OUTPUT, node, cell.name] = Place(f"{node}.{cell.name}", owner, 0, cell.sort)
-            found[Role.INPUT, node, cell.name] = Place(f"{node}.{cell.name}", owner, 1, cell.sort)
+            keep((node, cell.name), f"{node}.{cell.name}", node if any(place.node for place in read) else "", cell.sort)
+    for observed in frame.observed.values():
+        for node, event in observed.arrivals:
+            found[Role.INPUT, node, event] = Place(f"in.{node}.{event}", None, 0, BOOL)
+        for cell in observed.cells:
+            # it is remembered of steps of the node that is spoken of; of several, of all nodes
+            nodes = {v.name.partition(".")[0] for v in observed.spoken if CELL not in v.name}
+            owner, _, name = cell.name.partition(".")
+            keep((owner, name), cell.name, nodes.pop() if len(nodes) == 1 else owner, cell.sort)
     return found
+
+
+def required(frame: Frame, requirement: Requirement) -> Term:
+    """A requirement's formula, of one step, over ``node.port`` and what is remembered for it."""
+    known = frame.observed.get(requirement.id)
+    if known is not None:
+        return known.formula
+    return parse_state(requirement.formula or "", frame.system.contract, requirement.formula_span)

@@ -233,7 +233,7 @@ class Kernel:
         before = question.initials or any(back or any(p.back for p in each.sources) for each, back in used)
         reads = {(node, each.node) for each, _ in used for node in each.nodes - {each.node}}
         nodes = {node for each, _ in used for node in each.nodes}
-        own = {s.node for s, _ in used if s.kind is Kind.GUARANTEE or (s.kind is Kind.ASSUMPTION and s.sources)}
+        own = {s.node for s, _ in used if s.kind is Kind.GUARANTEE or (s.kind in KINDS[How.ENVIRONMENT] and s.sources)}
         if off := own - nodes - {claim.node}:
             nodes |= off | ({claim.node} - {""})
         joined = any(len(s.nodes - {s.node}) > 1 for s, _ in used) or len(reads) > len(dict(reads))

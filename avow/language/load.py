@@ -277,6 +277,7 @@ def parse_formula(
     *,
     roles: frozenset[Role] = BOTH_ROLES,
     remembers: bool = False,
+    clause: bool = False,
 ) -> Term:
     """A formula given as text (in a plan, say) as a term of sort BOOL.
 
@@ -284,9 +285,10 @@ def parse_formula(
     ``agent.command`` (``agent.in.phase`` or ``agent.out.phase`` where the node has both) and become
     ``Variable(role, "agent.command", sort)``. `extra` are further names, which become bound variables. `roles` are the
     roles that ports may have; a bare name then means the port of that role. With `remembers` it may speak of
-    other steps. `span` is where the text stands. Raises `Rejected`, with every error.
+    other steps; as a `clause`, it may be a response as well. `span` is where the text stands. Raises `Rejected`, with
+    every error.
     """
-    return _parse(text, node, contract, span, extra, roles, formula=True, remembers=remembers)
+    return _parse(text, node, contract, span, extra, roles, formula=True, remembers=remembers, clause=clause)
 
 
 def parse_term(
@@ -314,6 +316,7 @@ def _parse(
     formula: bool,
     sort: Sort | None = None,
     remembers: bool = False,
+    clause: bool = False,
 ) -> Term:
     source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
     reports = Reports(source)
@@ -324,7 +327,7 @@ def _parse(
     term: Term | None = None
     if tree is not None:
         bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
-        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers)
+        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers or clause)
         if node is None:
             scope.nodes = {n.name: n for n in contract.nodes}
         else:
@@ -333,7 +336,7 @@ def _parse(
             scope.node = node.name
         checker = Checker(scope, reports)
         if formula:
-            term = checker.formula(tree)
+            term = checker.clause(tree) if clause else checker.formula(tree)
         elif sort is not None:
             term = checker.wanted(tree, sort, "this")
         else:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import Past, Role, Term, Variable, histories
 from avow.system.folding import holders
 from avow.system.graph import Edge, Graph
 from avow.system.plan import Endpoint, System
@@ -93,7 +93,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
             continue
         owner = outside[0].node
         try:
-            term = _parse(system, entry.assume, owner, entry.assume_span)
+            term = _parse(system, entry.assume, owner, entry.assume_span, clause=True)
         except Rejected as rejected:
             faults += rejected.diagnostics
             continue
@@ -104,6 +104,11 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
         if foreign:
             message = f"environment: {entry.port}: {foreign[0].qualified} is not the environment's to assume"
             hint = "only inputs that no node provides may be spoken of"
+            faults.append(Diagnostic("PLAN113", message, entry.span, hint=hint))
+            continue
+        if any(record.operator in (Past.EVENTUALLY, Past.STEPS) for record in histories(term)):
+            message = f"environment: {entry.port}: what is assumed is of values, and of what some steps can break"
+            hint = "`within[…](…)` says how soon something comes"
             faults.append(Diagnostic("PLAN113", message, entry.span, hint=hint))
             continue
         found.append(Assumed(entry.port, owner, term, entry.assume, entry.because or ""))
@@ -153,7 +158,7 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
     return tuple(found)
 
 
-def _parse(system: System, text: str, node: str, span: Span | None) -> Term:
+def _parse(system: System, text: str, node: str, span: Span | None, *, clause: bool = False) -> Term:
     from avow.language.load import parse_formula  # the grammar is slow to import
 
-    return with_value(parse_formula(text, system.contract.node(node), system.contract, span))
+    return with_value(parse_formula(text, system.contract.node(node), system.contract, span, clause=clause))

@@ -26,5 +26,5 @@ def said_otherwise(
 ) -> Iterator[Diagnostic]:
     """What a requirement's sentence says otherwise than its formula; `elements` are the contract's (`elements_of`).
     Raises Rejected where that is no formula."""
-    for found in differences(text, written_state(formula, contract, span), elements):
+    for found in differences(text, written_state(formula, contract, span, clause=True), elements):
         yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)

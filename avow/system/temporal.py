@@ -102,13 +102,13 @@ def is_temporal(text: str) -> bool:
 
 def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term:
     """A claim over a system's ports, written ``node.port``: the formula, and that it has a value. Where a node has an
-    input and an output of one name, the output is meant, unless the text says ``node.in.port`` somewhere. Raises
-    Rejected."""
-    return with_value(written_state(text, contract, span))
+    input and an output of one name, the output is meant, unless the text says ``node.in.port`` somewhere. It may speak
+    of other steps. Raises Rejected."""
+    return with_value(written_state(text, contract, span, clause=True))
 
 
-def written_state(text: str, contract: Contract, span: Span | None = None) -> Term:
-    """As `parse_state`, of the formula alone."""
+def written_state(text: str, contract: Contract, span: Span | None = None, *, clause: bool = False) -> Term:
+    """As `parse_state`, of the formula alone; one that is no `clause` is of one step."""
     from dataclasses import replace
 
     from avow.language.load import parse_formula  # the grammar is slow to import
@@ -124,7 +124,7 @@ def written_state(text: str, contract: Contract, span: Span | None = None) -> Te
         )
         for node in contract.nodes
     )
-    return parse_formula(text, None, replace(contract, nodes=nodes), span)
+    return parse_formula(text, None, replace(contract, nodes=nodes), span, clause=clause)
 
 
 def _claimed(formula: Property, span: Span | None, positive: bool = True) -> Property:

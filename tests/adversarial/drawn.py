@@ -184,9 +184,12 @@ class System:
         self.outside: dict[str, tuple[Formula | None, bool]] = {}
         for name in sorted({wire.outside for wire in self.wires.values() if rich} & set(ENVIRONMENT)):
             assume = Formula("is", name=f"in.{name}", wanted=random.random() < 0.5) if random.random() < 0.4 else None
+            if self.remembers and name != CONSTANT and random.random() < 0.4:
+                assume = self.demand(random, [f"in.{name}"])
             if assume is not None or name == CONSTANT:
                 self.outside[name] = assume, name == CONSTANT
-        self.required = [formula(random, [f"{n}.o{n}" for n in self.nodes]) for _ in range(2)]
+        ports = [f"{n}.o{n}" for n in self.nodes]
+        self.required = [self.demand(random, ports) if self.remembers else formula(random, ports) for _ in range(2)]
         self.names = ["g0", "g1"]
         self.text, self.plan = self.written(), self.planned(random)
 
@@ -201,7 +204,9 @@ class System:
         return port, Wire(outside=port)
 
     def promise(self, random: Random, name: str) -> Formula:
-        names = [f"in.{port}" for node, port in self.wires if node == name] + [f"out.o{name}"]
+        return self.demand(random, [f"in.{port}" for node, port in self.wires if node == name] + [f"out.o{name}"])
+
+    def demand(self, random: Random, names: Sequence[str]) -> Formula:
         if random.random() < self.remembers / 2:
             return response(random, names)
         return formula(random, names, remembers=self.remembers)
@@ -277,7 +282,7 @@ class System:
         if random.random() < 0.5:
             rule = random.choice(["R1", "R2", "R3", "R4"])
             plan += f"compose: {{D: {{select: [{', '.join(random.sample(self.nodes, 2))}], rule: {rule}}}}}\n"
-        if len(self.nodes) > 2 and not self.remembers and random.random() < 0.4:
+        if len(self.nodes) > 2 and random.random() < 0.4:
             rule = f", rule: {random.choice(['R1', 'R2', 'R3', 'R4'])}" if self.rich and random.random() < 0.3 else ""
             plan += f"subsystems: {{s: {{nodes: [{', '.join(random.sample(self.nodes, 2))}]{rule}}}}}\n"
         plan += "requirements:\n"
@@ -316,12 +321,14 @@ class System:
                 yield fixed, dict(zip(self.nodes, last, strict=True))
 
     def steps(self, *, granted: bool = False) -> Iterator[tuple[Values, Values, Values]]:
-        """Every step that some run takes: the outputs at it, what each node reads (``node.in.port``), and what the
-        environment gives. What the plan assumes of the environment holds. `granted`: and what nodes assume of the
-        environment alone, up to that step. Raises OverflowError where there are too many."""
+        """Every step that some run takes: the outputs at it, whether each assumption (``n0.a0``) and requirement
+        (``R0``) holds, and what the environment gives. What the plan assumes of the environment holds. `granted`: and
+        what nodes assume of the environment alone, up to that step. Raises OverflowError where there are too many."""
         free = sorted({wire.outside for wire in self.wires.values() if wire.outside})
         clauses = [(n, each) for n in self.nodes for each in self.kept_of(n)]
-        memory = tuple(bit for _, each in clauses for bit in each.begins)
+        given = [(port, each) for port, (each, _) in self.outside.items() if each is not None]
+        every = [*(each for _, each in given), *(each for _, each in clauses), *self.required]
+        memory = tuple(bit for each in every for bit in each.begins)
         first = [
             (tuple(fixed.items()), tuple(last[n] for n in self.nodes), memory, (True,) * len(self.nodes))
             for fixed, last in self.begins(free)
@@ -334,14 +341,14 @@ class System:
             hears = [False, True] if self.publishers else [False]
             for chosen in product([True, False], repeat=len(self.nodes)):
                 now = dict(zip(self.nodes, chosen, strict=True))
-                for given, heard in product(product([True, False], repeat=len(changing)), hears):
+                for values, heard in product(product([True, False], repeat=len(changing)), hears):
                     if self.publishers and heard not in {now[n] for n in self.publishers}:
                         continue
-                    outside = {**fixed, **dict(zip(changing, given, strict=True))}
-                    if not all(f is None or f({f"in.{p}": outside[p]}) for p, (f, _) in self.outside.items()):
+                    outside = {**fixed, **dict(zip(changing, values, strict=True))}
+                    bits, after = iter(kept_bits), list[bool]()
+                    if not min([each.at({f"in.{port}": outside[port]}, bits, after) for port, each in given] or [True]):
                         continue
                     read = {n: self.inputs(n, before, now, outside, heard) for n in self.nodes}
-                    bits, after = iter(kept_bits), list[bool]()
                     held = {
                         n: [each.at({**read[n], f"out.o{n}": now[n]}, bits, after) for each in self.kept_of(n)]
                         for n in self.nodes
@@ -359,6 +366,8 @@ class System:
                         for n, good in zip(self.nodes, still, strict=True)
                     ):
                         truths = {f"{n}.a{k}": good for n in self.nodes for k, good in enumerate(met[n])}
+                        shown = {f"{n}.o{n}": value for n, value in now.items()}
+                        truths |= {f"R{k}": each.at(shown, bits, after) for k, each in enumerate(self.required)}
                         yield now, truths, outside
                         state = (constants, chosen, tuple(after), still)
                         if state not in seen:

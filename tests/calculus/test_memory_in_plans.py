@@ -1,0 +1,151 @@
+"""Requirements, and what a plan assumes of the environment, that speak of other steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Outcome, Verdict
+from avow.calculus.certificates import Certificates, requirement_scope
+from avow.calculus.composition import compose
+from avow.calculus.obligations import all_obligations, settle_all
+from avow.kernel.certificate import How
+from avow.kernel.statements import Kind
+
+from .make import Limits, make, node, outcomes
+
+RELAY = node("a", "e : BOOL", "x : BOOL", "G keep: once(in.e) -> out.x") + node(
+    "b", "x : BOOL", "y : BOOL", "G echo: out.y <=> in.x"
+)
+
+
+def required(folder: Path, rcl: str, formula: str, plan: str = "") -> Outcome:
+    text = f"{plan}requirements: {{R: {{text: test, formula: '{formula}'}}}}\n"
+    return outcomes(make(folder, rcl, text))["R"]
+
+
+@pytest.mark.parametrize(
+    ("formula", "verdict"),
+    [
+        ("once(a.in.e) -> b.y", Verdict.PROVED),
+        ("a.e -> next(b.y)", Verdict.PROVED),
+        ("a.e -> within[0 steps](b.y)", Verdict.PROVED),
+        ("a.e -> (b.y until FALSE)", Verdict.PROVED),
+        ("previous(b.y, FALSE) <=> previous(a.x, FALSE)", Verdict.PROVED),
+        ("rose(b.y) -> rose(a.x)", Verdict.PROVED),
+        ("counted(TRUE since a.e) >= 0", Verdict.PROVED),
+        ("b.y -> next(a.e)", Verdict.REFUTED),
+        ("b.y -> once(a.e)", Verdict.REFUTED),
+        ("previous(a.e, TRUE) -> b.y", Verdict.REFUTED),
+        ("a.e -> within[2 steps](not b.y)", Verdict.REFUTED),
+        ("b.y -> eventually(a.e)", Verdict.UNKNOWN),
+    ],
+)
+def test_a_requirement_with_memory_over_several_nodes(tmp_path: Path, formula: str, verdict: Verdict) -> None:
+    found = required(tmp_path, RELAY, formula)
+    assert found.verdict is verdict, found.summary
+    if verdict is Verdict.REFUTED:
+        assert found.counterexample is not None
+    if verdict is Verdict.UNKNOWN:
+        assert "eventually" in found.summary
+
+
+def test_what_a_requirement_remembers_is_no_hypothesis(tmp_path: Path) -> None:
+    system = make(tmp_path, RELAY, "requirements: {R: {text: t, formula: 'previous(a.e, FALSE) -> b.y'}}\n")
+    composition = compose(system)
+    obligations = all_obligations(composition)
+    found = dict(zip((o.name for o in obligations), settle_all(composition, obligations, Limits()), strict=True))
+    assert found["R"].verdict is Verdict.PROVED
+    made = composition.certificates.made[requirement_scope("R")]
+    assert How.DEFINED in {entry.how for entry in made.entries}
+    again = Certificates(compose(system), {requirement_scope("R"): made})
+    established = again.kept_for(requirement_scope("R"), Kind.REQUIREMENT, "R")
+    assert established is not None
+    kinds = {need.kind for need in established.hypotheses}
+    assert kinds == {How.GUARANTEE, How.TOGETHER}, "values of several nodes are of one step"
+    # under another system the requirement remembers something else: the certificate shows nothing of it
+    other = make(tmp_path, RELAY, "requirements: {R: {text: t, formula: 'previous(a.e, TRUE) -> b.y'}}\n")
+    assert Certificates(compose(other), again.kept).kept_for(requirement_scope("R"), Kind.REQUIREMENT, "R") is None
+
+
+SLOPE = node("a", "v : REAL", "w : REAL", "G: out.w == in.v - previous(in.v, in.v)")
+SLOW = "environment: {in.v: {assume: 'abs(in.v - previous(in.v, in.v)) <= 1', because: it is slow}}\n"
+
+
+@pytest.mark.parametrize(
+    ("formula", "plan", "verdict"),
+    [
+        ("a.w <= 1", SLOW, Verdict.PROVED),
+        ("a.w + previous(a.w, 0) <= 2", SLOW, Verdict.PROVED),
+        ("a.w <= 0.5", SLOW, Verdict.REFUTED),
+        ("a.w <= 1", "", Verdict.REFUTED),
+    ],
+)
+def test_the_environment_remembers(tmp_path: Path, formula: str, plan: str, verdict: Verdict) -> None:
+    found = required(tmp_path, SLOPE, formula, plan)
+    assert found.verdict is verdict, found.summary
+    if verdict is Verdict.PROVED:
+        assert "environment in.v" in found.summary
+
+
+def test_what_is_assumed_with_memory_supports_an_assumption(tmp_path: Path) -> None:
+    plan = "environment: {in.e: {assume: 'in.e -> next(not in.e)', because: it is a pulse}}\n"
+    text = node("a", "e : BOOL", "x : BOOL", "A pulse: previous(in.e, FALSE) -> not in.e", "G: TRUE")
+    found = outcomes(make(tmp_path, text, plan))
+    assert found["whole.a.pulse"].verdict is Verdict.PROVED
+    worse = plan.replace("next(not in.e)", "next(in.e)")
+    assert outcomes(make(tmp_path / "worse", text, worse))["whole.a.pulse"].verdict is Verdict.REFUTED
+
+
+def test_runs_over_a_scenario_keep_to_what_is_assumed(tmp_path: Path) -> None:
+    """The environment's runs are those that it is assumed to have."""
+    text = node("a", "e : BOOL", "x : BOOL", "G: out.x <=> (in.e and previous(in.e, FALSE))")
+    plan = "{}environment: {{in.e: {{assume: '{}', because: so}}}}\n"
+    wanted = "requirements: {R: {text: t, temporal: always not a.x}}\nscenario: {steps: 5}\n"
+    good = outcomes(make(tmp_path / "good", text, plan.format(wanted, "in.e -> next(not in.e)")))["R"]
+    assert good.verdict is Verdict.CHECKED, good.summary
+    bad = outcomes(make(tmp_path / "bad", text, plan.format(wanted, "rose(in.e) -> next(in.e)")))["R"]
+    assert bad.verdict is Verdict.REFUTED, bad.summary
+    stuck = outcomes(make(tmp_path / "stuck", text, plan.format(wanted, "in.e and not previous(in.e, FALSE)")))["R"]
+    assert stuck.verdict is not Verdict.CHECKED, "the environment can take one step and no other"
+
+
+@pytest.mark.parametrize("assumed", ["in.e -> eventually(not in.e)", "steps(every 20 ms)"])
+def test_the_environment_is_assumed_to_do_what_steps_can_break(tmp_path: Path, assumed: str) -> None:
+    plan = f"environment: {{in.e: {{assume: '{assumed}', because: so}}}}\n"
+    with pytest.raises(Rejected) as told:
+        compose(make(tmp_path, RELAY, plan))
+    assert {d.code for d in told.value.diagnostics} == {"PLAN113"}
+
+
+@pytest.mark.parametrize("plan", ["temporal: always once(a.e)", "temporal: eventually (rose(a.e) and b.y)"])
+def test_a_part_of_a_property_is_of_one_step(tmp_path: Path, plan: str) -> None:
+    with pytest.raises(Rejected) as told:
+        make(tmp_path, RELAY, f"requirements: {{R: {{text: t, {plan}}}}}\n")
+    assert "RCL322" in {d.code for d in told.value.diagnostics}
+
+
+LIDAR = node("lidar", "fault : BOOL", "silent : BOOL", "G same: out.silent <=> in.fault")
+STOPPER = """node stopper {
+  inputs( silent : BOOL ) outputs( stopped : BOOL ) topics()
+  steps( at most 500 ms )
+  guarantee stop "After two seconds of silence it stops within one" ( held[2 s](in.silent) -> within[1 s](stopped) )
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("formula", "verdict"),
+    [
+        ("held[2 s](lidar.silent) -> within[1 s](stopper.stopped)", Verdict.PROVED),
+        ("held[2 s](lidar.silent) -> within[1.5 s](stopper.stopped)", Verdict.PROVED),
+        pytest.param(
+            "held[2 s](lidar.silent) -> within[0.5 s](stopper.stopped)", Verdict.REFUTED, marks=pytest.mark.nightly
+        ),
+    ],
+)
+def test_a_requirement_in_seconds(tmp_path: Path, formula: str, verdict: Verdict) -> None:
+    found = required(tmp_path, LIDAR + STOPPER, formula)
+    assert found.verdict is verdict, found.summary
