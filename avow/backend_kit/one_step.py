@@ -65,6 +65,8 @@ def translate(tool: Backend, notation: str, system: System, node: Node) -> Trans
 
 def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     """The job without what the backend cannot say, and why not, by obligation."""
+    if tool.remembers and tool.answers_itself(job):
+        return job, {}
     told = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
     refused = {name: why for name, why in told.items() if why is not None}
     left = tuple(o for o in job.obligations if o.id not in refused)

@@ -8,7 +8,7 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,15 +16,28 @@ from typing import Any
 from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
 from avow.base.tools import Tool
-from avow.base.verdict import Link, Object, Outcome, Verdict
+from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.formulas.values import Value
 from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
-from avow.system.plan import Method, Source, System
+from avow.system.plan import Driving, Method, Source, System
 
-__all__ = ["COMMON_OPTIONS", "Backend", "Job", "Limits", "NoModel", "Report", "Tool", "Translated", "lacks"]
+__all__ = [
+    "COMMON_OPTIONS",
+    "Backend",
+    "Job",
+    "Judged",
+    "JudgedRun",
+    "Limits",
+    "NoModel",
+    "Report",
+    "Tool",
+    "Translated",
+    "lacks",
+    "wired",
+]
 
 
 COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
@@ -130,6 +143,36 @@ class Translated:
     """A warning for each guarantee that is not in them, with the reason."""
 
 
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What became of a clause in one run of messages."""
+
+    held: int = 0
+    broken: int = 0
+    """With no assumption broken."""
+    excused: int = 0
+    """With an assumption broken."""
+    undecided: int = 0
+    triggered: bool = False
+    """Its antecedent was met, or it has none."""
+    shown: Counterexample | None = None
+    """The first breach, or the first value of an output that is none of its type."""
+    at: int = 0
+    """The event at which that was, from 1."""
+    reason: str = ""
+    """Why something is undecided."""
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedRun:
+    """The contract's word on one run of messages."""
+
+    clauses: Mapping[str, Judged]
+    """Guarantee → what became of it."""
+    assumption: tuple[int, str] | None = None
+    """The first event (from 1) that breaks an assumption or whose input is no value of its type, and why."""
+
+
 class NoModel(Exception):  # noqa: N818 - it names a state
     """There is no model to be run, or it has no answer."""
 
@@ -161,7 +204,8 @@ class Backend(ABC):
     uses_steps: bool = True
     """Whether an answer may depend on the scenario's `steps`; likewise."""
     uses_wiring: bool = True
-    """Whether an answer may depend on topics, connections or other nodes; likewise."""
+    """Whether an answer may depend on topics, connections or other nodes; likewise. Of a callback class it always may
+    (`wired`)."""
     uses_upstream: bool = False
     """Whether an answer may depend on the contracts of the nodes from which data reaches the node, over however many
     others, and on what the same backend is told of them. Where it is False the job has no clause of another node."""
@@ -175,6 +219,8 @@ class Backend(ABC):
     """What it says of the node's program besides its guarantees (`Job.claims`)."""
     runs_models: bool = False
     """Whether what it verifies is a model that can be run on single inputs (`model`)."""
+    judges_runs: bool = False
+    """Whether it can judge runs of messages that another backend makes (`judge`)."""
     of: Object = Object.MODEL
     """What is verified; an outcome may say otherwise for itself."""
     portable: bool = False
@@ -200,6 +246,11 @@ class Backend(ABC):
         assumes something that does; None where it can. See `avow.backend_kit.runs`."""
         return None
 
+    def answers_itself(self, job: Job) -> bool:
+        """Whether of this job a backend that `remembers` answers itself for what it cannot say: `unsaid` is not
+        asked."""
+        return False
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         """What is wrong with the plan's options: missing files, unknown names, models that do not parse."""
         return ()
@@ -224,6 +275,12 @@ class Backend(ABC):
         input is at fault, and NoModel where there is nothing to be run; so does a call that has no answer."""
         raise NoModel(f"{self.name} has no model that can be run")
 
+    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
+        """The contract's word on whole runs of messages on the node's topics: events as recordings have them (`topic`,
+        `time` in seconds, fields; at the end one without a topic says how long it was). Of the method's options those
+        in `avow.backend_kit.reading` count. Raises Rejected where they are at fault."""
+        raise NotImplementedError(self.name)
+
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
         notation merely cannot say is `Translated.missing`."""
@@ -246,11 +303,18 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_source": bool,
     "claims": tuple,
     "runs_models": bool,
+    "judges_runs": bool,
     "of": Object,
     "portable": bool,
     "codes": Mapping,
     "translations": Mapping,
 }
+
+
+def wired(tool: Backend, source: Source | None) -> bool:
+    """Whether an answer may depend on topics, connections and other nodes: of a callback class, whose messages come by
+    them, that of every method that looks at the source."""
+    return tool.uses_wiring or (tool.uses_source and source is not None and source.kind is not Driving.STEP)
 
 
 def lacks(found: object) -> str:

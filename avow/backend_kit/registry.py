@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 
 from avow.backend_kit.protocol import Backend, lacks
@@ -72,14 +72,21 @@ def translators(plugins: tuple[str, ...] = ()) -> dict[str, Backend]:
     """Notation → the backend that translates into it. A backend that does not load offers none; of two that offer one
     notation, the first by name has it."""
     found: dict[str, Backend] = {}
-    offered: list[Backend] = []
-    for name in names():
-        with contextlib.suppress(Rejected):
-            offered.append(backend(name, plugins))
-    for one in (*offered, *_plugins(plugins)):
+    for one in (*_offered(plugins), *_plugins(plugins)):
         for notation in one.translations:
             found.setdefault(notation, one)
     return found
+
+
+def judge_of_runs() -> Backend | None:
+    """The installed backend, the first by name, that judges runs of messages."""
+    return next((one for one in _offered(()) if one.judges_runs), None)
+
+
+def _offered(plugins: tuple[str, ...]) -> Iterator[Backend]:
+    for name in names():
+        with contextlib.suppress(Rejected):
+            yield backend(name, plugins)
 
 
 _trusted: list[bool] = []

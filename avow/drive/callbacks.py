@@ -68,7 +68,21 @@ class Driven:
         self.classes: dict[str, Any] = {}
         self.due: list[tuple[int, int, Callable[[], None]]] = []
         self.most: int = spec["most"]
-        self.ran = self._order = 0
+        self.ran = self.handled = self._order = 0
+        self._loaded: Callable[[], None] | None = None
+
+    def begin(self, now: int) -> None:
+        """A new run, from what there was when the file had been loaded. What was refused once stays refused."""
+        if self._loaded is None:
+            said, heard, spoken, due = list(self.said), dict(self.heard), dict(self.spoken), list(self.due)
+
+            def loaded() -> None:
+                self.said, self.spoken, self.due = list(said), dict(spoken), list(due)
+                self.heard = {topic: list(acts) for topic, acts in heard.items()}
+
+            self._loaded = loaded
+        self._loaded()
+        self.now, self.ran, self.handled = now, 0, 0
 
     # -- what is not there -------------------------------------------------------------------------------
 
@@ -144,7 +158,7 @@ class Driven:
         if threading.current_thread() is not threading.main_thread():
             raise self.refuse("what is published by a thread of its own")
         data = self.data({"n": self.spoken[topic]}, message, topic)
-        self.said.append([topic, self.now, data])
+        self.said.append([topic, self.now, data, self.handled])
         for _, act in self.heard.get(topic, ()):
             self.later(self.now, lambda act=act: act(self.value({"n": self.spoken[topic]}, data)))  # type: ignore[misc]
 
@@ -335,15 +349,14 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
     def driver(made: Any, spec: Any) -> Callable[[str], str]:
         def run(case: str) -> str:
             asked = json.loads(case)
-            driven.now = int(asked["start"])
+            driven.begin(int(asked["start"]))
             driven.params = values.plain(spec["params"])
             wrong = ""
-            handled = 0
             try:
                 node = make(made, driven.params)
                 for topic, at, data in asked["events"]:
                     driven.until(int(at))
-                    handled += 1
+                    driven.handled += 1
                     driven.deliver(topic, data)
                     driven.until(driven.now)  # what it said to itself
                 driven.until(int(asked["end"]))
@@ -359,7 +372,7 @@ def answers(driven: Driven, values: Any, make: Callable[[Any, Any], Any]) -> Cal
                     "said": driven.said,
                     "refused": driven.refused,
                     "wrong": wrong,
-                    "after": handled,
+                    "after": driven.handled,
                 }
             )
 

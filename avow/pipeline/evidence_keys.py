@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.protocol import Backend, Job
+from avow.backend_kit.protocol import Backend, Job, wired
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import digest, sort_digest
 from avow.language.contract import Contract, Node
@@ -87,7 +87,7 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     scenario = job.system.plan.scenario
     if tool.uses_scenario and scenario:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
-    if tool.uses_wiring:
+    if wired(tool, job.source):
         parts.append(_wiring(job.system, job.node, tool.name))
     parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream(tool, job))]
     if tool.uses_source and job.source is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from avow.backend_kit.protocol import Backend, Job
+from avow.backend_kit.protocol import Backend, Job, wired
 from avow.backend_kit.registry import backend
 from avow.base.diagnostics import Span
 from avow.calculus.interpretation import interpretation, ranges
@@ -94,7 +94,8 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     named = Named.of(method_options(job.method), tool.files(job))
     graph, own = dataflow(job.system), job.node.name
     upstream = upstream_of(tool, job)
-    edges = graph.feeding(own) if tool.uses_wiring else ()
+    connected = wired(tool, job.source)
+    edges = graph.feeding(own) if connected else ()
     edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
     sources = {edge.source.node for edge in edges} - {own}
     contract = job.contract
@@ -110,8 +111,8 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
             *(_told(plan.node(name), tool.name) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
-        messages=plan.messages if tool.uses_wiring else (),
-        ros=plan.ros if tool.uses_wiring else Ros(),
+        messages=plan.messages if connected else (),
+        ros=plan.ros if connected else Ros(),
         scenario=plan.scenario if tool.uses_scenario else None,
         plugins=() if is_portable(tool) else plan.plugins,
     )

@@ -6,7 +6,8 @@ import json
 import math
 import random
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,18 +20,20 @@ from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
-from avow.stepping.cpython import Subject, ask
-from avow.stepping.samples import Pool, numbers_of, pool
+from avow.stepping.cpython import Subject, Told, ask
+from avow.stepping.samples import Pool, leaves, numbers_of, pool, written
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Source, System
 from avow.system.schema import suggest
 from avow.system.topics import whole_name
-from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS
+from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP
 
 SECOND = 10**9
 STEP = SECOND // 10
-"""Between two messages that are generated."""
+"""Between most messages that are generated."""
+
+LARGEST = {"float32": float.fromhex("0x1.fffffep+127"), "float64": sys.float_info.max}
 
 _TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 _HEADER = Message(HEADER, (Field("stamp", Scalar("time")), Field("frame_id", Scalar("string"))))
@@ -44,6 +47,8 @@ class Event:
     topic: str
     at: int
     data: Any
+    after: int = 0
+    """Of a publication: how many messages had been delivered before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +60,16 @@ class Run:
     spoken: Mapping[str, str]
     wrong: str = ""
     after: int = 0
+
+    def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
+        """What was heard and what was said, in the order in which it came about."""
+        for number in range(len(heard) + 1):
+            yield from heard[number - 1 : number] if number else ()
+            yield from (event for event in self.said if event.after == number)
+
+
+Given = tuple[tuple[Event, ...], int, int]
+"""What a run is of: messages, from when and until when, in nanoseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +97,15 @@ class Driver:
     def run(self, events: Iterable[Event], start: int, end: int) -> Run:
         """Twice, in processes of their own. Raises Rejected where ROS' own is asked for that is not driven, where the
         two differ, or where what came of it hangs on what no recording has."""
-        given = tuple(events)
-        first, second = (_run(self.source, self.subject, given, start, end) for _ in range(2))
+        given = [(tuple(events), start, end)]
+        first, second = (_runs(self.source, self.subject, given)[0] for _ in range(2))
         if first != second:
             raise _refused(self.source, f"{self.source.class_name} publishes otherwise when it is run again")
-        return first
+        return first[0]
+
+    def runs(self, given: Sequence[Given]) -> tuple[tuple[Run, ...], Told]:
+        """Of a new object each, in one process; how it was run. Raises Rejected likewise."""
+        return _runs(self.source, self.subject, given)
 
     def fits(self) -> Iterator[Diagnostic]:
         """Topics of the contract that the class does not hear or say, or with other messages."""
@@ -115,6 +134,12 @@ class Driver:
         except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise unusable(f"{where}: {topic} carries {kind}: {error}") from None
 
+    def fields(self, event: Event) -> dict[str, Any]:
+        """A message's fields as a recording has them."""
+        kind = self.topics.heard.get(event.topic) or self.topics.spoken[event.topic]
+        found: dict[str, Any] = shown(Nested(kind), event.data, self.known, self.source.kind)
+        return found
+
     def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
         """Whether a publication is what was recorded, in the fields that the recording has; one that has
         none says nothing."""
@@ -125,17 +150,31 @@ class Driver:
         recorded = self.coded(topic, event, "the recording")
         return json.dumps(said) == json.dumps(plain_fields(recorded, fields))
 
-    def generated(self, messages: int, seed: int) -> Iterator[Event]:
-        """So many messages on what it hears, a tenth of a second apart, from the contract's numbers and words."""
+    def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
+        """So many messages on what it hears, from the numbers and words of contract, program and parameters."""
         chance = random.Random(seed)
         topics = sorted(self.inputs)
         clauses = (*self.node.assumptions, *self.node.guarantees)
-        numbers = pool(numbers_of(clause.formula for clause in clauses))
-        words = sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
-        for number in range(messages if topics else 0):
+        numbers = numbers_of(clause.formula for clause in clauses) | set(written(self.text)) | set(leaves(self.params))
+        drawing = _Drawing(pool(numbers), self.words(), self.known, chance)
+        at = 0  # nanoseconds
+        for _ in range(messages if topics else 0):
             topic = chance.choice(topics)
-            made = _drawn(Nested(self.topics.heard[topic]), self.known, numbers, words, chance)
-            yield Event(topic, (number + 1) * STEP, made)
+            at += drawing.gap()
+            yield Event(topic, at, drawing.message(Nested(self.topics.heard[topic]), at))
+
+    def words(self) -> list[str]:
+        """What a text of the contract's types may be."""
+        return sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
+
+    @property
+    def params(self) -> Mapping[str, Any]:
+        return self.subject.params
+
+    @property
+    def text(self) -> str:
+        """The program's own, of which only constants are looked at."""
+        return self.subject.file.read_text(encoding="utf-8", errors="replace")
 
 
 def driver(system: System, name: str) -> Driver:
@@ -172,7 +211,8 @@ def driver(system: System, name: str) -> Driver:
         "messages": _messages(node, path, known, source.kind),
     }
     subject = Subject(root, path, source.class_name, params, {}, (), ros)
-    found = Driver(system, node, source, subject, known, _run(source, subject, (), 0, 0, quiet=True))
+    ((topics,), _) = _runs(source, subject, [((), 0, 0)], quiet=True)
+    found = Driver(system, node, source, subject, known, topics)
     if found.topics.wrong:
         raise _refused(source, f"{source.class_name} is not made: {found.topics.wrong}")
     wrong = tuple(found.fits())
@@ -181,31 +221,47 @@ def driver(system: System, name: str) -> Driver:
     return found
 
 
-def _run(
-    source: Source, subject: Subject, events: tuple[Event, ...], start: int, end: int, *, quiet: bool = False
-) -> Run:
-    """One run in a process of its own. `quiet`: only what it hears and says."""
-    asked = {"start": start, "end": end, "events": [[e.topic, e.at, e.data] for e in events]}
+def _runs(
+    source: Source, subject: Subject, given: Sequence[Given], *, quiet: bool = False
+) -> tuple[tuple[Run, ...], Told]:
+    """Runs in a process of their own. `quiet`: only what it hears and says."""
+    asked = [
+        json.dumps({"start": start, "end": end, "events": [[e.topic, e.at, e.data] for e in events]})
+        for events, start, end in given
+    ]
     try:
-        told = ask(subject, [json.dumps(asked)], seconds=DRIVEN_SECONDS, megabytes=DRIVEN_MEGABYTES)
+        told = ask(subject, asked, seconds=DRIVEN_SECONDS, megabytes=DRIVEN_MEGABYTES)
     except ToolMissing as missing:
         raise _refused(source, str(missing)) from None
-    if told.fault or not told.replies:
+    if told.silent:
+        raise Silent(_wrong(source, told.fault))
+    if told.fault or len(told.replies) != len(asked):
         raise _refused(source, told.fault or "there is no answer")
-    (reply,) = told.replies
-    if reply["refused"]:
-        once = dict.fromkeys(reply["refused"])
-        raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(once)}")
+    refused = dict.fromkeys(why for reply in told.replies for why in reply["refused"])
+    if refused:
+        raise _refused(source, f"{source.class_name} asks for what is not driven: {', '.join(refused)}")
     outside = [seen.path for seen in told.observed if seen.kind is Seen.OUTSIDE]
     if outside and not quiet:
         text = f"what {source.class_name} publishes hangs on what no recording has: {', '.join(outside)}"
         raise _refused(source, text)
-    said = tuple(Event(topic, at, data) for topic, at, data in reply["said"])
+    return tuple(_made(reply) for reply in told.replies), told
+
+
+def _made(reply: Mapping[str, Any]) -> Run:
+    said = tuple(Event(topic, at, data, after) for topic, at, data, after in reply["said"])
     return Run(said, reply["heard"], reply["spoken"], reply["wrong"], reply["after"])
 
 
+class Silent(Rejected):
+    """There is no answer for a reason that says nothing of the class: the machine was slow, or ended it."""
+
+
 def _refused(source: Source, text: str) -> Rejected:
-    return Rejected(Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR))
+    return Rejected(_wrong(source, text))
+
+
+def _wrong(source: Source, text: str) -> Diagnostic:
+    return Diagnostic("DRIVE103", text, source.place.at("source"), Severity.ERROR)
 
 
 def unusable(text: str) -> Rejected:
@@ -356,25 +412,56 @@ def _words(sort: Any) -> tuple[str, ...]:
             return ()
 
 
-def _drawn(wire: Wire, known: Definitions, numbers: Pool, words: list[str], chance: random.Random) -> Any:
-    match wire:
-        case Nested(name=name):
-            message = known.get(name)
-            assert message is not None
-            return {"d": [[f.name, _drawn(f.wire, known, numbers, words, chance)] for f in message.fields]}
-        case Array(item=item, length=length):
-            number = chance.choice(numbers.lengths) if length is None else length
-            return {"l": [_drawn(item, known, numbers, words, chance) for _ in range(number)]}
-        case Scalar(name="time" | "duration"):
-            return {"i": str(chance.randrange(100) * STEP)}
-        case Scalar(name="bool"):
-            return chance.random() < 0.5
-        case Scalar(name="string" | "wstring"):
-            return chance.choice(words) if words and chance.random() < 0.9 else chance.choice(("", "other"))
-        case Scalar(name=name) if name in INTEGERS:
-            low, high = INTEGERS[name]
-            return {"i": str(chance.choice([n for n in (*numbers.ints, 0) if low <= n <= high]))}
-        case Scalar(name=name):
-            found = chance.choice(numbers.floats)
-            near = found if chance.random() < 0.5 else found + chance.uniform(-1.0, 1.0)
-            return {"f": _as_float(near if math.isfinite(near) else found, name).hex()}
+@dataclass(slots=True)
+class _Drawing:
+    """Draws messages, at times that lie as far apart as the numbers say, in seconds."""
+
+    numbers: Pool
+    words: list[str]
+    known: Definitions
+    chance: random.Random
+    last: float = 0.0
+
+    def gap(self) -> int:
+        if self.chance.random() < 0.7:
+            return STEP
+        near = [n for n in self.numbers.steps if 0 <= n <= LONGEST_GAP]
+        return max(0, round(self.chance.choice(near) * SECOND) + self.chance.choice((-1, 0, 0, 1)))
+
+    def message(self, wire: Wire, at: int) -> Any:
+        """A message whose header has the time at which it comes."""
+        match wire:
+            case Nested(name=name):
+                message = self.known.get(name)
+                assert message is not None
+                inner = [(f, at if f.wire == Scalar("time") and name == HEADER else None) for f in message.fields]
+                return {"d": [[f.name, self.message(f.wire, at) if t is None else {"i": str(t)}] for f, t in inner]}
+            case Array(item=item, length=length):
+                number = self.chance.choice(self.numbers.lengths) if length is None else length
+                return {"l": [self.message(item, at) for _ in range(number)]}
+            case Scalar(name="time" | "duration"):
+                return {"i": str(self.chance.randrange(100) * STEP)}
+            case Scalar(name="bool"):
+                return self.chance.random() < 0.5
+            case Scalar(name="string" | "wstring"):
+                known = self.words and self.chance.random() < 0.9
+                return self.chance.choice(self.words) if known else self.chance.choice(("", "other"))
+            case Scalar(name=name) if name in INTEGERS:
+                low, high = INTEGERS[name]
+                whole = [n for n in (*self.numbers.ints, low, high, 0) if low <= n <= high]
+                return {"i": str(self.chance.choice(whole))}
+            case Scalar(name=name):
+                drawn = self.number()
+                return {"f": (_as_float(drawn, name) if abs(drawn) <= LARGEST[name] else 0.0).hex()}
+
+    def number(self) -> float:
+        """One of the numbers, or a little beside one, or as far from the last as they say."""
+        turn = self.chance.random()
+        found = self.chance.choice(self.numbers.floats)
+        if turn < 0.3:
+            found = self.last + self.chance.choice((-1, 1)) * self.chance.choice(self.numbers.steps)
+            found = self.chance.choice((found, math.nextafter(found, -math.inf), math.nextafter(found, math.inf)))
+        elif turn < 0.6:
+            found += self.chance.uniform(-1.0, 1.0)
+        self.last = found if math.isfinite(found) else 0.0
+        return self.last

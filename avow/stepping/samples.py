@@ -3,6 +3,7 @@ parameters write down, one double to either side, as far apart as these say, and
 
 from __future__ import annotations
 
+import ast
 import math
 import random
 import sys
@@ -38,6 +39,25 @@ def numbers_of(formulas: Iterable[Term]) -> frozenset[Fraction]:
             if number is not None:
                 found.add(number)
     return frozenset(found)
+
+
+def leaves(data: Any) -> list[Fraction]:
+    """The numbers of parameters."""
+    match data:
+        case bool():
+            return []
+        case int() | float():
+            return [Fraction(data)]
+        case dict():
+            return [n for value in data.values() for n in leaves(value)]
+    return []
+
+
+def written(text: str) -> list[Fraction]:
+    """The numbers that a Python program writes down."""
+    values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
+    numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+    return [Fraction(n) for n in numbers if isinstance(n, int) or math.isfinite(n)]
 
 
 def pool(numbers: Iterable[Fraction]) -> Pool:

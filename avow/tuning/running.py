@@ -91,6 +91,9 @@ LINES_NAMED = 5
 DRIVEN_SECONDS = 60.0
 """Seconds for one run of a callback class, whose time is virtual: thousands of messages take one."""
 
+LONGEST_GAP = 60.0
+"""Seconds between two messages that are generated: a longer time-out is none of a callback's."""
+
 DRIVEN_MEGABYTES = 2048
 """Of memory for such a run."""
 

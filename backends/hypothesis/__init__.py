@@ -7,6 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.reading import READING
 from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
@@ -41,7 +42,7 @@ class HypothesisBackend(Backend):
     link = Link.GENERATED
     options_schema = {
         "type": "object",
-        "properties": {"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS},
+        "properties": {"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS, **READING},
         "additionalProperties": False,
     }
     codes = CODES
@@ -58,16 +59,23 @@ class HypothesisBackend(Backend):
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause)
 
+    def answers_itself(self, job: Job) -> bool:
+        from .callbacks import wanted
+
+        return wanted(job)
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems
 
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
+        from . import callbacks
         from .subject import locate, modules, parameter_files
 
         try:
-            return (*modules(locate(job).path), *parameter_files(job))
+            found = (*modules(locate(job).path), *parameter_files(job))
+            return (*found, *callbacks.files(job)) if callbacks.wanted(job) else found
         except Rejected:
             return ()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import sys
 import tempfile
@@ -28,7 +27,8 @@ from avow.isolation.observed import from_json
 from avow.language.contract import Clause, Node
 from avow.solving.questions import opaque_sorts
 
-from . import export, wire
+from . import callbacks, export, wire
+from .judging import failure_bound
 from .machine import ANY
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
@@ -36,6 +36,9 @@ from .tuning import CONFIDENCE, REJECTED_CASES
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
     try:
+        if callbacks.wanted(job):
+            subject(job)
+            return callbacks.problems(job)
         export.files(job, subject(job))
     except Rejected as rejected:
         return rejected.diagnostics
@@ -45,6 +48,8 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
 
 
 def files(job: Job) -> Mapping[str, str]:
+    if callbacks.wanted(job):
+        return {}
     try:
         return export.files(job, subject(job))
     except (Rejected, wire.TooDeep, RecursionError):
@@ -61,6 +66,8 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     found = problems(job)
     if found:
         return Report.alike(job, Verdict.ERROR, told(job, found), "hypothesis", version)
+    if callbacks.wanted(job):
+        return callbacks.settle(job, limits, version)
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         # what was exported is written afresh: a file changed in between would be tested in place of the contract
         place = Path(scratch)
@@ -217,12 +224,6 @@ def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, reject
     if answer["undecided"]:
         return f"of {answer['undecided']} generated inputs it could not be told whether they meet the assumptions"
     return ""
-
-
-def failure_bound(cases: int) -> float:
-    """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
-    "rule of three": about 3/n)."""
-    return 1.0 if cases == 0 else 1 - math.pow(1 - CONFIDENCE, 1 / cases)
 
 
 def _inexact(values: Sequence[tuple[str, str]]) -> str:

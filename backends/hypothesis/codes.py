@@ -37,6 +37,12 @@ CODES = register(
         "Give the node a function as `subject`, or another method.",
     ),
     declare(
+        "HYPO107",
+        "callbacks cannot be judged",
+        "No installed method judges runs of messages, or the class hears no topic on which others speak to it.",
+        "Install Avow whole (`rosmonitoring` judges them), or let the class subscribe to the inputs.",
+    ),
+    declare(
         "HYPO105",
         "nested too deeply",
         "A formula of the node is nested too deeply for a test to compute it.",

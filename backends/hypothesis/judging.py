@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from avow.temporal.responses import due
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .generate import Inputs
+from .tuning import CONFIDENCE
 
 
 @dataclass(slots=True)
@@ -125,3 +127,9 @@ def _bound(outer: tuple[Variable, ...], formula: Term) -> Term:
 
 def _of_inputs(formula: Term) -> bool:
     return all(v.role is Role.INPUT for v in free_variables(formula))
+
+
+def failure_bound(cases: int) -> float:
+    """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
+    "rule of three": about 3/n)."""
+    return 1.0 if cases == 0 else 1 - math.pow(1 - CONFIDENCE, 1 / cases)

@@ -80,3 +80,9 @@ SMALL = 4
 
 WIRE_DEPTH = 300
 """Nesting of a formula beyond which it is not written."""
+
+RUNS_TOGETHER = 25
+"""Runs of a callback class that one process is asked, each of a new object: to start one takes as long as many runs."""
+
+SILENCE = 3
+"""Seconds, of virtual time, that such a run goes on after its last message: most timers and time-outs are shorter."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import math
 import random
@@ -32,7 +31,7 @@ from avow.solving.questions import z3_version
 from avow.solving.settling import Settler
 from avow.stepping.cpython import Told, ask, case_of
 from avow.stepping.judging import Formula, NoValue, Seen, meets, returned, seen
-from avow.stepping.samples import Drawing, beside, numbers_of, pool, shifted
+from avow.stepping.samples import Drawing, beside, leaves, numbers_of, pool, shifted, written
 from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found
@@ -150,9 +149,9 @@ class Work:
         """What contract, parameters and, where it is asked, the program write down."""
         clauses = (*self.job.node.assumptions, *(self.job.clause(o) for o in self.job.obligations))
         found = set(numbers_of(c.formula for c in clauses))
-        found |= set(_leaves(self.reading.params))
+        found |= set(leaves(self.reading.params))
         if with_program:
-            found |= set(_written(self.reading.text))
+            found |= set(written(self.reading.text))
         return frozenset(found)
 
     def cases(self, assumed: tuple[Formula, ...]) -> list[dict[str, Any]] | None:
@@ -404,23 +403,6 @@ def _in_fractions(data: Any) -> Any:
             return {"d": [[key, _in_fractions(value)] for key, value in pairs]}
         case _:  # no float
             return data
-
-
-def _leaves(data: Any) -> list[Fraction]:
-    match data:
-        case bool():
-            return []
-        case int() | float():
-            return [Fraction(data)]
-        case dict():
-            return [n for value in data.values() for n in _leaves(value)]
-    return []
-
-
-def _written(text: str) -> list[Fraction]:
-    values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
-    numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
-    return [Fraction(n) for n in numbers if isinstance(n, int) or math.isfinite(n)]
 
 
 def _reason(reply: Any) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.given import told
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
+from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
@@ -46,6 +46,7 @@ class RosMonitoringBackend(Backend):
     uses_steps = False
     uses_upstream = True
     remembers = True
+    judges_runs = True
     options_schema = SCHEMA
     codes = CODES
     translations = {"rml": "an RML specification for each node, by the plan's mapping"}
@@ -142,6 +143,11 @@ class RosMonitoringBackend(Backend):
         if len(missing) == len(node.guarantees):
             return Translated({}, missing)
         return Translated({f"{identifier('', node.name)}.rml": made.text}, missing)
+
+    def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
+        from .made import judge
+
+        return judge(job)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from avow import __version__

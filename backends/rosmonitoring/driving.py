@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from avow.stepping.callbacks import Driver, Event, Run
 
@@ -70,7 +70,7 @@ def command(
             raise unusable(f"{trace} has no message on a topic that {node} subscribes to: {topics}")
     run = found.run(events, *((times[0], times[-1]) if times else (0, 0)))
     if output is not None:
-        write(output, "".join(f"{line}\n" for line in _lines(found, events, run)))
+        write(output, "".join(f"{line}\n" for line in _lines(found, run.beside(events))))
     raised = (
         (f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}",) if run.wrong else ()
     )
@@ -120,16 +120,13 @@ def _whole(topic: str) -> str:
     return topic if topic.startswith("/") else f"/{topic}"
 
 
-def _lines(found: Driver, events: tuple[Event, ...], run: Run) -> Iterator[str]:
-    """The trace: of one time, what was heard stands before what was said."""
-    from avow.ros.definitions import Nested
-    from avow.stepping.callbacks import SECOND, shown
+def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
+    """Events as lines of a trace."""
+    from avow.stepping.callbacks import SECOND
 
-    kinds = {**run.heard, **run.spoken}
-    for event in sorted((*events, *run.said), key=lambda event: event.at):
+    for event in events:
         whole, part = divmod(event.at, SECOND)
-        fields = shown(Nested(kinds[event.topic]), event.data, found.known, found.source.kind)
-        rest = json.dumps(fields)[1:-1]
+        rest = json.dumps(found.fields(event))[1:-1]
         yield f'{{"topic": {json.dumps(event.topic)}, "time": {whole}.{part:09d}{", " if rest else ""}{rest}}}'
 
 
@@ -141,7 +138,7 @@ def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run)
         for number, (event, raw) in enumerate(zip(said, before, strict=False), start=1):
             if not found.said_as(topic, event.data, raw):
                 there = json.dumps({k: v for k, v in raw.items() if k not in ("topic", "time")}, default=str)
-                here = next(_lines(found, (), type(run)((event,), run.heard, run.spoken)))
+                here = next(_lines(found, (event,)))
                 yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
                 break
         else:

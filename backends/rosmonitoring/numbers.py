@@ -46,9 +46,11 @@ class NotANumber(Exception):  # noqa: N818 - it names what was found
 
 
 def exact(raw: object) -> Fraction | int:
-    """The value of a number as it came from JSON or from a bag. Raises NotANumber."""
+    """The value of a number as it came from JSON or from a bag, or as it is. Raises NotANumber."""
     if isinstance(raw, Decimal):
         return _fraction(raw.text)
+    if isinstance(raw, Fraction):
+        return raw
     if isinstance(raw, int) and not isinstance(raw, bool):
         return raw
     if isinstance(raw, float):

@@ -1,0 +1,132 @@
+"""JSON schema of the options that say how a node's messages are read and when they are judged: every method that
+judges messages takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+PATH = {"type": "string", "description": "a field of the message: pose.position.x, ranges[0]"}
+DURATION = {
+    "type": "string",
+    "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
+    "description": "a time with a unit, such as 50 ms",
+}
+ARGUMENT = {
+    "oneOf": [
+        PATH,
+        {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["table", "key", "by", "column"],
+            "properties": {
+                "table": {"type": "string", "description": "a table of the plan's scenario"},
+                "key": {"type": "string", "description": "the message's field that names the row"},
+                "by": {"type": "string", "description": "the table's column that the key is looked up in"},
+                "column": {"type": "string", "description": "the column of the value"},
+                "as": {"type": "string", "description": "the type in which the node holds the value: float64"},
+            },
+        },
+    ]
+}
+
+READING: dict[str, Any] = {
+    "when": {
+        "enum": ["outputs", "any", "every"],
+        "description": "judge a clause when each of its outputs has been published since it was last judged "
+        "(default), when any of them is, or at every event that changes one of its variables",
+    },
+    "answers": {
+        "description": "which input an answer answered: without it, verdicts are shown and are no evidence",
+        "oneOf": [
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["by", "because"],
+                "properties": {"by": {"const": "arrival"}, "because": {"type": "string", "minLength": 1}},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["by", "because"],
+                "properties": {"by": {"const": "order"}, "because": {"type": "string", "minLength": 1}},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["by"],
+                "properties": {"by": {"const": "call"}},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["by"],
+                "properties": {"by": {"const": "stamp"}, "input": PATH, "output": PATH},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["by", "input", "output"],
+                "properties": {"by": {"const": "key"}, "input": PATH, "output": PATH},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["latency", "jitter", "because"],
+                "properties": {
+                    "by": {"const": "latency"},
+                    "latency": DURATION,
+                    "jitter": DURATION,
+                    "because": {"type": "string", "minLength": 1},
+                },
+            },
+        ],
+    },
+    "mapping": {
+        "type": "object",
+        "description": "how messages become values of the node's variables (in.r, out.command)",
+        "additionalProperties": {
+            "oneOf": [
+                PATH,
+                {"type": "array", "items": PATH, "minItems": 1, "description": "the fields, in order"},
+                {
+                    "type": "object",
+                    "properties": {
+                        "topic": {"type": "string", "description": "a topic's name, if not the contract's"},
+                        "type": {"type": "string", "description": "the topic's ROS type, if not in the contract"},
+                        "field": PATH,
+                        "fields": {"type": "array", "items": PATH, "minItems": 1},
+                        "each": {"type": "string", "description": "a field that holds a list of tuples"},
+                        "hold": {
+                            "enum": ["latest", "seen"],
+                            "description": "a relation holds at the latest message's tuples (default), or at all "
+                            "that were seen",
+                        },
+                        "values": {
+                            "type": "object",
+                            "additionalProperties": {"type": "string"},
+                            "description": "a message's word: the contract's name",
+                        },
+                        "elsewhere": {
+                            "description": "a function's value where no message has given one; of anything else, "
+                            "the value where there is no reading"
+                        },
+                        "take": {"enum": ["min", "max", "count"], "description": "of the items of an array"},
+                        "nan": {"const": "none", "description": "a NaN is no reading"},
+                        "inf": {"const": "none", "description": "an infinity is no reading"},
+                        "initial": {"description": "the value before the first message"},
+                        "scenario": {"const": True, "description": "the plan's interpretation, at all times"},
+                        "previous": {"type": "string", "description": "an output's value of the step before"},
+                        "constructor": {"type": "string", "description": "the field that names the constructor"},
+                        "arguments": {
+                            "type": "object",
+                            "additionalProperties": {"type": "array", "items": ARGUMENT},
+                            "description": "constructor: the fields of its arguments (a constructor's name may "
+                            "also stand beside `constructor` itself)",
+                        },
+                    },
+                },
+            ]
+        },
+    },
+}
+"""`when`, `answers`, `mapping`."""

@@ -1,0 +1,378 @@
+"""A callback class that is tested: runs of messages in virtual time, judged as monitors judge a recording.
+
+Each run is of a new object, and has messages of which none breaks an assumption; what it publishes is judged against
+the latest messages that it had heard. What breaks a guarantee is cut down to as few messages as still break it, and has
+to break it in another process as well.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from avow.backend_kit.given import told
+from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
+from avow.backend_kit.registry import judge_of_runs
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.verdict import Counterexample, Object, Outcome, Verdict
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import CASE, RETRY
+from avow.formulas.values import show
+from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.observed import Observed
+from avow.ros.sources import message_files
+from avow.stepping.callbacks import SECOND, Driver, Event, Run, Silent, driver
+from avow.stepping.cpython import Told
+from avow.system.plan import Driving
+from avow.temporal.cells import longest_limits
+
+from .export import cases, numbers
+from .judging import failure_bound
+from .machine import ANY, EXACT, SPECIAL
+from .tuning import (
+    APART,
+    ASKED_AGAIN,
+    CONFIDENCE,
+    LONGEST_RUN,
+    REJECTED_CASES,
+    RUNS_TOGETHER,
+    SHRINKING_SECONDS,
+    SILENCE,
+    STEPS,
+)
+
+UNSTEADY = "undeclared input: asked the same again from its start, another process publishes otherwise"
+
+Messages = tuple[Event, ...]
+Judge = Callable[[Iterable[Mapping[str, Any]]], JudgedRun]
+
+
+def wanted(job: Job) -> bool:
+    """Whether what the method tests is a callback class."""
+    source = job.source if job.options.get("subject") is None else None
+    return source is not None and bool(source.python) and source.kind is not Driving.STEP
+
+
+def problems(job: Job) -> tuple[Diagnostic, ...]:
+    """What is wrong with the options, as far as it is seen without running the class."""
+    assert job.source is not None
+    place = job.source.place.at("source")
+    if numbers(job) == EXACT:
+        return (
+            Diagnostic("HYPO106", "messages carry doubles: a callback class is not tested with exact numbers", place),
+        )
+    backend = judge_of_runs()
+    if backend is None:
+        return (Diagnostic("HYPO107", "no installed method judges runs of messages", place),)
+    try:
+        backend.judge(job)
+    except Rejected as rejected:
+        return rejected.diagnostics
+    return ()
+
+
+def files(job: Job) -> tuple[Path, ...]:
+    """The message types, besides the class and its parameters."""
+    return tuple(message_files(job.system.plan.messages))
+
+
+def settle(job: Job, limits: Limits, version: str) -> Report:
+    """One outcome for each obligation."""
+    try:
+        available()
+    except Unavailable as missing:
+        return Report.alike(job, Verdict.NOT_RUN, str(missing), "hypothesis", version)
+    backend = judge_of_runs()
+    if backend is None:
+        return Report.alike(job, Verdict.NOT_RUN, "no installed method judges runs of messages", "hypothesis", version)
+    try:
+        work = _work(job, backend, limits)
+        outcomes = work.outcomes()
+    except Rejected as rejected:
+        report = Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "hypothesis", version)
+        again: dict[str, object] = {RETRY: True} if isinstance(rejected, Silent) else {}
+        return replace(report, outcomes=tuple(replace(o, details=dict(again)) for o in report.outcomes))
+    outcomes = tuple(replace(o, of=Object.SOURCE, numbers="float64") for o in outcomes)
+    return Report(outcomes, "hypothesis", version, (), work.logs, tuple(work.observed), work.isolation)
+
+
+def _work(job: Job, backend: Backend, limits: Limits) -> _Work:
+    """Raises Rejected."""
+    judge = backend.judge(job)
+    clauses = (*job.node.assumptions, *map(job.clause, job.obligations))
+    length = STEPS + min(2 * longest_limits(c.formula for c in clauses), LONGEST_RUN)
+    return _Work(job, driver(job.system, job.node.name), judge, limits, length)
+
+
+@dataclass(slots=True)
+class _Count:
+    """Of one guarantee."""
+
+    held: int = 0
+    excused: int = 0
+    undecided: int = 0
+    triggered: int = 0
+    """Runs in which its antecedent was met."""
+    reason: str = ""
+
+
+@dataclass(slots=True)
+class _Work:
+    job: Job
+    driver: Driver
+    judge: Judge
+    limits: Limits
+    length: int
+    """Messages of a run."""
+    observed: dict[Observed, None] = field(default_factory=dict)
+    isolation: Isolation = Isolation.SEALED
+    logs: dict[str, str] = field(default_factory=dict)
+    messages: int = 0
+    runs: int = 0
+    rejected: int = 0
+    replayed: int = 0
+    counts: dict[str, _Count] = field(default_factory=dict)
+    failing: dict[str, Messages] = field(default_factory=dict)
+    """Guarantee → a run that breaks it, or in which the class raises."""
+    first: list[tuple[Messages, Run]] = field(default_factory=list)
+    end: float = 0.0
+
+    def outcomes(self) -> tuple[Outcome, ...]:
+        self.end = time.monotonic() + self.limits.seconds
+        self.counts = {o.name: _Count() for o in self.job.obligations}
+        self.put(list(self.kept()), drawn=False)
+        stopped = self.sweep()
+        found = {o.name: self.failed(o) for o in self.job.obligations if o.name in self.failing}
+        unsteady = next((o.summary for o in found.values() if o.verdict is Verdict.UNKNOWN), "") or self.unsteady()
+        wrong = self.apart()
+        return tuple(found.get(o.name) or self.settled(o, stopped, unsteady, wrong) for o in self.job.obligations)
+
+    # -- runs --------------------------------------------------------------------------------------------
+
+    def sweep(self) -> str:
+        """Drawn runs; why there are too few, if there are."""
+        number, many = 0, cases(self.job)
+        while self.messages < many and len(self.failing) < len(self.counts):
+            if time.monotonic() > self.end:
+                return f"only {self.messages} of {many} messages in the time given"
+            made: list[Messages] = []
+            left = many - self.messages
+            while len(made) < min(RUNS_TOGETHER, math.ceil(left / self.length)):
+                events, number = self.allowed(f"{self.limits.seed}/{number}"), number + 1
+                made += [events] if events else []
+                if self.rejected > REJECTED_CASES * max(self.messages + sum(map(len, made)), 50):
+                    whole = f"{self.messages} of {self.messages + self.rejected} generated messages"
+                    return f"the assumptions are met too rarely: {whole}"
+            self.put(made)
+        return ""
+
+    def allowed(self, seed: str) -> Messages:
+        """Generated messages, without those that break an assumption."""
+        events = list(self.driver.generated(self.length, seed))
+        if not events:
+            raise Rejected(Diagnostic("HYPO107", f"{self.driver.source.class_name} hears no topic of others"))
+        while events and (wrong := self.judge(self.recorded(events, events)).assumption) is not None:
+            del events[min(wrong[0], len(events)) - 1]
+            self.rejected += 1
+        return tuple(events)
+
+    def ask(self, runs: Sequence[Messages]) -> tuple[Run, ...]:
+        """Each from its start, and on for a while after its last message. Raises Rejected."""
+        found, how = self.driver.runs([(events, 0, _end(events)) for events in runs])
+        self.keep(how)
+        return found
+
+    def keep(self, how: Told) -> None:
+        self.observed.update(dict.fromkeys(how.observed))
+        self.isolation = min(self.isolation, how.isolation, key=lambda level: level.rank)
+
+    def put(self, made: Sequence[Messages], *, drawn: bool = True) -> None:
+        """Ask the class, judge, count."""
+        if not made:
+            return
+        for events, run in zip(made, self.ask(made), strict=True):
+            if len(self.first) * self.length < ASKED_AGAIN:
+                self.first.append((events, run))
+            self.runs += drawn
+            self.messages += drawn * len(events)
+            self.replayed += not drawn
+            judged = self.judged(events, run)
+            for name, count in self.counts.items():
+                one = judged.clauses[name]
+                count.held += one.held
+                count.excused += one.excused
+                count.undecided += one.undecided
+                count.triggered += drawn and one.triggered
+                count.reason = count.reason or one.reason
+                if self.wrong(name, run, judged) is not None:
+                    self.failing.setdefault(name, events)
+
+    def judged(self, events: Messages, run: Run) -> JudgedRun:
+        return self.judge(self.recorded(events, run.beside(events)))
+
+    def recorded(self, heard: Sequence[Event], events: Iterable[Event]) -> Iterator[dict[str, Any]]:
+        for event in events:
+            yield {**self.driver.fields(event), "topic": event.topic, "time": Fraction(event.at, SECOND)}
+        yield {"time": Fraction(_end(heard), SECOND)}
+
+    def wrong(self, name: str, run: Run, judged: JudgedRun) -> Counterexample | None:
+        """What a run shows against a guarantee, before any assumption is broken."""
+        shown, broken = judged.clauses[name].shown, judged.assumption
+        if shown is not None and (broken is None or judged.clauses[name].at <= broken[0]):
+            return replace(shown, explanation=f"guarantee {name} does not hold of these: {shown.explanation}")
+        if run.wrong and broken is None:
+            return Counterexample((), f"at message {run.after} the class raises {run.wrong}: there is no output")
+        return None
+
+    # -- what refuted before -----------------------------------------------------------------------------
+
+    def kept(self) -> Iterator[Messages]:
+        """As far as the class still hears such messages, and the assumptions allow them."""
+        for case in (case for found in self.job.kept.values() for case in found):
+            try:
+                events = tuple(Event(str(topic), int(at), data) for topic, at, data in case)
+                same = all(self.driver.coded(e.topic, self.driver.fields(e), "") == e.data for e in events)
+            except (Rejected, ValueError, TypeError, KeyError, AttributeError, AssertionError):
+                continue
+            hears = all(event.topic in self.driver.inputs for event in events)
+            if events and same and hears and self.judge(self.recorded(events, events)).assumption is None:
+                yield events
+
+    # -- what was found ----------------------------------------------------------------------------------
+
+    def failed(self, obligation: Obligation) -> Outcome:
+        """The simplest run that breaks it, as it was in a process of its own."""
+        name = obligation.name
+        for events in (self.smaller(name, self.failing[name]), self.failing[name]):
+            run = self.driver.run(events, 0, _end(events))
+            judged = self.judged(events, run)
+            shown = self.wrong(name, run, judged)
+            if shown is not None:
+                last = judged.clauses[name].at or None
+                shown = replace(shown, trace=tuple(self.told(events, run))[:last])
+                case: dict[str, object] = {CASE: [[e.topic, e.at, e.data] for e in events]}
+                return Outcome(obligation.id, Verdict.REFUTED, shown.text(), shown, bound=self.bound(), details=case)
+        return Outcome(obligation.id, Verdict.UNKNOWN, UNSTEADY, bound=self.bound())
+
+    def smaller(self, name: str, best: Messages) -> Messages:
+        """Without the messages that it does not take: the last alone, halves, then one by one."""
+        end = min(self.end, time.monotonic() + SHRINKING_SECONDS)
+        while len(best) > 1 and time.monotonic() < end:
+            half = len(best) // 2
+            tried = [best[-1:], best[half:], best[:half]] if half > 1 else []
+            tried += [best[:k] + best[k + 1 :] for k in range(len(best))]
+            found = zip(tried, self.ask(tried), strict=True)
+            still = [e for e, run in found if self.wrong(name, run, self.judged(e, run)) is not None]
+            if not still:
+                break
+            best = min(still, key=len)
+        return best
+
+    def told(self, events: Messages, run: Run) -> Iterator[tuple[tuple[str, str], ...]]:
+        """A step a message: its topic, its time, its fields."""
+        for event in run.beside(events):
+            at = show(Fraction(event.at, SECOND))
+            yield (("(time)", f"{at} s"), *_fields(event.topic, self.driver.fields(event)))
+
+    def unsteady(self) -> str:
+        """Whether another process, asked the same, is another; the last first, so that what objects share shows."""
+        asked = [events for events, _ in reversed(self.first)]
+        same = not asked or tuple(run for _, run in reversed(self.first)) == self.ask(asked)
+        return "" if same else UNSTEADY
+
+    def apart(self) -> list[Counterexample]:
+        """What goes wrong where a float of a message is no number, or the negative zero: each in its turn."""
+        tried: list[tuple[Messages, str]] = []
+        for events, _ in self.first[:APART]:
+            for topic in dict.fromkeys(event.topic for event in events):
+                at = next(k for k, event in enumerate(events) if event.topic == topic)
+                for path in _floats(events[at].data):
+                    for word, text in SPECIAL.items():
+                        put = replace(events[at], data=_put(events[at].data, path, {"f": text}))
+                        tried.append(((*events[:at], put, *events[at + 1 :]), f"{topic}: {'.'.join(path)} = {word}"))
+        found: dict[str, Counterexample] = {}
+        asked = tried[:: max(1, len(tried) // (RUNS_TOGETHER * APART))]
+        for (events, what), run in zip(asked, self.ask([events for events, _ in asked]) if asked else (), strict=True):
+            judged = self.judged(events, run)
+            broken = [
+                name for name in self.counts if judged.clauses[name].shown is not None and name not in self.failing
+            ]
+            why = f"the class raises {run.wrong}" if run.wrong else f"{', '.join(broken)}: broken" if broken else ""
+            if why:
+                found.setdefault(why, Counterexample((), f"{what}: {why}", tuple(self.told(events, run))))
+        return list(found.values())
+
+    def bound(self) -> dict[str, object]:
+        """What limits the answer."""
+        found: dict[str, object] = {"cases": self.messages, "runs": self.runs, "rejected": self.rejected}
+        found |= {"replayed": self.replayed} if self.replayed else {}
+        return found | {"seed": self.limits.seed}
+
+    def settled(self, obligation: Obligation, stopped: str, unsteady: str, wrong: Sequence[Counterexample]) -> Outcome:
+        count = self.counts[obligation.name]
+        details: dict[str, object] = {"no numbers": [one.text() for one in wrong]} if wrong else {}
+        bound = {**self.bound(), "judged": count.held}
+        outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
+        if wrong and numbers(self.job) == ANY:
+            return replace(outcome, verdict=Verdict.REFUTED, summary=wrong[0].text(), counterexample=wrong[0])
+        if count.undecided:
+            why = f"{count.undecided} judgements are undecided: {count.reason or 'no calculation tells'}"
+        elif not count.held:
+            why = "no publication was judged: " + (count.reason or "the class never published all that it speaks of")
+            why = f"{count.excused} times only with an assumption broken" if count.excused else why
+        else:
+            why = unsteady or stopped
+        if why:
+            return replace(outcome, summary=why)
+        if not count.triggered:
+            return replace(outcome, summary=f"in none of {self.runs} runs was its condition met", vacuous=True)
+        below = failure_bound(count.triggered)
+        bound |= {"confidence": CONFIDENCE, "triggered": count.triggered}
+        bound["failure_probability_below"] = round(failure_bound(self.runs), 6)
+        bound["failure_probability_when_triggered_below"] = round(below, 6)
+        before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
+        summary = (
+            f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
+            f"it (seed {self.limits.seed}; 95 %: below {below:.2g} of such runs fail)"
+        )
+        return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+
+
+def _end(events: Sequence[Event]) -> int:
+    """How long a run goes on: timers are due after its last message."""
+    return (events[-1].at if events else 0) + SILENCE * SECOND
+
+
+def _fields(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    match value:
+        case dict():
+            for key, inner in value.items():
+                yield from _fields(f"{name}.{key}", inner)
+        case _:  # a number, a text, a list
+            yield name, json.dumps(value)[:200]
+
+
+def _floats(data: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The places of a message's floats; of an array the first item."""
+    match data:
+        case {"f": _}:
+            yield path
+        case {"d": list(pairs)}:
+            for name, inner in pairs:
+                yield from _floats(inner, (*path, name))
+        case {"l": [first, *_]}:
+            yield from _floats(first, (*path, "0"))
+
+
+def _put(data: Any, path: tuple[str, ...], value: Any) -> Any:
+    if not path:
+        return value
+    if "l" in data:
+        return {"l": [_put(data["l"][0], path[1:], value), *data["l"][1:]]}
+    return {"d": [[name, _put(inner, path[1:], value) if name == path[0] else inner] for name, inner in data["d"]]}
