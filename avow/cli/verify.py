@@ -14,6 +14,7 @@ from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Cluster
+    from avow.pipeline.executors import Elsewhere
 
 
 @click.command()
@@ -59,27 +60,27 @@ def command(
     if explain:
         os.environ[EXPLAIN] = "1"
     wanted = [f"verify:{name}" for name in systems] or ["verify"]
-    cluster = _cluster(address) if address else None
+    cluster, elsewhere = _cluster(address) if address else (None, None)
     if jobs is None:
         jobs = max(2, cluster.slots) if cluster else 2
     try:
-        return execute(place.root, wanted, jobs, sys.stdout if as_json else None)
+        return execute(place.root, wanted, jobs, sys.stdout if as_json else None, elsewhere)
     finally:
         if cluster:
             cluster.close()
 
 
-def _cluster(address: str) -> Cluster:
+def _cluster(address: str) -> tuple[Cluster, Elsewhere]:
     """Raises Rejected where there is none, or none that could do anything."""
-    from avow.pipeline.asking import use
+    from avow.pipeline.asking import elsewhere
     from avow.pipeline.cluster import Address, Cluster
     from avow.pipeline.run_info import ON
 
     found = Cluster(Address.read(address))
     try:
-        use(found)
+        there = elsewhere(found)
     except Rejected:
         found.close()
         raise
     os.environ[ON] = address
-    return found
+    return found, there

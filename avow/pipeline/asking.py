@@ -6,8 +6,6 @@ answered whole is handed on.
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,47 +19,43 @@ from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.isolation.observed import Seen
-from avow.pipeline import work as work_module
-from avow.pipeline.executors import Asked, Came, Desk, Executor, Local
+from avow.pipeline.executors import Asked, Came, Desk, Elsewhere, Executor, answered
 from avow.pipeline.mutant_systems import Altered
 from avow.pipeline.requests import Request, Unanswered, read_response
-from avow.pipeline.work import Work, is_portable, method_backend, planned_method, tool_identities
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import Work, is_portable, method_backend, planned_method
+from avow.tuning.running import WORKER_GRACE
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 
 
-def run(
+def settle(
     workspace: Workspace,
     work: Work,
     obligations: tuple[Obligation, ...],
     folder: Path,
+    run: Run,
     altered: Altered | None = None,
     kept: Mapping[str, Sequence[Any]] | None = None,
     earlier: str = "",
 ) -> Report:
     """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once, and
     `earlier` what the engine kept for itself. Never raises for what that process does."""
-    if lacking := _lacking(work):
+    if lacking := _lacking(work, run):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
         request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {}, earlier=earlier)
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
-    asked, came = _desk(workspace, request).ask(request)
+    asked, came = _answer(workspace, request, run)
     log = {"worker.log": came.log} if came.log.strip() else {}
     if came.data is None:
         return _failed(obligations, work, Verdict.UNKNOWN if came.timed_out else Verdict.ERROR, came.failure, log)
     return judged(work, obligations, asked.data, came.data, log)
 
 
-_desks: dict[tuple[int, str], Desk] = {}
-"""Process and folder → where its works are asked; no folder: whatever can be sent elsewhere. Of the process, as where
-works go is chosen before a run begins, and a desk's threads serve runs that follow one another."""
-_lock = threading.Lock()
-
-
-def use(executor: Executor) -> None:
-    """Send what can be sent elsewhere to an executor, from now on. Raises Rejected where no worker is there."""
+def elsewhere(executor: Executor) -> Elsewhere:
+    """What an executor offers. Raises Rejected where no worker is there."""
     offers = executor.offers()
     if not offers:
         raise Rejected(Diagnostic("CLUSTER004", "the cluster has no workers", hint="start one: avow worker --on …"))
@@ -69,30 +63,27 @@ def use(executor: Executor) -> None:
     for tools in offers.values():
         for name, version, program in sorted(tools):
             chosen[name] = max(chosen.get(name, ("", "")), (version, program))
-    work_module.offered = chosen
-    with _lock:
-        _desks[os.getpid(), ""] = Desk(executor, _said)
+    return Elsewhere(Desk(executor, _said), chosen)
 
 
-def _desk(workspace: Workspace, request: Request) -> Desk:
-    """The executor that a request goes to."""
-    elsewhere = _desks.get((os.getpid(), ""))
-    if elsewhere is not None and not request.root:
-        return elsewhere
-    place = os.getpid(), str(workspace.root)
-    with _lock:
-        return _desks.setdefault(place, Desk(Local(workspace.root), _said))
+def _answer(workspace: Workspace, request: Request, run: Run) -> tuple[Asked, Came]:
+    if run.elsewhere is not None and not request.root:
+        return run.elsewhere.desk.ask(request)
+    asked = Asked.of(request)
+    try:
+        return asked, answered(run.forks, asked.data, asked.key, request.seconds + WORKER_GRACE, workspace.root)
+    except OSError as error:
+        return asked, Came(asked.key, failure=f"{type(error).__name__}: {error}")
 
 
-def _lacking(work: Work) -> tuple[str, ...]:
+def _lacking(work: Work, run: Run) -> tuple[str, ...]:
     """The tools of a work, where the machines that there are have none of them."""
-    if work_module.offered is None or work.is_engine:
+    if run.offered is None or work.is_engine or not work.tools:
         return ()
-    tool = method_backend(work.system, planned_method(work))
-    if not is_portable(tool):
+    if not is_portable(method_backend(work.system, planned_method(work))):
         return ()
-    wanted = [t.name for t in tool.tools()]
-    return () if any(name in work_module.offered for name in wanted) else tuple(wanted)
+    wanted = [name for name, *_ in work.tools]
+    return () if any(name in run.offered for name in wanted) else tuple(wanted)
 
 
 def _said(asked: Asked, came: Came) -> object:
@@ -125,7 +116,7 @@ def request_of(
         encode(work.cut(), root),
         workspace.relative(root),
         files if portable else {},
-        tool_identities(tool) if tool else (),
+        work.tools,
         "" if portable else str(root),
         workspace.relative(folder),
         altered,

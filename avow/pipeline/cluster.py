@@ -25,6 +25,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.pipeline.executors import Asked, Came, answered
+from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Tools
 from avow.tuning.running import CLUSTER_CONNECT, CLUSTER_RETRIES, WORKER_GRACE
 
@@ -102,8 +103,11 @@ def _is_loopback(host: str) -> bool:
 
 def perform(data: bytes, key: str, seconds: float) -> bytes:
     """Runs on a worker: the work in a fork; the answer's bytes, or why there is none as JSON."""
+    from distributed import get_worker
+
+    forks = get_worker().extensions.setdefault("avow forks", Forks())
     # one folder for all works of this process: a fork server is of one
-    came = answered(data, key, seconds, Path(tempfile.gettempdir()), _cancelled())
+    came = answered(forks, data, key, seconds, Path(tempfile.gettempdir()), _cancelled())
     if isinstance(came.data, bytes):
         return b"+" + came.data
     return b"-" + json.dumps([came.failure, came.timed_out, came.log]).encode()

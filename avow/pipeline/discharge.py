@@ -77,8 +77,8 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     report = (
         _language(todo)
         if work.engine == LANGUAGE
-        else asking.run(
-            workspace, work, todo, place, kept=_kept(workspace, work, todo), earlier=earlier(workspace, work, run)
+        else asking.settle(
+            workspace, work, todo, place, run, kept=_kept(workspace, work, todo), earlier=earlier(workspace, work, run)
         )
     )
     seconds = time.monotonic() - clock

@@ -1,4 +1,4 @@
-"""Where works are done: on this machine by default (`Local`), or on others (`avow.pipeline.cluster`).
+"""Where works are done: on this machine (`answered`), or on others by an executor (`avow.pipeline.cluster`).
 
 An executor carries bytes to workers and back. What comes back is judged by whoever asked (`avow.pipeline.asking`); only
 the process that asked writes ledger, artifacts and reports.
@@ -6,7 +6,6 @@ the process that asked writes ledger, artifacts and reports.
 
 from __future__ import annotations
 
-import queue
 import sys
 import tempfile
 import threading
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Protocol
 
 from avow.base.process import Completed
-from avow.pipeline import forks
+from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Request, request_bytes, request_digest
 from avow.tuning.running import QUEUE_PATIENCE, WORKER_GRACE
 
@@ -70,51 +69,9 @@ class Executor(Protocol):
         ...
 
 
-class Local:
-    """Forks on this machine, one for each work (`avow.pipeline.forks`)."""
-
-    def __init__(self, cwd: Path) -> None:
-        self._cwd = cwd
-        self._came: queue.SimpleQueue[Came | None] = queue.SimpleQueue()
-        self._stopped: dict[str, threading.Event] = {}
-        self._lock = threading.Lock()
-
-    def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
-        return {}
-
-    def submit(self, asked: Asked) -> None:
-        with self._lock:
-            if asked.key in self._stopped:
-                return
-            stopped = self._stopped[asked.key] = threading.Event()
-        threading.Thread(target=self._run, args=(asked, stopped), daemon=True).start()
-
-    def results(self) -> Iterator[Came]:
-        while (came := self._came.get()) is not None:
-            yield came
-
-    def cancel(self, keys: Collection[str]) -> None:
-        with self._lock:
-            for key in keys:
-                if key in self._stopped:
-                    self._stopped[key].set()
-
-    def close(self) -> None:
-        self.cancel(tuple(self._stopped))
-        self._came.put(None)
-
-    def _run(self, asked: Asked, stopped: threading.Event) -> None:
-        try:
-            came = answered(asked.data, asked.key, asked.request.seconds + WORKER_GRACE, self._cwd, stopped.is_set)
-        except Exception as error:  # whoever asked waits for an answer
-            came = Came(asked.key, failure=f"{type(error).__name__}: {error}")
-        with self._lock:
-            self._stopped.pop(asked.key)
-        if not stopped.is_set():
-            self._came.put(came)
-
-
-def answered(data: bytes, key: str, seconds: float, cwd: Path, stopped: Callable[[], bool]) -> Came:
+def answered(
+    forks: Forks, data: bytes, key: str, seconds: float, cwd: Path, stopped: Callable[[], bool] | None = None
+) -> Came:
     """Do a work in a process of its own on this machine. Ends it as soon as `stopped` says so."""
     with tempfile.TemporaryDirectory(prefix="avow-request-") as place:
         question, answer = Path(place, "request"), Path(place, "response")
@@ -185,6 +142,15 @@ class Desk:
     def _alarm(self, text: str) -> None:
         self.alarms.append(text)
         print(f"warning: {text}", file=sys.stderr)
+
+
+@dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """Other machines, where a run sends what can be sent."""
+
+    desk: Desk
+    tools: Mapping[str, tuple[str, str]]
+    """Tool → version and program's digest there: what is settled there is of these."""
 
 
 @dataclass(slots=True)

@@ -7,9 +7,6 @@ Python. The server runs nothing but imports, has one thread, and ends with the p
 
 It is of one process, folder and environment: where any of them is another, another server is started. Systems other
 than Linux, and machines on which the server does not start, use a new Python for each work.
-
-What is known of servers stands in this module, and not in a run's object: a server is of the process, runs that follow
-one another in it share it, and it ends with the process.
 """
 
 from __future__ import annotations
@@ -24,6 +21,7 @@ import sys
 import tempfile
 import threading
 import time
+import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -44,58 +42,55 @@ def _python() -> dict[str, str]:
     return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": absolute_only()}
 
 
-_lock = threading.Lock()
-_servers: list[_Server] = []
-"""The one in use; none before the first work."""
-
-_ending: list[subprocess.Popen[bytes]] = []
-"""Those that still had a fork to wait for: kept, so that `kill_all` never finds a number that has become another's."""
-
-
-def run(arguments: Sequence[str], *, cwd: Path, seconds: float, stopped: Callable[[], bool] | None = None) -> Completed:
-    """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept. A fork
-    ends soon after `stopped` says so, as if its time were up."""
-    server = _server(cwd)
-    done = server.run(arguments, seconds, stopped) if server else None
-    if done is not None:
-        return done
-    return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
-
-
-def _server(cwd: Path) -> _Server | None:
-    """The server for this folder and environment; None where there can be none."""
-    if os.environ.get(PLAIN) or sys.platform != "linux" or not hasattr(os, "pidfd_open"):
-        return None
-    place = (os.getpid(), str(cwd.resolve()), tuple(sorted(os.environ.items())))
-    with _lock:
-        if _servers and (_servers[0].place != place or not _servers[0].alive):
-            _servers.pop().close()
-        if not _servers:
-            server = _start(place, cwd)
-            if server is None:
-                return None
-            _servers.append(server)
-        return _servers[0]
-
-
 _Place = tuple[int, str, tuple[tuple[str, str], ...]]
 
 
-_refused: set[_Place] = set()
-"""Where a server did not start: waited for once, not for each work."""
+class Forks:
+    """The processes of a run's works. Its server ends with it, or at the latest with this process."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._server: _Server | None = None
+        self._refused: set[_Place] = set()
+        """Where a server did not start: waited for once, not for each work."""
+
+    def run(
+        self, arguments: Sequence[str], *, cwd: Path, seconds: float, stopped: Callable[[], bool] | None = None
+    ) -> Completed:
+        """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept. A
+        fork ends soon after `stopped` says so, as if its time were up."""
+        server = self._at(cwd)
+        done = server.run(arguments, seconds, stopped) if server else None
+        if done is not None:
+            return done
+        return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
+
+    def _at(self, cwd: Path) -> _Server | None:
+        """The server for this folder and environment; None where there can be none."""
+        if os.environ.get(PLAIN) or sys.platform != "linux" or not hasattr(os, "pidfd_open"):
+            return None
+        place = (os.getpid(), str(cwd.resolve()), tuple(sorted(os.environ.items())))
+        with self._lock:
+            if self._server is not None and (self._server.place != place or not self._server.alive):
+                self._server.close()
+                self._server = None
+            if self._server is None and place not in self._refused:
+                self._server = _started(place, cwd)
+                if self._server is None:
+                    self._refused.add(place)
+                else:
+                    weakref.finalize(self, self._server.close).atexit = False
+            return self._server
 
 
-def _start(place: _Place, cwd: Path) -> _Server | None:
-    if place in _refused:
-        return None
+def _started(place: _Place, cwd: Path) -> _Server | None:
     try:
         server = _Server(place, cwd)
-        if server.ready():
-            return server
-        server.close()
     except OSError:
-        pass
-    _refused.add(place)
+        return None
+    if server.ready():
+        return server
+    server.close()
     return None
 
 
@@ -164,14 +159,14 @@ class _Server:
             return Completed((WORKER, *arguments), code, "", text, time.monotonic() - start)
 
     def close(self) -> None:
-        """Let it end, once nothing that it forked is running. Never waits long."""
-        self._control.close()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(1)
-        if self._process.poll() is None:
-            _ending.append(self._process)
-        else:
-            process.unwatch(self._process.pid)
+        """Let it end, once nothing that it forked is running. Does not wait for that."""
+        if self._control.fileno() >= 0:
+            self._control.close()
+            threading.Thread(target=self._wait, daemon=True).start()
+
+    def _wait(self) -> None:
+        self._process.wait()
+        process.unwatch(self._process.pid)  # not before: until then its number cannot be another's
 
 
 def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | None) -> int:

@@ -108,7 +108,7 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
-            report = asking.run(workspace, work, (obligation,), folder, Altered(obligation.name, number, limit))
+            report = asking.settle(workspace, work, (obligation,), folder, run, Altered(obligation.name, number, limit))
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         match _noticed(report.outcomes[0], record):

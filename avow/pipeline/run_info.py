@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from avow.pipeline.forks import Forks
+
 if TYPE_CHECKING:
+    from avow.pipeline.executors import Elsewhere
     from avow.pipeline.recheck import Checked
 
 EXPLAIN = "AVOW_EXPLAIN"
@@ -46,8 +50,17 @@ class Run:
     fresh: bool
     """It settles everything anew."""
     begun: float = field(default_factory=time.monotonic, compare=False)
+    elsewhere: Elsewhere | None = field(default=None, compare=False, repr=False)
+    """Where it sends works; none: it does all on this machine."""
+    forks: Forks = field(default_factory=Forks, compare=False, repr=False)
+    """Where it does works on this machine."""
     checked: dict[Path, Checked] = field(default_factory=dict, compare=False, repr=False)
     """System's folder → what the kernel established again of it."""
+
+    @property
+    def offered(self) -> Mapping[str, tuple[str, str]] | None:
+        """The tools of the machines that works are sent to, as `Elsewhere` has them."""
+        return self.elsewhere.tools if self.elsewhere else None
 
     @property
     def seconds(self) -> float:
@@ -73,7 +86,7 @@ def sign_with(key: object) -> None:
         private_key(found)
 
 
-def new_run() -> Run:
+def new_run(elsewhere: Elsewhere | None = None) -> Run:
     """A run that begins now, in this process."""
     now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3]
-    return Run(f"{now}-{os.getpid()}", os.environ.get(FRESH, "") not in ("", "0"))
+    return Run(f"{now}-{os.getpid()}", os.environ.get(FRESH, "") not in ("", "0"), elsewhere=elsewhere)

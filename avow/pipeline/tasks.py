@@ -9,14 +9,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from avow.base.module_path import leave_here
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
-from avow.pipeline.run_info import FRESH
+from avow.pipeline.run_info import FRESH, new_run
 from avow.pipeline.state import State
 from avow.tuning.running import COLLECTED
+
+if TYPE_CHECKING:
+    from avow.pipeline.executors import Elsewhere
 
 Task = dict[str, Any]
 
@@ -26,9 +29,12 @@ class Pipeline:
 
     `asked` is doit's command line without the program's name: it tells whether only verification is wanted, so that a
     run with nothing to do reads no contract. `answer` gets the results as JSON; all else goes to standard error then.
+    `elsewhere`: where works are sent that can be done on other machines.
     """
 
-    def __init__(self, root: Path, asked: Sequence[str], answer: IO[str] | None = None) -> None:
+    def __init__(
+        self, root: Path, asked: Sequence[str], answer: IO[str] | None = None, elsewhere: Elsewhere | None = None
+    ) -> None:
         leave_here()
         gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
@@ -39,7 +45,7 @@ class Pipeline:
             )
             print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
             raise SystemExit(2)
-        self._state = State(Workspace(root), answer=answer)
+        self._state = State(Workspace(root), new_run(elsewhere), answer=answer)
         self._wanted = wanted(asked)
 
     def config(self) -> dict[str, Any]:
@@ -86,14 +92,21 @@ def _runs(asked: Sequence[str]) -> bool:
     return first not in ("list", "info", "clean", "forget", "help", "ignore", "dumpdb", "strace", "auto", "reset-dep")
 
 
-def execute(root: Path, tasks: Sequence[str], jobs: int = 2, answer: IO[str] | None = None) -> int:
-    """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`: as `Pipeline` has it."""
+def execute(
+    root: Path,
+    tasks: Sequence[str],
+    jobs: int = 2,
+    answer: IO[str] | None = None,
+    elsewhere: Elsewhere | None = None,
+) -> int:
+    """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`, `elsewhere`: as `Pipeline` has
+    them."""
     from doit.cmd_base import ModuleTaskLoader
     from doit.doit_cmd import DoitMain
 
     os.chdir(root)
     asked = ["run", "-n", str(jobs), *tasks]
-    run = Pipeline(root, asked, answer)
+    run = Pipeline(root, asked, answer, elsewhere)
     return int(DoitMain(ModuleTaskLoader({"DOIT_CONFIG": run.config(), "task_avow": run.tasks})).run(asked) or 0)
 
 

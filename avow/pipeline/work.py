@@ -43,6 +43,10 @@ ENGINES = (LANGUAGE, SANITY, COMPOSE)
 """The core's own engines; the plan cannot name a method so."""
 
 
+Offered = Mapping[str, tuple[str, str]] | None
+"""Where works go to other machines: tool → version and program's digest there."""
+
+
 @dataclass(frozen=True, slots=True)
 class Work:
     """One method and the obligations that it takes on; `keys` maps an obligation's id to what its answer depends on."""
@@ -61,6 +65,8 @@ class Work:
     """What a method's generated files show."""
     files: tuple[Path, ...] = field(default=(), compare=False, repr=False)
     """The plan's files that the answer depends on."""
+    tools: tuple[tuple[str, str, str], ...] = field(default=(), compare=False, repr=False)
+    """The identities of the outside tools that the answer depends on."""
     texts: str = field(default="", compare=False, repr=False)
     """The digest of the plan's and the contract's texts."""
 
@@ -140,33 +146,34 @@ def compose_work(composition: Composition) -> Work:
     return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
 
 
-def method_works(system: System) -> tuple[Work, ...]:
+def method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
     """One for each method of each node of the plan. Raises Rejected for an unknown backend."""
     return tuple(
-        method_work(system, system.contract.node(plan.node), method)
+        method_work(system, system.contract.node(plan.node), method, offered)
         for plan in system.plan.nodes
         for method in plan.methods
     )
 
 
-def method_work(system: System, node: Node, method: Method) -> Work:
+def method_work(system: System, node: Node, method: Method, offered: Offered = None) -> Work:
+    """`offered`: the tools of the machines that works are sent to, if they are."""
     from avow.pipeline.slices import method_slice
 
     tool = method_backend(system, method)
     job = method_job(system, node, method)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
-    told = method_options(method)
+    told, tools = method_options(method), tool_identities(tool, offered)
     parts = (
         tool.name,
         tool.version,
         backend_digest(tool),
-        json.dumps(tool_identities(tool)),
+        json.dumps(tools),
         told,
         _files(tool, job),
         surroundings(tool, job, told),
         *_compared(system, job),
     )
-    return _work(
+    work = _work(
         system,
         node.name,
         method.id,
@@ -178,6 +185,7 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         shown=lambda: method_slice(tool, job, sentences=True),
         files=tool.files(job),
     )
+    return replace(work, tools=tools)
 
 
 def _compared(system: System, job: Job) -> tuple[str, ...]:
@@ -219,17 +227,14 @@ def planned_method(work: Work) -> Method:
     return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
 
 
-def tool_identities(tool: Backend) -> tuple[tuple[str, str, str], ...]:
-    """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing."""
+def tool_identities(tool: Backend, offered: Offered = None) -> tuple[tuple[str, str, str], ...]:
+    """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing. With
+    `offered`, of what can be sent there: the tools there."""
     if offered is not None and is_portable(tool):
         return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
     return tuple(
         (t.name, t.version or "", package_digest(t.package) if t.package else _program(t.path)) for t in tool.tools()
     )
-
-
-offered: Mapping[str, tuple[str, str]] | None = None
-"""Where works go to other machines: tool → version and program's digest there. What they settle is of these tools."""
 
 
 def is_portable(tool: Backend) -> bool:
@@ -304,8 +309,9 @@ class Catalogue:
         raise KeyError((node, method))
 
 
-def catalogue(system: System) -> Catalogue:
-    """Raises Rejected for an unknown backend, and where the plan's formulas are wrong."""
+def catalogue(system: System, offered: Offered = None) -> Catalogue:
+    """`offered`: as `method_work` has it. Raises Rejected for an unknown backend, and where the plan's formulas are
+    wrong."""
     from avow.calculus.composition import compose
 
     composition = compose(system)
@@ -314,7 +320,7 @@ def catalogue(system: System) -> Catalogue:
         language_work(system),
         *(sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
         compose_work(composition),
-        *method_works(system),
+        *method_works(system, offered),
     )
     asked = asked_seconds()
     works = tuple(

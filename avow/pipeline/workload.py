@@ -15,7 +15,7 @@ from avow.base.files import digest, digest_file, write
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
-from avow.pipeline.work import Catalogue, Work, catalogue
+from avow.pipeline.work import Catalogue, Offered, Work, catalogue
 from avow.system.load import load_system
 from avow.system.plan import System
 
@@ -41,11 +41,12 @@ class Survey:
         return {(o.id, work.method): work.keys[o.id] for work in self.catalogue.works for o in work.obligations}
 
 
-def survey(folder: Path) -> Survey | Rejected:
-    """A system that cannot be read is a value here: it must not keep the others from being verified."""
+def survey(folder: Path, offered: Offered = None) -> Survey | Rejected:
+    """A system that cannot be read is a value here: it must not keep the others from being verified. `offered`: as
+    `method_work` has it."""
     try:
         system = load_system(folder)
-        listed = catalogue(system)
+        listed = catalogue(system, offered)
     except Rejected as rejected:
         from avow.pipeline.check import of_rest
         from avow.system.faults import in_order

@@ -13,14 +13,6 @@ LINES = 500
 PIPELINE = ROOT / "avow" / "pipeline"
 
 STAYS = {
-    "forks._lock": "of the process, as the server is that it guards",
-    "forks._servers": "a server is of a process, its folder and environment: runs in one process share it",
-    "forks._ending": "the processes that the process still has to wait for",
-    "forks._refused": "where this process could start none",
-    "asking.work_module.offered": "see `work.offered`",
-    "asking._lock": "guards the desks",
-    "asking._desks": "a desk's threads are of the process; it is told where to send works before its run begins",
-    "work.offered": "the tools of those that works are sent to: said with the desk, and read wherever a key is made",
     "work.engine_identity": "of the code that runs in this process",
     "engine_code.engine_digest": "of the code that runs in this process",
     "engine_code.trusted_parts": "of the code that runs in this process",

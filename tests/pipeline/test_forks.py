@@ -19,8 +19,11 @@ from avow.backend_kit.protocol import Limits, Report
 from avow.base import process
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
-from avow.pipeline import asking, executors, forks
+from avow.pipeline import asking, forks
+from avow.pipeline.run_info import Run
 from avow.pipeline.workload import Survey, survey
+
+RUN = Run("a", False)
 
 BACKEND = """
 import os, signal, subprocess, sys, time
@@ -93,7 +96,7 @@ def settle(root: Path, does: str) -> tuple[Outcome, Report]:
     work = found.work("odd")
     folder = root / "artifacts" / does
     folder.mkdir(parents=True, exist_ok=True)
-    report = asking.run(Workspace(root), work, work.obligations, folder)
+    report = asking.settle(Workspace(root), work, work.obligations, folder, RUN)
     (outcome,) = report.outcomes
     return outcome, report
 
@@ -113,7 +116,8 @@ def until(happens: object) -> None:
 
 
 def server() -> int:
-    return forks._servers[0]._process.pid
+    assert RUN.forks._server is not None
+    return RUN.forks._server._process.pid
 
 
 @pytest.mark.slow
@@ -147,7 +151,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     (odd / "pids").unlink(missing_ok=True)
     settle(odd, "answers")  # from here on, a server is there
     for limit in (1.0, 4.0, 16.0, 64.0):  # until the work gets far enough to hang, on a busy machine
-        monkeypatch.setattr(executors, "WORKER_GRACE", limit - 2 * Limits().seconds)
+        monkeypatch.setattr(asking, "WORKER_GRACE", limit - 2 * Limits().seconds)
         outcome, _ = settle(odd, "hangs")
         assert outcome.verdict is Verdict.UNKNOWN
         assert "no answer within" in outcome.summary
@@ -192,12 +196,13 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
         from pathlib import Path
         from avow.backend_kit.registry import trust_plugins
         from avow.pipeline import asking
+        from avow.pipeline.run_info import new_run
         from avow.pipeline.workload import survey
         from avow.base.workspace import Workspace
         root = Path({str(odd)!r})
         trust_plugins()
         work = survey(root / "contracts" / "hangs").work("odd")
-        asking.run(Workspace(root), work, work.obligations, root)
+        asking.settle(Workspace(root), work, work.obligations, root, new_run())
     """
     run = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], cwd=odd)
     started = pids(odd)

@@ -29,9 +29,8 @@ from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger, ledger_of
 from avow.pipeline import asking, forks
-from avow.pipeline import work as work_module
 from avow.pipeline.discharge import discharge
-from avow.pipeline.executors import Asked, Came, Desk, Executor, Local
+from avow.pipeline.executors import Asked, Came, Desk, Elsewhere
 from avow.pipeline.requests import Request, Response, Unanswered, read_response, response_bytes
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, catalogue, tool_identities
@@ -47,14 +46,12 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workspace
     programs(tmp_path / "contracts" / "made", 3, 2)
     (tmp_path / "dodo.py").touch()
     monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)  # with another environment it is another fork server
-    monkeypatch.setattr(asking, "_desks", {})
-    monkeypatch.setattr(work_module, "offered", None)
     yield Workspace(tmp_path)
     ledger_of.cache_clear()
 
 
-def works(place: Workspace) -> list[Work]:
-    found = catalogue(load_system(place.contracts / "made")).works
+def works(place: Workspace, there: Elsewhere | None = None) -> list[Work]:
+    found = catalogue(load_system(place.contracts / "made"), there.tools if there else None).works
     return [work for work in found if work.cut is not None]
 
 
@@ -72,11 +69,12 @@ def verdicts(records: list[Any]) -> dict[str, str]:
     return {record["obligation"]: record["verdict"] for record in records}
 
 
-def settle(place: Workspace) -> list[object]:
+def settle(place: Workspace, there: Elsewhere | None = None) -> list[object]:
     place.ledger("made").unlink(missing_ok=True)
     ledger_of.cache_clear()
-    for work in works(place):
-        discharge(place, work, Run("a", False))
+    run = Run("a", False, elsewhere=there)
+    for work in works(place, there):
+        discharge(place, work, run)
     return recorded(place)
 
 
@@ -117,14 +115,14 @@ def test_the_same_is_recorded_however_works_are_carried_about(
     few = works(place)[:2]
     place.ledger("made").unlink()
     ledger_of.cache_clear()
+    run = Run("b", False)
     for work in few:
-        discharge(place, work, Run("b", False))
+        discharge(place, work, run)
     anew = recorded(place)
     assert anew == [record for record in forked if record in anew]
     assert len(anew) == sum(len(work.obligations) for work in few)
     monkeypatch.delenv(forks.PLAIN)
-    asking.use(Odd())
-    assert settle(place) == forked
+    assert settle(place, asking.elsewhere(Odd())) == forked
 
 
 def one(place: Workspace, engine: str = "hoare") -> tuple[Work, Asked]:
@@ -211,21 +209,11 @@ def test_a_tool_that_no_worker_offers_is_not_waited_for(tmp_path: Path, place: W
     (folder / "plan.yaml").write_text(
         (folder / "plan.yaml").read_text().replace("[hoare: {program", "[dafny: {implementation")
     )
-    asking.use(Odd())
-    work = next(w for w in works(place) if w.engine == "dafny")
-    report = asking.run(place, work, work.obligations, tmp_path)
+    run = Run("a", False, elsewhere=asking.elsewhere(Odd()))
+    work = next(w for w in works(place, run.elsewhere) if w.engine == "dafny")
+    report = asking.settle(place, work, work.obligations, tmp_path, run)
     assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}, report.outcomes[0].summary
     assert "no worker of the cluster offers dafny" in report.outcomes[0].summary
-
-
-def test_what_is_cancelled_ends_at_once(place: Workspace) -> None:
-    _, asked = one(place)
-    local: Executor = Local(place.root)
-    local.submit(asked)
-    local.submit(asked)
-    local.cancel([asked.key])
-    local.close()
-    assert not list(local.results())
 
 
 def until(happens: object, seconds: float = 60) -> None:
@@ -287,14 +275,15 @@ def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspa
     cluster = Cluster(Address.read(machines.url))
     try:
         until(lambda: len(cluster.offers()) == 2)
-        asking.use(cluster)
-        assert settle(place) == here
+        there = asking.elsewhere(cluster)
+        assert settle(place, there) == here
         place.ledger("made").unlink()
         ledger_of.cache_clear()
-        for number, work in enumerate(works(place)):
+        run = Run("a", False, elsewhere=there)
+        for number, work in enumerate(works(place, there)):
             if number == 1:
                 first.send_signal(signal.SIGKILL)
-            discharge(place, work, Run("a", False))
+            discharge(place, work, run)
         assert recorded(place) == here
     finally:
         cluster.close()
@@ -321,13 +310,13 @@ def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
 
     try:
         until(lambda: len(cluster.offers()) == 2)
-        asking.use(cluster)
+        there = asking.elsewhere(cluster)
         place.ledger("made").unlink()
         ledger_of.cache_clear()
         threading.Thread(target=trouble, daemon=True).start()
         for run in "abcd":  # what was lost three times is asked again
-            for work in works(place):
-                discharge(place, work, Run(run, False))
+            for work in works(place, there):
+                discharge(place, work, Run(run, False, elsewhere=there))
         assert verdicts(recorded(place)) == verdicts(here)
     finally:
         over.set()
@@ -374,8 +363,8 @@ def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
 
     try:
         until(cluster.offers)
-        asking.use(cluster)
-        work = next(w for w in works(place) if w.engine == "dafny")
+        there = asking.elsewhere(cluster)
+        work = next(w for w in works(place, there) if w.engine == "dafny")
         request = asking.request_of(place, work, work.obligations, place.root / "artifacts")
         assert request.wanted
         asked = Asked.of(request)
@@ -483,8 +472,7 @@ def test_by_tls_the_same_and_no_word_with_whom_the_authority_does_not_know(
         cluster = Cluster(Address.read(machines.url))
         try:
             until(cluster.offers)
-            asking.use(cluster)
-            assert settle(place) == here
+            assert settle(place, asking.elsewhere(cluster)) == here
         finally:
             cluster.close()
         before = Ledger(place.ledger("made")).head
