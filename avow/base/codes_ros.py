@@ -65,6 +65,14 @@ ROS_CODES = register(
         "Give both ports one name, or connect them.",
     ),
     declare(
+        "ROS116",
+        "remapping the other way round",
+        "A node is started with a name for a topic that it does not have, and the new name is that of one that it has: "
+        "a remapping says the node's own name first.",
+        "Write the name that the contract (the node's code) has, and then the robot's.",
+        warning=True,
+    ),
+    declare(
         "ROS120",
         "no launch file",
         "A launch file of the plan, or one that it includes, cannot be read as one. It is never run.",

@@ -68,12 +68,13 @@ def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[
     from avow.system.launched import told as launched
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
-    from avow.system.topics import unknown_types
+    from avow.system.topics import turned, unknown_types
 
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
         *launched(system),
         *unknown_types(system.plan, system.contract),
+        *turned(system.plan, system.contract),
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),
@@ -98,13 +99,15 @@ def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
     rest = rest_of(folder)
     if rest is None:
         return ()
-    from avow.system.topics import unknown_types
+    from avow.system.topics import heard, unknown_types
 
     found = [*_policy(rest.system), *unknown_types(rest.system.plan, rest.system.contract)]
-    for plan in rest.system.plan.nodes:
-        for method in plan.methods:
+    plan, contract, _ = heard(rest.system.plan, rest.system.contract)
+    system = replace(rest.system, plan=plan, contract=contract)
+    for node in rest.system.plan.nodes:
+        for method in node.methods:
             try:
-                found += _method(rest.system, plan.node, method, follows=rest.may_follow)
+                found += _method(system, node.node, method, follows=rest.may_follow)
             except Rejected as rejected:
                 found += rejected.diagnostics
             except Exception:

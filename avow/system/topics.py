@@ -113,6 +113,19 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
             yield Diagnostic("ROS104", f"nothing defines {kind}", topic.span, Severity.WARNING, hint)
 
 
+def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
+    """Remappings of a topic that the node does not have to one that it has: it seems the other way round."""
+    for node in contract.nodes:
+        placed = plan.ros.names.placed(node.name)
+        own = {placed.expanded(topic.name): topic.name for topic in node.topics}
+        for old, new in placed.remaps:
+            meant = own.get(placed.expanded(new))
+            if meant is not None and placed.expanded(old) not in own:
+                message = f"{node.name} is started with {old}:={new}, and has no topic {old}, but {meant}"
+                hint = f"a remapping says the node's own name first: {{{meant}: {old}}}"
+                yield Diagnostic("ROS116", message, placed.span, Severity.WARNING, hint)
+
+
 def contradicted(connections: Sequence[Connection], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:
     """Connections whose ends have topics of different names, and those beside which an input hears its topic."""
     for connection in connections:

@@ -250,14 +250,15 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
     """The node's own monitor, and those of the nodes from which its data comes: as far as they can be watched."""
     from avow.system.graph import dataflow
 
+    from .ends import method_of
     from .engine import Monitor
-    from .options import NAME, setup
+    from .options import setup
 
     system, names = job.system, dataflow(job.system).upstream(job.node.name)
     monitors = [Monitor(found, None if job.node.name in names else [o.name for o in job.obligations])]
     for name in sorted(names - {job.node.name}):
         node = system.contract.node(name)
-        options = next((m.options for m in system.plan.node(name).methods if m.backend == NAME), None)
+        options = method_of(system, name)
         other, faults = setup(system, node, options, found.known)
         if not node.relay and not faults:
             monitors.append(Monitor(other))

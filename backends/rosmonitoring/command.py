@@ -140,7 +140,7 @@ class _Telling:
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
     from .configuration import of_system
-    from .options import NAME
+    from .ends import NAME
     from .session import session
 
     parts = []

@@ -12,7 +12,8 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.calls import is_part
 
-from .options import Setup, duration, same_topic
+from .options import Setup, same_topic
+from .pace import duration
 from .rules import Choice, Fields
 
 _ESCAPE = re.compile(r"[^A-Za-z0-9_]|_(?=x[0-9a-f]+_)")

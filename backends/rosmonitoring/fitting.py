@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from avow.language.sorts import BOOL, EnumSort, FunctionSort, Sort
-from avow.ros.definitions import INTEGERS, Definitions, Message, Nested, Scalar, Wire
+from avow.language.sorts import BOOL, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
+from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
 from .rules import Path
 from .tuning import CANDIDATES_SHOWN
@@ -43,6 +43,7 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
     ways = _ways(fitting, len(places))
     if ways == 1:
         return tuple(places[at][0] for at in _only(fitting, len(places)))
+    hint = _hint(wanted, places, known, values)
     told = [
         f"{'.'.join(map(str, path)) or 'the whole message'} : {wire}"
         for at, (path, wire, _) in enumerate(places)
@@ -50,10 +51,34 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
     ]
     if ways == 0:
         every = ", ".join(f"{'.'.join(map(str, p))} : {w}" for p, w, _ in places[:CANDIDATES_SHOWN] if p) or "none"
-        raise Undecided(f"no field of {message.name} can be read as it; its fields are {every}")
+        raise Undecided(f"no field of {message.name} can be read as it; its fields are {every}", hint)
     more = f" and {len(told) - CANDIDATES_SHOWN} more" if len(told) > CANDIDATES_SHOWN else ""
     what = "field" if len(wanted) == 1 else f"{len(wanted)} fields"
-    raise Undecided(f"which {what} of {message.name} it means is not said: {', '.join(told[:CANDIDATES_SHOWN])}{more}")
+    which = f"which {what} of {message.name} it means is not said"
+    raise Undecided(f"{which}: {', '.join(told[:CANDIDATES_SHOWN])}{more}", hint)
+
+
+def _hint(
+    wanted: Sequence[Sort], places: Sequence[tuple[Path, Wire, Message]], known: Definitions, values: Mapping[str, str]
+) -> str | None:
+    """What the plan may write of arrays, whose items no variable means by itself, and of numbers that may be elements
+    of an enumeration; None where there is nothing of the kind."""
+    if len(wanted) != 1:
+        return None
+    sort = wanted[0]
+    for path, wire, holder in places:
+        name = ".".join(map(str, path))
+        if isinstance(wire, Array) and isinstance(sort, RealSort | IntegerSort | NaturalSort):
+            take = "min" if fits(sort, wire.item, known) else "count"
+            item = f"an item of an array, `{name}[0]`, or " if take == "min" else ""
+            return f"name the field; {item}of all items: `{{field: {name}, take: {take}}}`"
+        if isinstance(sort, EnumSort) and isinstance(wire, Scalar) and wire.name in INTEGERS and not values:
+            constants = [constant for constant, kind, _ in holder.constants if kind == wire.name] or ["0"]
+            left = [m for m in sort.members if m not in words(sort, wire, holder, {}).values()]
+            if left:
+                said = f"`{{field: {name}, values: {{{constants[0]}: {left[0]}, …}}}}`"
+                return f"say what its numbers mean ({', '.join(constants)}): {said}"
+    return None
 
 
 SOURCES = "name its file under `messages:`, or the distribution: `ros: {distro: noetic}`"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -28,17 +27,16 @@ from avow.system.schema import suggest
 
 from . import observing
 from .bags import Event, Origin, carried, is_bag
+from .ends import mapping_of, method_of, published, show_entry, sources, written_out
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
-from .pace import Leeway, Rate
+from .pace import NO_TIME, RATE, Leeway, Rate, duration
 from .pairing import Answers
 from .reading import from_text, shown
-from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule
+from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule, otherwise
 from .tuning import DECIDED_SHARE
 from .wires import MappingError
-
-NAME = "rosmonitoring"
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,19 +133,6 @@ def setup(
     return made, tuple(work.faults)
 
 
-_RATE = re.compile(r"([0-9]+(?:[.][0-9]+)?) ?Hz ?(?:±|[+]/?-) ?([0-9]+(?:[.][0-9]+)?) ?%")
-
-NO_TIME = "a time with a unit is wanted, such as 50 ms"
-
-_UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "min": Fraction(60)}
-
-
-def duration(text: str) -> Fraction:
-    """``200 ms`` in seconds; the schema has seen to its form."""
-    number = text.rstrip("abcdefghijklmnopqrstuvwxyz").strip()
-    return Fraction(number) * _UNITS[text[len(text.rstrip("abcdefghijklmnopqrstuvwxyz")) :]]
-
-
 def origin(system: System) -> Origin:
     """What the plan says of message types."""
     return Origin(system.plan.ros.distro, system.plan.messages)
@@ -202,7 +187,7 @@ class _Work:
     faults: list[Diagnostic] = field(default_factory=list)
 
     def mapping(self) -> Mapping[str, Any]:
-        return _mapping(self.options)
+        return mapping_of(self.options)
 
     def unknown_names(self) -> None:
         known = {p.variable.qualified for p in (*self.node.inputs, *self.node.outputs)}
@@ -249,7 +234,7 @@ class _Work:
         """How often variables have to come."""
         found: dict[str, Rate] = {}
         for name in self.heard("rate", entry):
-            written = _RATE.fullmatch(str(entry[name]))
+            written = RATE.fullmatch(str(entry[name]))
             hertz, share = (Fraction(part) for part in written.groups()) if written else (Fraction(0), Fraction(0))
             if hertz and share < 100:
                 found[name] = Rate.of(hertz, share / 100, str(entry[name]))
@@ -298,6 +283,21 @@ class _Work:
             self.hidden[name] = found
         else:
             self.rules[name] = found
+            self.as_published(name, found)
+
+    def as_published(self, name: str, rule: Rule) -> None:
+        """A link says that both ends have one value: they are read in one way."""
+        for source in sources(self.system, self.node, name.partition(".")[2]) if name in self.mapping() else ():
+            node = self.system.contract.node(source.node)
+            other = _Work(self.system, node, method_of(self.system, node.name), self.known)
+            if source.node == self.node.name or (entry := other.mapping().get(f"out.{source.port}")) is None:
+                continue
+            other.port(node.output(source.port))
+            rule_there = other.rules.get(f"out.{source.port}")
+            if rule_there is not None and otherwise(rule, rule_there):
+                text = f"{source}, to which it is linked, is read otherwise, as {show_entry(entry)}"
+                hint = "leave it out: an input is read as what it is linked to; or give the two ports different names"
+                self.fault(text, name, hint=hint)
 
     def shared_fields(self) -> None:
         """Refuses two inputs (or outputs) that are read from one field: what one of them means is then not said."""
@@ -334,7 +334,7 @@ class _Work:
             if topic is None:
                 topic, kind = self.topic(source, source.output(edge.source.port))
             if entry is None:
-                entry = self.neighbour(edge)
+                entry = published(self.system, self.node, port.name)
         if isinstance(entry, Mapping):
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
@@ -345,7 +345,7 @@ class _Work:
         return self.observed(port, topic, kind, entry)
 
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:
-        entry = _written_out(entry)
+        entry = written_out(entry)
         try:
             return observe(Observed(self.system.plan, port, topic, self.message(kind, entry), self.known), entry)
         except Undecided as undecided:
@@ -454,31 +454,8 @@ class _Work:
             return whole(value) if isinstance(port.sort, RealSort) and type(value) is int else value
         return FunctionValue({}, False) if _says_empty(term, edge.source.port) else None
 
-    def neighbour(self, edge: Edge) -> Any:
-        """What the providing node's own monitor says of the same topic."""
-        for method in self.system.plan.node(edge.source.node).methods:
-            if method.backend == NAME:
-                entry = _mapping(method.options).get(f"out.{edge.source.port}")
-                return {k: v for k, v in entry.items() if k != "initial"} if isinstance(entry, Mapping) else entry
-        return None
-
 
 _FIELD_HINT = "name the field under `mapping`, for instance `in.x: pose.x`"
-
-
-def _written_out(entry: Any) -> Mapping[str, Any]:
-    if isinstance(entry, str):
-        return {"field": entry}
-    if isinstance(entry, list):
-        return {"fields": entry}
-    found: Mapping[str, Any] = entry or {}
-    return found
-
-
-def _mapping(options: Located | None) -> Mapping[str, Any]:
-    data = options.data if options is not None else None
-    found = data.get("mapping") if isinstance(data, Mapping) else None
-    return found if isinstance(found, Mapping) else {}
 
 
 def _says_empty(term: Term, port: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
@@ -14,6 +15,18 @@ from avow.tuning.bounds import INSTANCES
 
 from .pairing import time_of
 from .tuning import GRACE, JITTER, RATE_MESSAGES
+
+RATE = re.compile(r"([0-9]+(?:[.][0-9]+)?) ?Hz ?(?:±|[+]/?-) ?([0-9]+(?:[.][0-9]+)?) ?%")
+
+NO_TIME = "a time with a unit is wanted, such as 50 ms"
+
+_UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "min": Fraction(60)}
+
+
+def duration(text: str) -> Fraction:
+    """``200 ms`` in seconds; the schema has seen to its form."""
+    number = text.rstrip("abcdefghijklmnopqrstuvwxyz").strip()
+    return Fraction(number) * _UNITS[text[len(text.rstrip("abcdefghijklmnopqrstuvwxyz")) :]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,3 +136,21 @@ def heard_through(rule: Rule) -> str:
             return ""
         case Fields(variable=variable) | Choice(variable=variable):
             return variable.qualified
+
+
+def otherwise(one: Rule, other: Rule) -> bool:
+    """Whether one rule reads other values from a topic's messages than another does, as far as rules show it."""
+    match one, other:
+        case Fields() | Choice(), Fields() | Choice() if one.topic.lstrip("/") != other.topic.lstrip("/"):
+            return True
+        case Fields(), Fields():
+            ways = [(rule.paths, rule.each, rule.take, rule.hold) for rule in (one, other)]
+            names = any(one.names[word] != other.names[word] for word in one.names.keys() & other.names.keys())
+            away = one.elsewhere != other.elsewhere and None not in (one.elsewhere, other.elsewhere)
+            return ways[0] != ways[1] or names or away
+        case Choice(), Choice():
+            return (one.tag, one.arguments, one.names) != (other.tag, other.arguments, other.names)
+        case Fields() | Choice(), Fields() | Choice():
+            return True
+        case _:  # one of them is of no message
+            return False

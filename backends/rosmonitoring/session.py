@@ -17,9 +17,10 @@ from .bags import Origin, is_bag, messages
 from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
+from .ends import NAME
 from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
-from .options import NAME, Setup, known_types, origin, same_topic, setup
+from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
 from .told import readable
 from .traces import read_trace

@@ -222,3 +222,20 @@ def test_a_laser_scan_is_usable(make_system: Callable[..., System], distro: str)
     entry = {"field": "ranges", "take": "min", "nan": "none", "inf": "none", "elsewhere": 30}
     system = system_of(make_system, "REAL", "sensor_msgs/LaserScan", entry, plan={"ros": {"distro": distro}})
     assert value(system, ranges=[0.1, 3.5, math.inf]) == Fraction(struct.unpack("<f", pack(0.1))[0])
+
+
+@pytest.mark.parametrize(
+    ("sort", "text", "hint"),
+    [
+        ("REAL", "float32 a\nfloat32 b\nfloat32[] ranges", "`{field: ranges, take: min}`"),
+        ("NATURAL", "float32[] ranges", "`{field: ranges, take: count}`"),
+        ("Level", "uint8 OK=0\nuint8 LOW=1\nuint8 level", "(OK, LOW): `{field: level, values: {OK: error, …}}`"),
+        ("REAL", "float32 a\nfloat32 b", "name the field under `mapping`"),
+    ],
+)
+def test_what_may_be_written_of_arrays_and_numbers_is_told(
+    sort: str, text: str, hint: str, make_system: Callable[..., System]
+) -> None:
+    _, (fault,) = told(system_of(make_system, sort, "p/M", messages={"p/M": text}))
+    assert fault.hint is not None
+    assert hint in fault.hint

@@ -10,6 +10,7 @@ from avow.base.diagnostics import Rejected
 from avow.system.graph import dataflow
 from avow.system.load import load_system
 from avow.system.plan import System
+from avow.system.topics import turned
 
 NODE = """
 node {name} {{
@@ -75,6 +76,15 @@ def test_namespaces_and_remaps_decide(tmp_path: Path, plan: str, linked: bool) -
 def test_private_topics(tmp_path: Path) -> None:
     text = node("a", "", "x : REAL", "float64 ~x matches(out.x)") + sink("float64", "/a/x")
     assert edges(make(tmp_path, text)) == ["a.x → b.y"]
+
+
+def test_a_remapping_the_other_way_round(tmp_path: Path) -> None:
+    def found(remap: str) -> list[str]:
+        system = make(tmp_path, SOURCE + sink(), f"ros: {{nodes: {{b: {{remap: {remap}}}}}}}")
+        return [d.code for d in turned(system.plan, system.contract)]
+
+    assert found("{scan: t}") == found("{scan: /t}") == ["ROS116"]
+    assert found("{t: scan}") == found("{/tf: /robot/tf}") == []
 
 
 @pytest.mark.parametrize(
