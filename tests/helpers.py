@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 from _pytest.mark import ParameterSet
+
+from avow.cli import main
 
 
 def edit(path: Path, *pairs: tuple[str, str]) -> None:
@@ -19,6 +26,27 @@ def edit(path: Path, *pairs: tuple[str, str]) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+def avow(*words: str, cwd: Path, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    """A command of Avow's through its real entry point, in this process: a new one costs half a second, and only a test
+    of the process itself needs it."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
+    given = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
+    here, code = Path.cwd(), 0
+    with mock.patch.multiple(sys, stdout=out, stderr=err, stdin=given, argv=["avow", *words]):
+        os.chdir(cwd)
+        try:
+            main(list(words))
+        except SystemExit as ended:
+            code = ended.code if isinstance(ended.code, int) else ended.code is not None
+        finally:
+            os.chdir(here)
+    texts = []
+    for stream in (out, err):
+        stream.flush()
+        texts.append(stream.buffer.getvalue().decode())  # type: ignore[attr-defined]
+    return subprocess.CompletedProcess(["avow", *words], code, *texts)
+
+
 def alive(pid: int) -> bool:
     """Whether a process runs: a zombie does not."""
     try:
@@ -27,14 +55,22 @@ def alive(pid: int) -> bool:
         return False
 
 
-def some(cases: Iterable[Any], always: int) -> list[Any]:
-    """Parameters of a test: so many of them, evenly spread, run always, and the others with `-m nightly`."""
+def some(cases: Iterable[Any], always: int, slow: int = 0) -> list[Any]:
+    """Parameters of a test: so many of them, evenly spread, run always, so many more with `-m slow`, the others with
+    `-m nightly`."""
     listed = list(cases)
-    chosen = {k * len(listed) // always for k in range(always)}
-    return [case if k in chosen else _nightly(case) for k, case in enumerate(listed)]
+    wanted = _spread(range(len(listed)), always + slow)
+    ever = _spread(wanted, always)
+    marks = {k: pytest.mark.slow if k in wanted else pytest.mark.nightly for k in range(len(listed)) if k not in ever}
+    return [_marked(case, marks[k]) if k in marks else case for k, case in enumerate(listed)]
 
 
-def _nightly(case: Any) -> Any:
+def _spread(places: Sequence[int], count: int) -> list[int]:
+    """So many of the places, evenly spread."""
+    return sorted({places[k * len(places) // count] for k in range(count)})
+
+
+def _marked(case: Any, mark: pytest.MarkDecorator) -> Any:
     if isinstance(case, ParameterSet):
-        return pytest.param(*case.values, marks=[*case.marks, pytest.mark.nightly], id=case.id)
-    return pytest.param(*case if isinstance(case, tuple) else (case,), marks=pytest.mark.nightly)
+        return pytest.param(*case.values, marks=[*case.marks, mark], id=case.id)
+    return pytest.param(*case if isinstance(case, tuple) else (case,), marks=mark)

@@ -107,6 +107,7 @@ def message(**body: object) -> bytes:
     return b"Content-Length: %d\r\n\r\n%s" % (len(text), text)
 
 
+@pytest.mark.slow
 def test_the_language_server(place: Path) -> None:
     asked = [
         message(id=0, method="initialize", params={"processId": None, "rootUri": place.as_uri(), "capabilities": {}})

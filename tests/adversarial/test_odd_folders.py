@@ -77,6 +77,7 @@ def test_a_pipe_in_another_file_s_place_is_not_waited_for(place: Path, name: str
     assert run(place, AVOW, "verify", "s")[0] == 2
 
 
+@pytest.mark.slow
 def test_a_contract_that_is_a_link_out_of_the_folder(place: Path) -> None:
     (place / "outside.rcl").write_text(RCL)
     contract = place / "contracts" / "s" / "s.rcl"

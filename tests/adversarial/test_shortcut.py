@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from avow.base.workspace import Workspace
 from avow.pipeline.results import Result
 from avow.pipeline.shortcut import Shortcut
@@ -41,6 +43,7 @@ def test_what_stood_still_is_kept(workspace: Path) -> None:
     assert shortcut.nothing_to_do(("verify",)) is None
 
 
+@pytest.mark.slow
 def test_a_memory_of_doit_that_was_half_written(workspace: Path) -> None:
     """A full disk, or a kill at the wrong moment, must not keep the next run from starting."""
     system(workspace)

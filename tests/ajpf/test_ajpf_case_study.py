@@ -100,6 +100,7 @@ MARKS = dict.fromkeys(FAULTS, (pytest.mark.slow,)) | {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [pytest.param(fault, marks=MARKS[fault]) for fault in FAULTS])
 def test_seeded_faults_are_caught(rover, tmp_path, fault):
     change, caught = FAULTS[fault]
@@ -139,6 +140,7 @@ def test_the_published_agent(rover, tmp_path):
     assert len(listed) == 6
 
 
+@pytest.mark.slow
 def test_the_route_of_the_publicly_available_program_makes_the_rest_vacuous(rover, tmp_path):
     """Its next_location(5,0) makes waypoints 6 to 12 unreachable: every claim about them passes for nothing."""
     job = rover(*REPAIRED, program=lambda text: text.replace("next_location(5, 6)", "next_location(5, 0)"))

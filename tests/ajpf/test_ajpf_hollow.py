@@ -339,6 +339,7 @@ def test_no_negated_guarantee_of_the_lift_is_supported(lift, tmp_path, name):
     assert settle(altered(job, name, negated.formula), tmp_path)[name].verdict is not Verdict.CHECKED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", some(["next_waypoint", "inspect_here", "exit_on_danger", "abandon", "end_of_mission"], 2)
 )

@@ -114,6 +114,7 @@ def test_a_machine_without_java_or_spin_gives_the_same_verdicts(lift, tmp_path, 
     assert "Spin" not in without.tool
 
 
+@pytest.mark.slow
 def test_a_rule_that_asks_for_too_much_ends_the_search(tmp_path):
     """Six of forty beliefs, in every way: 4,096,000,000 of them."""
     beliefs = "\n".join(f"n({k})" for k in range(40))

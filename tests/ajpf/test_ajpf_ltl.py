@@ -269,6 +269,7 @@ SHAPES = [
 ]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(repetitive_graphs())
 def test_reduction_changes_nothing(graph):

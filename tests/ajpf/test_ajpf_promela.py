@@ -40,6 +40,10 @@ ALL = [(folder, name) for folder, rows in ROWS.items() for name in rows]
 TOLD_APART = {("verdicts", "h1"), ("verdicts", "k12"), ("societies", next(iter(ROWS["societies"])))}
 
 
+def _when(case):
+    return () if case == min(TOLD_APART) else pytest.mark.slow if case in TOLD_APART else pytest.mark.nightly
+
+
 def checkers(programs, draws, properties, semantics=Semantics.MCAPL, most=20_000):
     """A checker for the properties that ask for percepts, and one for the others."""
     for probed in (False, True):
@@ -55,9 +59,7 @@ def properties_of(texts):
 
 
 @pytest.mark.needs_spin
-@pytest.mark.parametrize(
-    ("folder", "name"), [pytest.param(*c, marks=() if c in TOLD_APART else pytest.mark.nightly) for c in ALL]
-)
+@pytest.mark.parametrize(("folder", "name"), [pytest.param(*c, marks=_when(c)) for c in ALL])
 def test_spin_says_of_the_program_what_ajpf_says(tmp_path, folder, name):
     rows = ROWS[folder][name]
     programs = read_system(GOLDEN / folder / f"{name}.gwen")

@@ -116,6 +116,7 @@ def test_ajpf_missing_is_not_run_and_says_how_to_get_it(lift, tmp_path, monkeypa
     assert "AJPF_HOME" in report.outcomes[0].summary
 
 
+@pytest.mark.slow
 def test_answers_are_kept_and_asked_again_when_anything_changes(lift, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     _installed(tmp_path, monkeypatch, HOLDS)

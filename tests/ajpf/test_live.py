@@ -50,6 +50,7 @@ def test_it_acts_and_rests_and_perceives(tmp_path: Path) -> None:
     assert agent.perceive(["dark"]) is None  # it is lit
 
 
+@pytest.mark.slow
 def test_a_program_that_never_acts_is_told(tmp_path: Path) -> None:
     loop = PROGRAM.replace("+at(N), peek(N, M), +seen(N);", "+!look(N) [perform];")
     with pytest.raises(Endless):

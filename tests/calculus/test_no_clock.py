@@ -6,6 +6,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 ROOMS = ("avow/sanity", "avow/solving", "avow/calculus", "avow/formulas", "avow/evaluation", "backends/hoare")
 
@@ -31,6 +33,7 @@ def limits_by_the_clock(path: Path) -> list[str]:
     return [line.strip() for line in path.read_text("utf-8").splitlines() if '"timeout"' in line and ".set(" in line]
 
 
+@pytest.mark.slow
 def test_none_reads_a_clock() -> None:
     found = {p.relative_to(ROOT).as_posix() for room in ROOMS for p in (ROOT / room).rglob("*.py") if clocks(p)}
     assert found - {"backends/hoare/backend.py"} <= TOLD  # that one reads the day of a person's word

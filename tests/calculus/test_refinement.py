@@ -79,6 +79,7 @@ def test_of_a_contract_that_nothing_can_keep_it_says_so(guarantees: tuple[str, .
     assert ("not realizable: in.r = " in out) == at
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wanted",
     some(

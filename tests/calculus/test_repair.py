@@ -6,6 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.base.verdict import Outcome, Verdict
 from avow.cli.compose import command
@@ -178,7 +179,7 @@ def test_deep_formulas_do_no_harm(tmp_path: Path) -> None:
     assert outcomes(make(tmp_path, text))["whole.b.A1"].verdict in (Verdict.REFUTED, Verdict.UNKNOWN)
 
 
-@pytest.mark.parametrize("seed", [*range(5), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(5, 12))])
+@pytest.mark.parametrize("seed", some(range(12), 2, slow=3))
 def test_whatever_is_offered_does_it(tmp_path: Path, seed: int) -> None:
     """Random diamonds of linear contracts: each offer, taken up, makes the refuted side condition hold."""
     rng = random.Random(seed)

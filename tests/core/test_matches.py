@@ -6,8 +6,6 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 
 
@@ -35,9 +33,10 @@ def silent(source: str) -> Iterator[int]:
                 yield pattern.lineno
 
 
-@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_what_a_match_leaves_out_has_a_reason(path: Path) -> None:
-    assert not list(silent(path.read_text("utf-8"))), "assert_never, an exception, or a comment with the reason"
+def test_what_a_match_leaves_out_has_a_reason() -> None:
+    texts = {path: path.read_text("utf-8") for path in files()}
+    found = [f"{path}:{line}" for path, text in texts.items() if "case _" in text for line in silent(text)]
+    assert not found, "assert_never, an exception, or a comment with the reason"
 
 
 def test_a_silent_one_is_found() -> None:

@@ -215,6 +215,7 @@ DECOYS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.needs_dafny
 @pytest.mark.parametrize(
     "name",

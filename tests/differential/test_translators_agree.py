@@ -154,6 +154,7 @@ def many(seeds: range, folder: Path, backend: str, tool: Any) -> dict[Verdict, i
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 48), marks=pytest.mark.nightly)])
 def test_hoare_says_what_the_oracle_says(seeds: range, tmp_path: Path) -> None:
     found = many(seeds, tmp_path, "hoare", HOARE)
@@ -240,6 +241,7 @@ def mapping(name: str, sort: str) -> Any:
     return name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 120), marks=pytest.mark.nightly)])
 def test_the_monitor_says_what_the_oracle_says(seeds: range, tmp_path: Path) -> None:
     seen = {True: 0, False: 0}

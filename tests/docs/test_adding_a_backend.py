@@ -20,6 +20,7 @@ from avow.system.load import load_system
 PAGE = Path(__file__).parent.parent.parent / "docs" / "adding-a-backend.md"
 
 
+@pytest.mark.slow
 def test_the_example_works_as_a_plugin(workspace: Path) -> None:
     code = re.search(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     assert code is not None

@@ -107,6 +107,7 @@ def test_gitlab_runs_the_same() -> None:
     assert job["artifacts"]["reports"]["junit"] == "reports/*/junit.xml"
 
 
+@pytest.mark.slow
 def test_the_hooks_take_the_files_that_they_are_given(tmp_path: Path) -> None:
     assert run("avow init robot", tmp_path).returncode == 0
     place = tmp_path / "robot"

@@ -101,6 +101,7 @@ def tool_commands(place: Path, node: str, method: str) -> set[str]:
     return {tool_command(entry.evidence) for entry in entries if entry.evidence.method == method} - {""}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("template", some(["ros1", "ros2"], 1))
 def test_a_package_for_ros_has_a_test_and_a_monitor(template: str, tmp_path: Path) -> None:
     from xml.etree import ElementTree

@@ -149,6 +149,7 @@ CAUGHT = {
 }
 
 
+@pytest.mark.slow
 def test_what_of_ros_is_not_driven_is_refused_by_name_also_where_it_is_caught(tmp_path: Path) -> None:
     lines = "".join(f"\n        try: {line}\n        except Exception: pass" for line in CAUGHT)
     folder = system(tmp_path / "w", "rospy", ROS1.replace("# HERE", lines))
@@ -175,6 +176,7 @@ def test_a_recording_hangs_on_nothing_else(tmp_path: Path, line: str, why: str) 
     assert why in told(drive(folder, "watch", trace(tmp_path)))
 
 
+@pytest.mark.slow
 def test_nodes_of_ros_2_have_what_they_have(tmp_path: Path) -> None:
     folder = system(tmp_path / "w", "rclpy", ROS2.replace("# HERE", "self.create_client(None, 'x')"))
     assert "rclpy.node.Node.create_client" in told(drive(folder, "watch", trace(tmp_path)))
@@ -260,6 +262,7 @@ def test_a_bag_is_a_recording_too(tmp_path: Path, form: str) -> None:
     assert drive(folder, "watch", tmp_path / "made.jsonl", "--replay").return_value == 0
 
 
+@pytest.mark.slow
 def test_nothing_is_not_the_same(tmp_path: Path) -> None:
     silent = ROS1.replace("rospy.Timer(rospy.Duration(0.25), self.tick)", "pass")
     done = drive(system(tmp_path / "w", "rospy", silent), "watch", trace(tmp_path), "--replay")

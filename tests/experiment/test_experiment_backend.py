@@ -434,6 +434,7 @@ def test_bad_summaries_are_told(make_job: Callable[..., Any], tmp_path: Path, te
     assert settle(job).verdict is Verdict.ERROR
 
 
+@pytest.mark.slow
 def test_the_simulation_reproduces_its_data_byte_for_byte() -> None:
     program = ROOT / "remote_inspection/models/simulate_navigation.py"
     made = subprocess.run([sys.executable, program], capture_output=True, check=True, timeout=60).stdout

@@ -63,6 +63,7 @@ def test_the_rule_of_three() -> None:
     assert runs_needed(Fraction(1, 10**9), CONFIDENCE) is None
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 12), min_size=2, max_size=6))
 @settings(max_examples=200, deadline=None)
 def test_least_and_greatest_deviation_bound_every_data_set(values: list[int]) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from helpers import avow
 
 from avow.base.diagnostics import Rejected
 from avow.fretish.project import nodes, read
@@ -15,11 +14,6 @@ from avow.fretish.sentence import Unreadable, parse
 from avow.fretish.writing import to_fretish
 from avow.language.contract import Contract
 from avow.language.load import check_text
-
-
-def avow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "avow", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=120)
 
 
 def contract(text: str) -> Contract:
@@ -121,6 +115,7 @@ def export(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_export_with_variables(tmp_path: Path) -> None:
     path = export(tmp_path)
     done = avow("fretish", str(path), cwd=tmp_path)

@@ -241,6 +241,7 @@ def test_division_by_zero_breaks_a_triple(tmp_path: Path) -> None:
     assert verdicts(job(tmp_path, small("out.y * in.b == in.a", "in.b > 0"), "y := a / b"))["G1"] is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_a_run_without_an_output_refutes_what_a_triple_cannot_tell(tmp_path: Path) -> None:
     """Where b is 0, the guarantee has no truth value: no run shows its triple to be broken. But there is no output."""
     rcl = small("0 <= in.a / in.b < 1 -> out.y <= in.a")

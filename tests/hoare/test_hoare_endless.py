@@ -60,7 +60,8 @@ def settle(folder: Path, program: str, formula: str = "y == 0", assume: str = ""
             ),
             ("n := 0\nWHILE n < a INVARIANT TRUE VARIANT a - n DO\n  n := n - 1", ""),  # a variant that does not fall
         ],
-        5,
+        3,
+        slow=2,
     ),
 )
 def test_a_run_that_never_ends_is_found(tmp_path: Path, loop: str, assume: str) -> None:
@@ -79,7 +80,8 @@ def test_a_run_that_never_ends_is_found(tmp_path: Path, loop: str, assume: str) 
             ("q := 0\nWHILE q < 10000 INVARIANT y == 0 DO\n  q := q + 1", Verdict.PARTIAL),  # long, and it ends
             ("n := 0\nWHILE n * n < 50000000 INVARIANT y == 0 DO\n  n := n + 1", Verdict.PARTIAL),
         ],
-        2,
+        1,
+        slow=1,
     ),
 )
 def test_a_loop_that_ends_is_not_called_endless(tmp_path: Path, loop: str, verdict: Verdict) -> None:

@@ -66,6 +66,7 @@ def with_constants(draw: st.DrawFn) -> Term:
     return Not(joined) if draw(st.booleans()) else joined
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.one_of(formulas(), with_constants()))
 def test_simplified_formulas_mean_the_same(formula: Term) -> None:
@@ -93,6 +94,7 @@ def numeric(draw: st.DrawFn, depth: int = 3) -> Term:
     return Compare(operator, draw(st.sampled_from(parts)), draw(st.sampled_from(parts)))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(numeric())
 def test_also_with_numbers_and_divisions_by_anything(formula: Term) -> None:

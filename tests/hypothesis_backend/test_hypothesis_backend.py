@@ -68,11 +68,17 @@ def test_a_right_subject_is_tested_and_no_more(tmp_path: Path) -> None:
     [
         pytest.param("r < 120", "r < 130", {"medium"}, ("120", "130"), marks=pytest.mark.nightly),
         ("r < 120", "r <= 120", {"medium"}, ("120", "120")),
-        ("r < 250", "r <= 250", {"high"}, ("250", "250")),
+        pytest.param("r < 250", "r <= 250", {"high"}, ("250", "250"), marks=pytest.mark.slow),
         pytest.param('"green" if', '"orange" if', {"low"}, ("0", "120"), marks=pytest.mark.nightly),
-        ('"orange" if r < 250 else "red"', '"red" if r < 250 else "orange"', {"medium", "high"}, None),
+        pytest.param(
+            '"orange" if r < 250 else "red"',
+            '"red" if r < 250 else "orange"',
+            {"medium", "high"},
+            None,
+            marks=pytest.mark.slow,
+        ),
         pytest.param("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None, marks=pytest.mark.nightly),
-        ("done.add(command[1])", "done = {command[1]}", {"marks"}, None),
+        pytest.param("done.add(command[1])", "done = {command[1]}", {"marks"}, None, marks=pytest.mark.slow),
         ('== "inspect"', '!= "halt"', {"marks"}, None),
     ],
 )
@@ -100,6 +106,7 @@ def test_the_same_seed_gives_the_same_answer(tmp_path: Path) -> None:
     assert run(wanted, seed=3).outcomes == run(wanted, seed=3).outcomes
 
 
+@pytest.mark.slow
 def test_hypothesis_leaves_nothing_behind(tmp_path: Path) -> None:
     wanted = job(tmp_path)
     before = sorted(p.name for p in tmp_path.rglob("*"))
@@ -151,7 +158,8 @@ QUICK = ("answers by itself", "leaves hard", "lies about types", "patches the ju
 
 
 @pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.nightly) for n in sorted(HOSTILE)]
+    "name",
+    [*some(QUICK, 1, slow=3), *(pytest.param(n, marks=pytest.mark.nightly) for n in sorted({*HOSTILE} - {*QUICK}))],
 )
 def test_nothing_that_a_subject_does_is_green(tmp_path: Path, name: str) -> None:
     found = settle(job(tmp_path, HOSTILE[name], cases=60), seconds=20)
@@ -165,6 +173,7 @@ def test_an_endless_subject_is_stopped(tmp_path: Path) -> None:
     assert all("does not answer" in o.summary for o in found.values())
 
 
+@pytest.mark.slow
 def test_a_crash_is_shown_with_its_smallest_input(tmp_path: Path) -> None:
     found = settle(job(tmp_path, HOSTILE["raises at times"]))
     low = found["low"]
@@ -187,11 +196,13 @@ def test_an_assumption_without_a_value_is_said_to_be_one(tmp_path: Path) -> None
     assert settle(job(tmp_path, text, both, "n", cases=30))["g"].verdict is Verdict.TESTED
 
 
+@pytest.mark.slow
 def test_printing_does_not_disturb(tmp_path: Path) -> None:
     noisy = STEP.replace("    done =", "    print('{}' * 1000, flush=True)\n    done =", 1)
     assert {o.verdict for o in settle(job(tmp_path, noisy)).values()} == {Verdict.TESTED}
 
 
+@pytest.mark.slow
 def test_a_faulty_guarantee_is_refuted_even_if_the_subject_crashes_elsewhere(tmp_path: Path) -> None:
     text = STEP.replace("r < 120", "r < 110").replace("    done =", "    assert r < 590\n    done =", 1)
     found = settle(job(tmp_path, text, cases=400))
@@ -221,7 +232,9 @@ def free(
     return settle(job(tmp_path, subject, rcl, "n", **more))["g"]
 
 
-@pytest.mark.parametrize(("guarantee", "supposed"), [("out.y != out.z", 1), ("in.a > 3 -> in.a > 2", 0)])
+@pytest.mark.parametrize(
+    ("guarantee", "supposed"), some([("out.y != out.z", 1), ("in.a > 3 -> in.a > 2", 0)], 1, slow=1)
+)
 def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, supposed: int) -> None:
     """A type of which nothing is known may have one element only: then no subject answers with two."""
     subject = "def step(**inputs):\n    return {'y': 'U#0', 'z': 'U#1'}\n"
@@ -235,8 +248,14 @@ def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, suppo
     ("text", "verdict"),
     [
         ("def f(x):\n    return id(object()) // 16 % 997 / 1000\n", Verdict.UNKNOWN),
-        ("import _random\nr = _random.Random()\ndef f(x):\n    return r.random()\n", Verdict.UNKNOWN),
-        ("n = 0\ndef f(x):\n    global n\n    n += 1\n    return 1 / n\n", Verdict.TESTED),
+        pytest.param(
+            "import _random\nr = _random.Random()\ndef f(x):\n    return r.random()\n",
+            Verdict.UNKNOWN,
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "n = 0\ndef f(x):\n    global n\n    n += 1\n    return 1 / n\n", Verdict.TESTED, marks=pytest.mark.slow
+        ),
         ("def f(x):\n    return {object() for _ in 'ab'} and 1\n", Verdict.TESTED),
     ],
 )
@@ -247,17 +266,20 @@ def test_what_comes_of_chance_is_not_green(tmp_path: Path, text: str, verdict: V
     assert ("undeclared input" in found.summary) is (verdict is Verdict.UNKNOWN)
 
 
+@pytest.mark.slow
 def test_an_antecedent_that_is_never_met_is_not_green(tmp_path: Path) -> None:
     found = free(tmp_path, "in.a * in.a == 2 -> out.y == 5", "def step(a): return 0")
     assert (found.verdict, found.vacuous) == (Verdict.UNKNOWN, True)
 
 
+@pytest.mark.slow
 def test_assumptions_that_are_never_met_are_not_green(tmp_path: Path) -> None:
     found = free(tmp_path, "out.y == 5", "def step(a): return 5", assume="in.a * in.a == 2")
     assert found.verdict is Verdict.UNKNOWN
     assert "assumptions" in found.summary
 
 
+@pytest.mark.slow
 def test_a_rare_condition_is_aimed_at(tmp_path: Path) -> None:
     found = free(
         tmp_path,
@@ -268,6 +290,7 @@ def test_a_rare_condition_is_aimed_at(tmp_path: Path) -> None:
     assert found.verdict is Verdict.REFUTED
 
 
+@pytest.mark.slow
 def test_assumptions_are_repaired(tmp_path: Path) -> None:
     found = free(
         tmp_path,
@@ -280,11 +303,13 @@ def test_assumptions_are_repaired(tmp_path: Path) -> None:
     assert found.bound["cases"] == 150
 
 
+@pytest.mark.slow
 def test_a_small_space_of_inputs(tmp_path: Path) -> None:
     found = free(tmp_path, "in.c == on -> out.y == 1", 'def step(c): return 1 if c == "on" else 0', inputs="c : C")
     assert found.verdict is Verdict.TESTED
 
 
+@pytest.mark.slow
 def test_data_sequences_tuples_functions_and_unspecified_sorts(tmp_path: Path) -> None:
     subject = """
 def step(d, f, u, p):
@@ -304,6 +329,7 @@ def step(d, f, u, p):
     assert found.verdict is Verdict.TESTED, found.summary
 
 
+@pytest.mark.slow
 def test_what_cannot_be_judged_is_not_green(tmp_path: Path) -> None:
     hard = "forall(i in INTEGER | i * i * i + out.y * i != 42 * in.a + 11 * i * i) or out.y == 1 / (in.a - in.a)"
     found = free(tmp_path, hard, "def step(a): return a", cases=3)
@@ -415,6 +441,7 @@ def named(texts: Sequence[str]) -> str:
     )
 
 
+@pytest.mark.slow
 def test_the_contracts_text_never_becomes_code(tmp_path: Path) -> None:
     subject = "def step(**inputs):\n    return inputs['class']"
     wanted = job(tmp_path, subject, named(TEXTS), "n", cases=120)

@@ -36,6 +36,7 @@ def settle(
     return {o.obligation.rpartition("/")[2]: o for o in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("node", "file"), some([("radiationSensor", "radiation_sensor.py:step"), ("agent", "agent.py:decide")], 1)
 )
@@ -52,9 +53,11 @@ def test_the_repaired_nodes_pass(tmp_path: Path, root: Path, node: str, file: st
             '("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}, marks=pytest.mark.nightly
         ),
         pytest.param('("inspect", here)', '("inspect", here + 1)', {"inspect_here"}, marks=pytest.mark.nightly),
-        ('("red", "orange")', '("red",)', {"exit_on_danger", "abandon"}),
+        pytest.param('("red", "orange")', '("red",)', {"exit_on_danger", "abandon"}, marks=pytest.mark.slow),
         pytest.param('or phase == "leaving"', "", {"exit_on_danger", "abandon"}, marks=pytest.mark.nightly),
-        ("not inspected(here)", "inspected(here)", {"next_waypoint", "inspect_here"}),
+        pytest.param(
+            "not inspected(here)", "inspected(here)", {"next_waypoint", "inspect_here"}, marks=pytest.mark.slow
+        ),
         pytest.param("EXIT = 0", "EXIT = 1", {"exit_on_danger"}, marks=pytest.mark.nightly),
     ],
 )
@@ -119,6 +122,7 @@ def test_the_generated_contracts_hold_both_kinds() -> None:
     assert len({("<=" in text) for text in wrong}) == 2
 
 
+@pytest.mark.slow
 def test_a_scenario_gives_the_places(tmp_path: Path) -> None:
     """With a scenario, its rows are the map: a place that only they have is tried."""
     rcl = """

@@ -88,6 +88,7 @@ def settle(folder: Path, node: str, program: str, **options: Any) -> Outcome:
     return outcome
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("node", some(RIGHT, 1))
 def test_the_right_ones_stand(tmp_path: Path, node: str) -> None:
     outcome = settle(tmp_path, node, RIGHT[node])
@@ -118,7 +119,7 @@ SPECIALS = [
 ]
 
 
-@pytest.mark.parametrize(("node", "program", "numbers", "verdict"), some(SPECIALS, 2))
+@pytest.mark.parametrize(("node", "program", "numbers", "verdict"), some(SPECIALS, 1, slow=1))
 def test_machine_numbers(tmp_path: Path, node: str, program: str, numbers: str, verdict: Verdict) -> None:
     outcome = settle(tmp_path, node, program, numbers=numbers)
     assert outcome.verdict is verdict, outcome.summary

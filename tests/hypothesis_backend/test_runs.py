@@ -133,6 +133,7 @@ def f(a):
 """
 
 
+@pytest.mark.slow
 def test_what_a_function_keeps_between_runs_settles_nothing(tmp_path: Path) -> None:
     """No run of a fresh process breaks the guarantee: that is no refutation, and no good answer."""
     rcl = "node n { inputs( a : BOOL ) outputs( b : BOOL ) topics() guarantee g ( historically(b) or fell(b) or a ) }"
@@ -159,6 +160,7 @@ def test_what_has_no_steps_is_refused_by_name(clauses: str, said: str, tmp_path:
     assert [d.code for d in one_step.check(BACKEND, work)] == ["BACKEND006"]
 
 
+@pytest.mark.slow
 def test_a_deadline_that_no_run_reaches_is_not_tested(tmp_path: Path) -> None:
     rcl = "node n { inputs( a : BOOL ) outputs( b : BOOL ) topics() guarantee g ( a -> within[5000 steps](b) ) }"
     (found,) = run(job(tmp_path, "def f(a):\n    return False\n", rcl, "s.py:f")).outcomes

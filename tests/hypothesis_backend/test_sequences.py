@@ -91,6 +91,7 @@ COUNT = "inputs( go : BOOL, n : NATURAL ) outputs( u : BOOL, n : NATURAL )"
 COUNTS = "go):\n        self.n = self.n + 1 if go else 0\n        return self.n > 4\n"
 
 
+@pytest.mark.slow
 def test_memory_is_what_the_class_had(tmp_path: Path) -> None:
     """A fault that shows only after five steps in a row; the counterexample has these and no more."""
     clauses = "guarantee g ( in.go -> out.n == in.n + 1 and not out.u )"
@@ -101,6 +102,7 @@ def test_memory_is_what_the_class_had(tmp_path: Path) -> None:
     assert dict(found.counterexample.values)["in.n"] == "4"
 
 
+@pytest.mark.slow
 def test_a_case_is_tried_again_first(tmp_path: Path) -> None:
     clauses = "guarantee g ( in.go -> out.n == in.n + 1 and not out.u )"
     work = job(tmp_path, COUNT, clauses, COUNTS, n="n")
@@ -110,6 +112,7 @@ def test_a_case_is_tried_again_first(tmp_path: Path) -> None:
     assert second.verdict is Verdict.REFUTED
 
 
+@pytest.mark.slow
 def test_what_another_process_answers_otherwise_is_no_function(tmp_path: Path) -> None:
     step = "r):\n        return float(id(object()) % 1000)\n"
     found = outcome(tmp_path, REAL, "guarantee g ( out.u >= 0 )", step)
@@ -159,6 +162,7 @@ def wide(folder: Path, clause: str, step: str) -> Job:
     return method_job(system, system.contract.node("made"), work.method)
 
 
+@pytest.mark.slow
 def test_commands_are_tuples_and_ports_that_no_clause_speaks_of_are_left_out(tmp_path: Path) -> None:
     clause = "in.c == stop -> out.u == 5"
     # `stop` has no arguments, and comes as a tuple of its name

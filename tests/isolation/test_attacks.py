@@ -203,6 +203,7 @@ def _command(process: Path) -> str:
         return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", some(LEVELS, 1))
 def test_a_subject_that_looks_at_nothing_was_seen_to_look_at_nothing(
     tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch
@@ -226,6 +227,7 @@ def test_a_required_sandbox_that_is_missing_runs_nothing(tmp_path: Path, monkeyp
     assert "bubblewrap" in report.outcomes[0].summary
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not seals(), reason="bubblewrap does not run here")
 def test_a_sealed_subject_has_no_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, "required")

@@ -218,7 +218,7 @@ def started(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(not traces(), reason="strace does not run here")
-@pytest.mark.parametrize("sandbox", ["off", "required"])
+@pytest.mark.parametrize("sandbox", [pytest.param("off", marks=pytest.mark.slow), "required"])
 def test_what_a_started_program_reads_is_an_input(
     started: Path, tmp_path: Path, sandbox: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +237,7 @@ def test_what_a_started_program_reads_is_an_input(
     assert open_obligations(workspace, method(started), Run("third", False))
 
 
+@pytest.mark.slow
 def test_a_started_program_is_undeclared_where_nothing_traces_it(
     started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -306,6 +307,7 @@ def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str) -> None:
     assert outside(tmp_path, UNRECORDABLE[name])
 
 
+@pytest.mark.slow
 def test_what_cannot_be_recorded_is_not_green(tmp_path: Path) -> None:
     folder = tmp_path / "contracts" / "robot"
     (folder / "models").mkdir(parents=True)
@@ -391,6 +393,7 @@ def test_the_machine_s_time_zone_is_no_subject_s(tmp_path: Path) -> None:
     assert not outside(tmp_path, "import os, time\ntop = 10 if os.environ['TZ'] == 'UTC' == time.tzname[0] else 9\n")
 
 
+@pytest.mark.slow
 def test_a_compiled_file_never_stands_for_its_source(tmp_path: Path) -> None:
     folder = tmp_path / "contracts" / "robot"
     (folder / "models").mkdir(parents=True)

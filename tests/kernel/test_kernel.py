@@ -139,6 +139,7 @@ def test_an_edit_makes_stale_what_used_it_and_nothing_else(tmp_path: Path) -> No
         established(compose(make(tmp_path / "initial", LOOP, rewired)).certificates, certificate)
 
 
+@pytest.mark.slow
 def test_where_the_second_solver_says_the_opposite_nothing_is_established(tmp_path: Path) -> None:
     certificates, certificate = made(tmp_path)
     certificates.solvers = Solvers(second=lambda script: ask_z3(script, BUDGET))

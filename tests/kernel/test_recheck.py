@@ -36,6 +36,7 @@ def test_recheck(tmp_path: Path) -> None:
     assert "stale" in told
 
 
+@pytest.mark.slow
 def test_nothing_to_establish_and_wrong_labels_are_no_success(tmp_path: Path) -> None:
     _, certificate = made(tmp_path / "system")
     good, kept = to_json(certificate), tmp_path / "certificates.json"

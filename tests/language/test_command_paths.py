@@ -136,6 +136,7 @@ def test_folders_without_contracts(place: Path, capsys: pytest.CaptureFixture[st
         assert "no" in said
 
 
+@pytest.mark.slow
 def test_a_file_name_that_is_no_text(place: Path) -> None:
     """Python has lone surrogates for its bytes, which no JSON reader and no terminal takes."""
     import json

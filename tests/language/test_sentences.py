@@ -138,6 +138,7 @@ def test_without_a_sentence_there_is_nothing_to_compare() -> None:
     assert found("guarantee( in.b <=> out.ok )") == []
 
 
+@pytest.mark.slow
 def test_sentences_of_any_kind_are_read_quickly() -> None:
     for sentence in (
         "less than " * 30_000,

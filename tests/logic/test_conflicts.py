@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from itertools import combinations, product
 
 import pytest
+from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.formulas.values import Value
@@ -32,7 +33,7 @@ def least(failing: Iterable[frozenset[str]]) -> set[frozenset[str]]:
     return {s for s in listed if not any(other < s for other in listed)}
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", some(range(60), 20, slow=40))
 def test_every_minimal_set_is_found(seed: int) -> None:
     draw = random.Random(seed)
     wanted = least(frozenset(draw.sample(LABELS, draw.randint(1, 4))) for _ in range(draw.randint(0, 9)))
@@ -94,7 +95,7 @@ def drawn(draw: random.Random) -> str:
     return f"node n {{ {ports} {assume} {guarantees} }}"
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", some(range(12), 4, slow=8))
 def test_conflicts_are_those_of_enumeration_and_are_wherever_it_is_said(seed: int) -> None:
     text = drawn(random.Random(seed))
     (node,) = contract(text).nodes
@@ -148,6 +149,7 @@ def test_inputs_that_do_not_matter_are_left_out_and_numbers_have_a_region() -> N
     assert all(v.role is Role.INPUT for v in conflict.inputs)
 
 
+@pytest.mark.slow
 def test_all_of_many_are_found() -> None:
     """Twenty guarantees, four of which exclude each other in twos."""
     modes = ", ".join(f"m{k}" for k in range(4))

@@ -73,6 +73,7 @@ def test_a_function_beside_a_number_stays_a_function() -> None:
     assert pointwise({c.name: c.formula for c in of.guarantees}, [p.variable for p in of.outputs]) is None
 
 
+@pytest.mark.slow
 def test_a_value_chosen_for_each_point_is_not_one_for_all() -> None:
     """For each x some k is greater than g(x); no k is for all of them, and none is claimed."""
     of = node("inputs( g : REAL --> REAL ) outputs( k : REAL )|guarantee( forall(x in REAL | g(x) < k) )")

@@ -36,6 +36,7 @@ PAIRS = (
 CAN, CANNOT = "forall(i in INTEGER | m(i) <=> i > k)", "forall(i in INTEGER | (m(i) <=> i > k) and (m(i) <=> i < k))"
 
 
+@pytest.mark.slow
 def test_they_are_decided() -> None:
     assert {realizable(text) for text in RIGHT} == {Verdict.PROVED}
     assert {realizable(text) for text in WRONG} == {Verdict.REFUTED}

@@ -228,6 +228,7 @@ def test_the_published_radiation_sensor_says_nothing(published: dict[str, dict[s
     assert published["agent"]["not-tautological-A1"].verdict is Verdict.REFUTED, "an assumption that is true by typing"
 
 
+@pytest.mark.slow
 def test_the_other_published_nodes_are_sound(published: dict[str, dict[str, SanityResult]]) -> None:
     for name in ("localisation", "navigation"):
         assert not [r.name for r in published[name].values() if r.fails]
@@ -275,6 +276,7 @@ def test_names_of_claims_are_unique() -> None:
             assert len(names) == len(set(names))
 
 
+@pytest.mark.slow
 def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
     of = node(
         "inputs( f : NATURAL --> NATURAL ) outputs( v : NATURAL )"

@@ -62,6 +62,7 @@ def test_a_bad_contract(tmp_path: Path, root: Path) -> None:
     assert answer["conflicts"][0]["clauses"] == ["low", "high"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "claim"),
     [

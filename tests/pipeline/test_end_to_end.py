@@ -280,6 +280,7 @@ def test_one_system_by_name(robot: Path) -> None:
     assert verify(robot, "verify:nothere").returncode != 0
 
 
+@pytest.mark.slow
 def test_the_stages_are_listed(made: Path) -> None:
     done = verify(made, "list", "--all")
     for stage in ("check", "sanity", "compose", "obligations", "export", "discharge", "report", "verify"):

@@ -322,6 +322,7 @@ def test_a_constant_that_only_an_option_or_a_program_names_reruns_it(tmp_path: P
     assert changed(named, keys(folder)) == guarantees("gauge", "shallow good deep", "hoare")
 
 
+@pytest.mark.slow
 def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     folder = copied(SHIPPED, tmp_path)
     before = keys(folder)
@@ -368,7 +369,13 @@ def watched(folder: Path) -> System:
 
 
 @pytest.mark.parametrize(
-    "method", ["hypothesis", "rosmonitoring", pytest.param("ajpf", marks=pytest.mark.nightly), "sanity"]
+    "method",
+    [
+        pytest.param("hypothesis", marks=pytest.mark.slow),
+        "rosmonitoring",
+        pytest.param("ajpf", marks=pytest.mark.nightly),
+        "sanity",
+    ],
 )
 def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, method: str) -> None:
     folder = copied(SHIPPED, tmp_path)
@@ -402,6 +409,7 @@ def test_temporal_requirements_look_at_the_steps_and_others_do_not(tmp_path: Pat
         temporal(composition, Bounds(effort=300))
 
 
+@pytest.mark.slow
 def test_a_plug_in_is_taken_to_look_at_the_steps(tmp_path: Path) -> None:
     system = load_system(copied(SHIPPED, tmp_path))
     given = system.plan.scenario
@@ -494,6 +502,7 @@ def test_another_backend_tool_or_solver_reruns_what_it_answered(
     assert changed(before, keys(folder)) == set()
 
 
+@pytest.mark.slow
 def test_wiring_reruns_the_monitors_and_only_them(tmp_path: Path) -> None:
     folder = copied(SHIPPED, tmp_path)
     before = keys(folder)

@@ -45,6 +45,7 @@ def asked(folder: Path) -> Report:
     return BACKEND.discharge(method_job(system, node, method), folder / "made", Limits(seconds=120))
 
 
+@pytest.mark.slow
 def test_they_agree(tmp_path: Path) -> None:
     written(tmp_path / "s")
     found = {o.obligation.rpartition("/")[2]: o for o in asked(tmp_path / "s").outcomes}

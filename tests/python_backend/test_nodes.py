@@ -92,6 +92,7 @@ def test_what_init_makes_has_to_meet_what_is_assumed_of_memory(tmp_path: Path) -
         assert "in.count = 5" in found.summary
 
 
+@pytest.mark.slow
 def test_what_a_step_leaves_in_memory_is_a_hypothesis_unless_it_is_kept(tmp_path: Path) -> None:
     kept = NODES["debouncer"].settled(tmp_path / "kept")["says"]
     assert not any("memory" in h for h in kept.hypotheses)
@@ -126,6 +127,7 @@ UNROLLED = """class Limiter:
 """
 
 
+@pytest.mark.slow
 def test_a_counted_loop_needs_no_invariant(tmp_path: Path) -> None:
     ports = "node limiter { inputs( v : REAL ) outputs( u : REAL ) topics()"
     rcl = f"{ports} guarantee g ( out.u == (if in.v > 100 then 0 else 1.5) ) }}"

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from assurance.sample import rover_case
 from calculus.make import make
 from kernel.test_kernel import LOOP, PLAN, made
@@ -17,6 +18,7 @@ from avow.calculus.obligations import reestablished
 from avow.report import check as module
 
 
+@pytest.mark.slow
 def test_what_the_kernel_is_said_to_have_established_is_established_again(tmp_path: Path) -> None:
     """An edited certificate, another claim's key or scope, a claim that has no certificate: the kernel does not believe
     them, whatever else in the report agrees."""

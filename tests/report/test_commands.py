@@ -110,6 +110,7 @@ def test_explain_shows_runs_and_history_and_says_what_is_near(root: Path) -> Non
         run(explain, "REQ4")
 
 
+@pytest.mark.slow
 def test_report_check(root: Path) -> None:
     for given in ("reports/rover", "rover", "contracts/rover", "reports/rover/report.json"):
         code, text = run(report, "--check", given)

@@ -188,6 +188,7 @@ class Spoken:
     def __exit__(self, *_: object) -> None: ...
 
 
+@pytest.mark.slow
 def test_a_running_graph_gives_record_timeline_and_mcap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limits(tmp_path)
     events = pairs(40)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import some
+from helpers import avow, some
 
 from avow.backends.rosmonitoring.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
@@ -18,9 +17,8 @@ from avow.system.plan import System
 from rosmonitoring.conftest import CASE
 
 
-def avow(*arguments: str, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "avow", "monitor", *arguments]
-    return subprocess.run(command, input=stdin, capture_output=True, text=True, timeout=120)
+def monitor(*arguments: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    return avow("monitor", *arguments, cwd=Path.cwd(), stdin=stdin)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +36,7 @@ def traces(case_folder: Path) -> dict[str, Path]:
 
 
 def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
-    done = avow(str(case_folder), str(traces["nominal"]))
+    done = monitor(str(case_folder), str(traces["nominal"]))
     assert (done.returncode, done.stderr) == (0, "")
     assert "nothing broken" in done.stdout
     assert "agent.next_waypoint (guarantee): published 17 times: held 16, before the first value 1" in done.stdout
@@ -46,7 +44,7 @@ def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
 
 def test_topics_that_nobody_listens_to_are_told_with_those_that_are() -> None:
     line = '{"topic": "/raditaion", "time": %d, "radiation": 1}'
-    done = avow(str(CASE), "-", "--node", "radiationSensor", stdin="\n".join(line % n for n in range(3)))
+    done = monitor(str(CASE), "-", "--node", "radiationSensor", stdin="\n".join(line % n for n in range(3)))
     assert done.returncode == 1
     assert "topics of the trace that no clause speaks of, and their events: /raditaion (3)" in done.stdout
     told = next(row for row in done.stdout.splitlines() if row.startswith("topics listened to: "))
@@ -62,7 +60,7 @@ def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[
         and json.loads(row)["time"] > 0
         and json.loads(text.splitlines()[k - 1]).get("radiation", 0) >= 250
     )
-    done = avow(str(case_folder), "-", "--json", "--node", "radiationSensor", stdin=text)
+    done = monitor(str(case_folder), "-", "--json", "--node", "radiationSensor", stdin=text)
     assert done.returncode == 1
     whole = json.loads(done.stdout)
     (violation,) = whole["violations"]
@@ -90,9 +88,9 @@ def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[
 )
 def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str, Path], trace: str, words: str) -> None:
     if trace == "nodes":
-        done = avow(str(case_folder), str(traces["nominal"]), "--node", "agnt")
+        done = monitor(str(case_folder), str(traces["nominal"]), "--node", "agnt")
     else:
-        done = avow(str(case_folder), str(traces.get(trace, case_folder / "absent.jsonl")))
+        done = monitor(str(case_folder), str(traces.get(trace, case_folder / "absent.jsonl")))
     assert done.returncode == 2
     assert words in done.stderr
     assert "Traceback" not in done.stderr
@@ -102,14 +100,15 @@ def test_a_trace_of_other_topics_is_no_success(case_folder: Path, traces: dict[s
     """Seeded fault: a remapped robot, whose every topic has another name."""
     events = [json.loads(line) for line in traces["nominal"].read_text().splitlines()]
     text = "".join(json.dumps({**event, "topic": f"robot2/{event['topic']}"}) + "\n" for event in events)
-    done = avow(str(case_folder), "-", stdin=text)
+    done = monitor(str(case_folder), "-", stdin=text)
     assert done.returncode == 1
     assert "nothing was judged" in done.stdout
 
 
+@pytest.mark.slow
 def test_usage(case_folder: Path) -> None:
-    assert avow(str(case_folder)).returncode == 2
-    assert avow(str(case_folder), "x", "--serve", "0").returncode == 2
+    assert monitor(str(case_folder)).returncode == 2
+    assert monitor(str(case_folder), "x", "--serve", "0").returncode == 2
 
 
 def test_replies_always_carry_a_verdict_and_never_a_final_one(case: System, nominal: list[dict[str, Any]]) -> None:

@@ -39,6 +39,7 @@ def same(line: str, event: Event) -> bool:
     return {key: event.get(key) for key in said} == {**said, "topic": f"/{said['topic']}"}
 
 
+@pytest.mark.slow
 def test_a_mission_without_faults_is_the_recorded_one(tmp_path: Path) -> None:
     done = drive("--record", str(tmp_path / "run.bag"))
     assert done.returncode == 0, done.stdout + done.stderr

@@ -104,6 +104,7 @@ def test_a_lie_that_was_kept_proves_nothing(tmp_path: Path, monkeypatch: pytest.
     assert reestablished(Certificates(compose(system), composition.certificates.made), lied.obligation) is None
 
 
+@pytest.mark.slow
 def test_answers_are_kept_beside_the_evidence_and_bound_to_it(tmp_path: Path) -> None:
     workspace, folder = Workspace(tmp_path), tmp_path / "contracts" / "made"
     folder.mkdir(parents=True)

@@ -236,6 +236,7 @@ sys.stdout.buffer.write(said)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", some(["sanity", "hoare", "compose"], 1))
 def test_a_worker_reads_nothing_of_the_workspace(folder: Path, engine: str) -> None:
     work = next(w for w in works(folder) if w.engine == engine)

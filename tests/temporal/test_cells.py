@@ -235,6 +235,7 @@ def test_what_is_printed_reads_back(seed: int) -> None:
             assert bool(histories(clause.formula)) == bool(histories(term))
 
 
+@pytest.mark.slow
 def test_the_smtlib_script_is_one_step_of_any_run() -> None:
     """With the cells at their first values it has exactly the first steps that keep the clauses; what a step leaves is
     what the cells have next."""

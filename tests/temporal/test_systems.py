@@ -188,6 +188,7 @@ def test_what_is_remembered_of_each_value(tmp_path: Path) -> None:
     assert found["whole.b.stays"] is Verdict.REFUTED
 
 
+@pytest.mark.slow
 def test_of_a_node_that_assumes_more_than_steps_can_break_nothing_is_proved(tmp_path: Path) -> None:
     assert Verdict.PROVED not in made(tmp_path, "assume ever ( w -> eventually(v) )").values()
 

@@ -70,7 +70,7 @@ def node_of(assumed: Term, promised: list[Term]) -> Node:
     )
 
 
-@pytest.mark.parametrize("seed", some(range(1000), 40))
+@pytest.mark.parametrize("seed", some(range(1000), 15, slow=25))
 def test_the_game_says_the_same(seed: int) -> None:
     assumed, promised = drawn(seed)
     found = viable(compile_node(node_of(assumed, promised)), effort=2_000)
@@ -186,7 +186,7 @@ def test_what_is_said_of_a_clause_is_so_in_every_run(seed: int) -> None:
     [
         ("not-tautological-g1", Verdict.PROVED),
         ("not-tautological-never", Verdict.REFUTED),
-        ("constrained-y", Verdict.UNKNOWN),
+        pytest.param("constrained-y", Verdict.UNKNOWN, marks=pytest.mark.slow),
     ],
 )
 def test_what_other_clauses_keep_runs_from_is_no_tautology(name: str, verdict: Verdict) -> None:
