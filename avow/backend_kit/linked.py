@@ -1,4 +1,5 @@
-"""A model that was verified in the place of a program, held against the program: both are given the same steps.
+"""A model that was verified in the place of a program, held against the program: both are given the same steps, those
+that the program's own method draws and those of the recordings that the plan names.
 
 A difference refutes the *link* between the two, a claim of its own (`ProgramClaim.LINKED`): the guarantee may well hold
 of either. A backend whose models can be run says so (`Backend.runs_models`); one that runs the program asks here.
@@ -7,18 +8,19 @@ of either. A backend whose models can be run says so (`Backend.runs_models`); on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
-from avow.backend_kit.protocol import Job, NoModel
-from avow.backend_kit.registry import backend
+from avow.backend_kit.protocol import Backend, Job, NoModel, wired
+from avow.backend_kit.registry import backend, judge_of_runs
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
+from avow.formulas.values import Element, Value, show
 from avow.formulas.values import Sequence as SequenceValue
-from avow.formulas.values import Value, show
 from avow.system.plan import Method, System
-from avow.tuning.bounds import ROUNDED_PART
+from avow.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 
 Step = Mapping[str, Value]
 """A step's inputs and outputs by qualified name."""
@@ -31,16 +33,132 @@ def models(system: System, node: str) -> tuple[Method, ...]:
     return tuple(sorted(found, key=lambda m: m.id))
 
 
-def settled(job: Job, steps: Sequence[Step], why: str = "") -> tuple[Outcome, ...]:
+def unrun(system: System, node: str) -> tuple[Method, ...]:
+    """The node's methods whose models cannot be run."""
+    plan = system.plan
+    found = (m for m in plan.node(node).methods if backend(m.backend, plan.plugins).not_run)
+    return tuple(sorted(found, key=lambda m: m.id))
+
+
+def recordings(system: System, node: str) -> tuple[Method, ...]:
+    """The node's methods to which the plan names recordings."""
+    plan = system.plan
+    found = (m for m in plan.node(node).methods if backend(m.backend, plan.plugins).records)
+    return tuple(sorted(found, key=lambda m: m.id))
+
+
+def beside(job: Job) -> tuple[Method, ...]:
+    """The other methods that the job's answer depends on: models that its program is held against, and recordings."""
+    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
+        return ()
+    system, node = job.system, job.node.name
+    return (*models(system, node), *recordings(system, node), *unrun(system, node))
+
+
+def reads_recordings(job: Job) -> bool:
+    """Whether the job's program is asked on recorded steps, which are read by topics, connections and scenario."""
+    return any(backend(m.backend, job.system.plan.plugins).records for m in beside(job))
+
+
+def connected(tool: Backend, job: Job) -> bool:
+    """Whether the job's answer may depend on topics, connections and other nodes."""
+    return wired(tool, job.source) or reads_recordings(job)
+
+
+def told_too(tool: Backend, job: Job) -> frozenset[str]:
+    """The backends whose options of other nodes the job's answer may depend on: its own, and those that read its
+    messages."""
+    judge = judge_of_runs() if wired(tool, job.source) and not tool.uses_wiring else None
+    reading = [m.backend for m in beside(job) if backend(m.backend, job.system.plan.plugins).records]
+    return frozenset((tool.name, *reading, *([judge.name] if judge is not None else [])))
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What the recordings of a node have for its program."""
+
+    runs: tuple[tuple[Mapping[str, Any], ...], ...] = ()
+    """For each recording the inputs of its steps, as a program is given them: port → float, int, bool, text, list."""
+    without: int = 0
+    """Steps that lack an input, or have one that is no machine value."""
+    wrong: str = ""
+    """Why a recording cannot be read."""
+
+
+def recorded(job: Job, ports: Sequence[str]) -> Recorded:
+    """The recorded steps on which the job's program can be asked: those that have all of these inputs, the first
+    few thousand."""
+    runs: list[tuple[Mapping[str, Any], ...]] = []
+    without = left = 0
+    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
+        return Recorded()
+    for method in recordings(job.system, job.node.name):
+        other = replace(job, method=method, obligations=(), claims=())
+        try:
+            for run in backend(method.backend, job.system.plan.plugins).steps(other):
+                asked = [_asked(step, ports) for step in run[: RECORDED_STEPS - left]]
+                without += asked.count(None)
+                left += len(asked)
+                runs.append(tuple(step for step in asked if step is not None))
+        except (Rejected, OSError) as error:
+            return Recorded((), without, f"the recordings of {method.id} cannot be read: {error}"[:300])
+    return Recorded(tuple(run for run in runs if run), without)
+
+
+def _asked(step: Step, ports: Sequence[str]) -> Mapping[str, Any] | None:
+    try:
+        return {name: _machine(step[f"in.{name}"]) for name in ports}
+    except (KeyError, OverflowError, TypeError):
+        return None
+
+
+def _machine(value: Value) -> Any:
+    """A value as a program is given it. Raises TypeError, OverflowError."""
+    match value:
+        case bool() | int():
+            return value
+        case Fraction():
+            return float(value)
+        case Element(name=name):
+            return name
+        case SequenceValue(items=items):
+            return [_machine(item) for item in items]
+    raise TypeError(value)
+
+
+def settled(
+    job: Job, steps: Sequence[Step], why: str = "", of_recordings: Recorded | None = None, kept: int = 0
+) -> tuple[Outcome, ...]:
     """The outcome of the job's claim that model and program agree, where it has one. `steps` are what the program did
-    within its assumptions; where there are none, `why` says it."""
-    return tuple(_held(job, claim, steps, why) for claim in job.claims if claim.name == ProgramClaim.LINKED)
+    within its assumptions, `kept` of them those of recordings; where there are none, `why` says it."""
+    found = of_recordings or Recorded()
+    claims = [claim for claim in job.claims if claim.name == ProgramClaim.LINKED]
+    if found.wrong:
+        return tuple(Outcome(claim.id, Verdict.UNKNOWN, found.wrong) for claim in claims)
+    return tuple(_told(_held(job, claim, steps, why), found, kept) for claim in claims)
+
+
+def _told(outcome: Outcome, found: Recorded, kept: int) -> Outcome:
+    """With what of the recordings it rests on."""
+    asked = sum(map(len, found.runs))
+    if not asked and not found.without:
+        return outcome
+    bound = {**outcome.bound, "recorded": kept}
+    summary = f"{outcome.summary}; {kept} of these steps were recorded" if outcome.verdict.supports else outcome.summary
+    return replace(outcome, bound={**bound, "recorded_unasked": asked - kept + found.without}, summary=summary)
 
 
 def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outcome:
+    plugins = job.system.plan.plugins
+    others = tuple(
+        f"the model of {m.id} is not held against the program: {backend(m.backend, plugins).not_run}"
+        for m in unrun(job.system, job.node.name)
+    )
     unknown = Outcome(
         claim.id, Verdict.UNKNOWN, why or "the program has answered nothing that the model could be held to"
     )
+    if not models(job.system, job.node.name):
+        return replace(unknown, summary="; ".join(others))
     if not steps:
         return unknown
     told, rounded, unsaid = [], 0, 0
@@ -57,18 +175,22 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
             if said is None:
                 unsaid += 1
                 continue
+            both = [name for name in said if name in step]
+            if not both:
+                unsaid += 1
+                continue
             compared += 1
-            differing = [name for name, value in said.items() if name in step and not _same(value, step[name])]
+            differing = [name for name in both if not _same(said[name], step[name])]
             if differing:
                 return _differs(claim, method, step, said, differing)
-            rounded += any(name in step and value != step[name] for name, value in said.items())
+            rounded += any(said[name] != step[name] for name in both)
         if not compared:
             return replace(unknown, summary=f"the model of {method.id} answers none of {len(steps)} steps")
         told.append(f"{method.id} on {compared}")
     about = f"the program answers as the model of {', '.join(told)} steps"
-    remarks = (f"in {rounded} of them but for rounding",) if rounded else ()
+    but = (f"in {rounded} of them but for rounding",) if rounded else ()
     bound: dict[str, object] = {"cases": len(steps), "rounded": rounded, "unanswered": unsaid}
-    return Outcome(claim.id, Verdict.TESTED, "; ".join((about, *remarks)), hypotheses=remarks, bound=bound)
+    return Outcome(claim.id, Verdict.TESTED, "; ".join((about, *but)), hypotheses=(*but, *others), bound=bound)
 
 
 def _said(run: Callable[[Step], Step], step: Step) -> Step | None:
@@ -95,4 +217,15 @@ def _differs(claim: Obligation, method: Method, step: Step, said: Step, names: I
     return Outcome(claim.id, Verdict.REFUTED, shown.text(), shown)
 
 
-__all__ = ["models", "settled"]
+__all__ = [
+    "Recorded",
+    "beside",
+    "connected",
+    "models",
+    "reads_recordings",
+    "recorded",
+    "recordings",
+    "settled",
+    "told_too",
+    "unrun",
+]

@@ -8,7 +8,7 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -219,6 +219,11 @@ class Backend(ABC):
     """What it says of the node's program besides its guarantees (`Job.claims`)."""
     runs_models: bool = False
     """Whether what it verifies is a model that can be run on single inputs (`model`)."""
+    not_run: str = ""
+    """Why the models that it verifies cannot be run on single inputs, in words: told where a program is held against
+    the node's models."""
+    records: bool = False
+    """Whether the plan names recordings of the running node to it, whose steps it can tell (`steps`)."""
     judges_runs: bool = False
     """Whether it can judge runs of messages that another backend makes (`judge`)."""
     of: Object = Object.MODEL
@@ -275,6 +280,11 @@ class Backend(ABC):
         input is at fault, and NoModel where there is nothing to be run; so does a call that has no answer."""
         raise NoModel(f"{self.name} has no model that can be run")
 
+    def steps(self, job: Job) -> Iterator[tuple[Mapping[str, Value], ...]]:
+        """Of each recording that the method's options name the node's steps: the inputs that were known, by qualified
+        name. Raises Rejected where one cannot be read."""
+        raise NotImplementedError(self.name)
+
     def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         """The contract's word on whole runs of messages on the node's topics: events as recordings have them (`topic`,
         `time` in seconds, fields; at the end one without a topic says how long it was). Of the method's options those
@@ -303,6 +313,8 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_source": bool,
     "claims": tuple,
     "runs_models": bool,
+    "not_run": str,
+    "records": bool,
     "judges_runs": bool,
     "of": Object,
     "portable": bool,

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.protocol import Backend, Job, wired
+from avow.backend_kit.linked import connected, reads_recordings, told_too
+from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import digest, sort_digest
 from avow.language.contract import Contract, Node
@@ -85,10 +86,10 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
     parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario
-    if tool.uses_scenario and scenario:
+    if (tool.uses_scenario or reads_recordings(job)) and scenario:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
-    if wired(tool, job.source):
-        parts.append(_wiring(job.system, job.node, tool.name))
+    if connected(tool, job):
+        parts.append(_wiring(job.system, job.node, told_too(tool, job)))
     parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream(tool, job))]
     if tool.uses_source and job.source is not None:
         declared = job.source
@@ -109,7 +110,7 @@ def _ports(node: Node) -> list[list[str]]:
     return sorted([p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs))
 
 
-def _wiring(system: System, node: Node, backend: str) -> list[Any]:
+def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
     """The node's topics, and for each edge that feeds it: the first value, the source's topics, and what the same
     backend is told of the source."""
     ros = system.plan.ros
@@ -121,7 +122,7 @@ def _wiring(system: System, node: Node, backend: str) -> list[Any]:
     except Rejected as rejected:  # told elsewhere
         return [*found, str(rejected)]
     for edge in sorted(edges, key=lambda e: (str(e.target), str(e.source))):
-        methods = [m for m in system.plan.node(edge.source.node).methods if m.backend == backend]
+        methods = [m for m in system.plan.node(edge.source.node).methods if m.backend in backends]
         told = [m.options.data for m in methods if isinstance(m.options.data, Mapping)]
         found.append(
             [
@@ -152,7 +153,7 @@ def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:
     node, plan = job.contract.node(name), job.system.plan.node(name)
     clauses = sorted([c.kind.value, c.name, digest(c.formula)] for c in node.clauses)
     told = [method_options(m) for m in plan.methods if m.backend == backend and name != job.node.name]
-    return [name, clauses, _ports(node), _wiring(job.system, node, backend), told]
+    return [name, clauses, _ports(node), _wiring(job.system, node, {backend}), told]
 
 
 def _topics(node: Node) -> list[list[str]]:

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from avow.backend_kit.protocol import Backend, Job, wired
-from avow.backend_kit.registry import backend
+from avow.backend_kit.linked import beside, connected, reads_recordings, told_too
+from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Span
 from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.variables import Frame
-from avow.evidence.obligation import ProgramClaim
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
@@ -24,7 +23,7 @@ from avow.pipeline.evidence_keys import Named, method_options
 from avow.pipeline.evidence_keys import upstream as upstream_of
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
-from avow.system.plan import Connection, Located, Method, NodePlan, Plan, Ros, System
+from avow.system.plan import Connection, Located, NodePlan, Plan, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +93,8 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     named = Named.of(method_options(job.method), tool.files(job))
     graph, own = dataflow(job.system), job.node.name
     upstream = upstream_of(tool, job)
-    connected = wired(tool, job.source)
-    edges = graph.feeding(own) if connected else ()
+    looks = connected(tool, job)
+    edges = graph.feeding(own) if looks else ()
     edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
     sources = {edge.source.node for edge in edges} - {own}
     contract = job.contract
@@ -107,13 +106,13 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     cut = replace(
         _bare(plan),
         nodes=(
-            _planned(tool, plan.node(job.node.name), job.method, plan.plugins),
-            *(_told(plan.node(name), tool.name) for name in sorted(sources)),
+            _planned(tool, plan.node(job.node.name), job),
+            *(_told(plan.node(name), told_too(tool, job)) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
-        messages=plan.messages if connected else (),
-        ros=plan.ros if connected else Ros(),
-        scenario=plan.scenario if tool.uses_scenario else None,
+        messages=plan.messages if looks else (),
+        ros=plan.ros if looks else Ros(),
+        scenario=plan.scenario if tool.uses_scenario or reads_recordings(job) else None,
         plugins=() if is_portable(tool) else plan.plugins,
     )
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes)
@@ -147,16 +146,15 @@ def _bare_clause(clause: Clause) -> Clause:
     return replace(clause, position=0, text="", sentence=None)
 
 
-def _planned(tool: Backend, node: NodePlan, method: Method, plugins: tuple[str, ...]) -> NodePlan:
-    """With the methods whose models the program is held against."""
-    others = (m for m in node.methods if m.id != method.id and backend(m.backend, plugins).runs_models)
-    beside = tuple(replace(m, guarantees=()) for m in others) if ProgramClaim.LINKED in tool.claims else ()
-    return replace(node, methods=(method, *beside), source=node.source if tool.uses_source else None)
+def _planned(tool: Backend, node: NodePlan, job: Job) -> NodePlan:
+    """With the methods whose models the program is held against, and those whose recordings it is asked on."""
+    others = tuple(replace(m, guarantees=()) for m in beside(job) if m.id != job.method.id)
+    return replace(node, methods=(job.method, *others), source=node.source if tool.uses_source else None)
 
 
-def _told(node: NodePlan, backend: str) -> NodePlan:
+def _told(node: NodePlan, backends: Collection[str]) -> NodePlan:
     """A source: what the same backend is told of it."""
-    return replace(node, criticality="", source=None, methods=tuple(m for m in node.methods if m.backend == backend))
+    return replace(node, criticality="", source=None, methods=tuple(m for m in node.methods if m.backend in backends))
 
 
 def _connection(edge: Edge) -> Connection:

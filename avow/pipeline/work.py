@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow.backend_kit.linked import models
+from avow.backend_kit.linked import beside, models, unrun
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -189,17 +189,18 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
 
 
 def _compared(system: System, job: Job) -> tuple[str, ...]:
-    """The models that the program is held against: their programs and options."""
-    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
-        return ()
+    """The models that the program is held against, and the recordings: their programs, files and options."""
     found = []
-    for method in models(system, job.node.name):
+    for method in beside(job):
         tool = method_backend(system, method)
+        if tool.not_run:
+            found.append([method.id, tool.not_run])
+            continue
         other = replace(job, method=method, obligations=(), claims=())
         found.append(
             [method.id, tool.name, tool.version, backend_digest(tool), method_options(method), _files(tool, other)]
         )
-    return (json.dumps(found),)
+    return (json.dumps(found),) if found else ()
 
 
 _BOUNDS = {"seconds": (0.1, 604_800), "megabytes": (64, 10_000_000), "seed": (0, 2**31 - 1)}
@@ -255,8 +256,8 @@ def method_job(system: System, node: Node, method: Method, tool: Backend | None 
 
 
 def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:
-    """A program agrees with a model where the plan has one that can be run."""
-    return name is not ProgramClaim.LINKED or bool(models(system, node.name))
+    """A program agrees with a model where the plan has one; where none can be run, the answer says why."""
+    return name is not ProgramClaim.LINKED or bool(models(system, node.name) or unrun(system, node.name))
 
 
 _CLAIMED = {

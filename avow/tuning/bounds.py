@@ -193,6 +193,9 @@ COUNTS_GUESSED = 6
 """Numbers below which a counter of a program and one that its contract has are guessed to agree, beside the limits that
 the contract writes down: programs that keep less than they count saturate early."""
 
+RECORDED_STEPS = 2000
+"""Steps of a node's recordings on which its program and its models are asked: some minutes of a robot at ten hertz."""
+
 ROUNDED_PART = 2**-40
 """The part of a REAL by which a program may differ from its model for rounding: thousands of roundings of a double."""
 

@@ -28,6 +28,10 @@ class AjpfBackend(Backend):
     uses_steps = False
     uses_wiring = False
     remembers = True
+    not_run = (
+        "an agent takes as many of its own steps as it likes for one of the contract's, and the plan's table says what "
+        "formulas mean to it, not which percepts an input is"
+    )
     link = Link.MAPPED
     options_schema = SCHEMA
     codes = CODES

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.given import told
+from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest
@@ -117,12 +118,15 @@ class Work:
         faults = _files(kept, "fault-", 10)
         found = [Drawn(data, made, reading.single) for data in (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2))]
         drawn = [one.steps(reading.asked, reading.steps) for one in found]
-        runs = _different([*self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
+        bench.recorded = recorded(self.job, [port.name for port in reading.asked])
+        shown = _different([[dict(step) for step in run] for run in bench.recorded.runs])
+        runs = _different([*shown, *self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
         answer = self._asked(built[1].program, runs, built[2].program)
         judged = 0
         for run, reply in zip(runs, answer["runs"], strict=False):
             bench.judge(run, reply)
             judged += 1
+            bench.kept = len(bench.compared) if judged <= len(shown) else bench.kept
         self._confirm(bench, built[1].program)
         if answer["unsteady"] is not None and not bench.broken:
             said = bench.words(runs[answer["unsteady"]])

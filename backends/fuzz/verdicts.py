@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from avow.backend_kit.linked import settled
+from avow.backend_kit.linked import Recorded, settled
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
@@ -82,6 +82,9 @@ class Bench:
     samples: list[list[Step]] = field(default_factory=list)
     compared: list[Mapping[str, Value]] = field(default_factory=list)
     """What the program made of allowed steps."""
+    recorded: Recorded = field(default_factory=Recorded)
+    kept: int = 0
+    """How many of those compared were recorded."""
 
     def __post_init__(self) -> None:
         job = self.reading.job
@@ -308,7 +311,8 @@ class Bench:
         refuting = job.options.get("nan") == "possible"
         own = tuple(self._own(o, counts, stopped and faulty is None, apart, refuting) for o in job.obligations)
         faultless = [claim for claim in job.claims if claim.name == ProgramClaim.FAULTLESS]
-        claims = (*(self._claim(c, counts, faulty, stopped) for c in faultless), *settled(job, self.compared))
+        links = settled(job, self.compared, "", self.recorded, self.kept)
+        claims = (*(self._claim(c, counts, faulty, stopped) for c in faultless), *links)
         rests = tuple(Hypothesis(HypothesisKind.CLAIM, c.local_id, c.digest, c.claim) for c in faultless)
         open_ones = self.reading.left_out
         remarks = (

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 from avow.backend_kit.given import told
-from avow.backend_kit.linked import settled
+from avow.backend_kit.linked import Recorded, recorded, settled
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.process import ToolMissing
@@ -59,7 +59,8 @@ def settle(job: Job, limits: Limits) -> Report:
         return Report((), TOOL, version)
     try:
         work = Work(reading, limits)
-        outcomes = (*work.outcomes(), *settled(job, work.compared))
+        outcomes = work.outcomes()
+        outcomes += settled(job, work.compared, "", work.recorded, work.kept)
     except ToolMissing as missing:
         return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
     what = {"of": Object.SOURCE, "numbers": reading.source.numbers.value}
@@ -88,6 +89,9 @@ class Work:
     """Cases that met the assumptions."""
     compared: list[Mapping[str, Value]] = field(default_factory=list)
     """What CPython made of them."""
+    recorded: Recorded = field(default_factory=Recorded)
+    kept: int = 0
+    """How many of those compared were recorded."""
 
     @property
     def job(self) -> Job:
@@ -100,7 +104,7 @@ class Work:
         cases = self.cases(assumed)
         if cases is None:
             return self.alike(Verdict.UNKNOWN, self.refusals())
-        fault = self.try_all(cases, formulas, assumed)
+        fault = self.try_recorded(formulas, assumed) or self.try_all(cases, formulas, assumed)
         if fault and reading.step is None:
             return self.alike(Verdict.UNKNOWN, f"{self.refusals()} ({fault})")
         if fault:
@@ -163,6 +167,13 @@ class Work:
         drawn = Drawing(pool(self.numbers(with_program=True)), sorts, random.Random(self.limits.seed))
         return list(drawn.cases(VALIDATED, meets(assumed)))
 
+    def try_recorded(self, formulas: Mapping[str, Formula], assumed: tuple[Formula, ...]) -> str:
+        """As `try_all`, of the steps that recordings of the node show."""
+        self.recorded = recorded(self.job, [port.name for port in self.job.node.inputs])
+        fault = self.try_all([dict(case) for run in self.recorded.runs for case in run], formulas, assumed)
+        self.kept = len(self.compared)
+        return fault
+
     def try_all(
         self,
         cases: Sequence[Mapping[str, Any]],
@@ -172,6 +183,8 @@ class Work:
     ) -> str:
         """Ask CPython, compare with the translation, judge; why nothing counts, if nothing does. Where the plan has
         exact numbers, what is judged are runs on fractions in which no float came in between."""
+        if not cases:
+            return ""
         memory = self.reading.source.memory
         asked = [
             case_of({n: v for n, v in case.items() if n not in memory}, {n: v for n, v in case.items() if n in memory})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from .tuning import VIOLATIONS_KEPT
 
 if TYPE_CHECKING:
     from avow.evidence.obligation import Obligation
+    from avow.formulas.values import Value
     from avow.language.contract import Node
     from avow.system.plan import System
 
@@ -46,6 +47,7 @@ class RosMonitoringBackend(Backend):
     uses_steps = False
     uses_upstream = True
     remembers = True
+    records = True
     judges_runs = True
     options_schema = SCHEMA
     codes = CODES
@@ -143,6 +145,11 @@ class RosMonitoringBackend(Backend):
         if len(missing) == len(node.guarantees):
             return Translated({}, missing)
         return Translated({f"{identifier('', node.name)}.rml": made.text}, missing)
+
+    def steps(self, job: Job) -> Iterator[tuple[Mapping[str, Value], ...]]:
+        from .made import steps
+
+        return steps(job, _traces(job))
 
     def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         from .made import judge

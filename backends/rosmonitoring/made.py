@@ -1,20 +1,24 @@
-"""Runs of messages that were made, not recorded: the monitors' judgement of each, for who makes them."""
+"""For other methods: the monitors' judgement of runs that were made, and the steps that a recording shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Judged, JudgedRun
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value
+from avow.system.paths import inside
 
 from .coverage import Tally
 from .engine import Monitor
 from .memory import unmonitored
-from .options import Setup, setup
+from .options import Setup, origin, setup
 from .pairing import Answers
+from .traces import read_trace
 from .watched import Fault, Violation
 
 ARRIVAL = Answers("arrival", "callbacks run one at a time, and what they publish is known by them")
@@ -40,6 +44,42 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         )
 
     return run
+
+
+def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value], ...]]:
+    """As `Backend.steps`. A step begins with an output that its answer has not had yet, or that inputs have changed
+    before."""
+    found, faults = setup(job.system, job.node, job.method.options)
+    if faults:
+        raise Rejected(*faults)
+    for name in traces:
+        path = inside(job.root, name)
+        if path is None:
+            raise Rejected(Diagnostic("MON102", f"traces: {name!r} is outside the system's folder"))
+        watched = _Steps(replace(found, answers=ARRIVAL, fresh={}, rates={}))
+        events = read_trace(path, origin(job.system), watched.monitor.listens)
+        yield tuple(step for recorded in events if (step := watched.step(recorded.event)) is not None)
+
+
+class _Steps:
+    """Tells one answer from the next."""
+
+    def __init__(self, used: Setup) -> None:
+        self.monitor = Monitor(used, ())
+        self.inputs: dict[str, Value] = {}
+        self.said: set[str] = set()
+
+    def step(self, event: Mapping[str, Any]) -> Mapping[str, Value] | None:
+        """The inputs of the step that begins with this event, where one does."""
+        names = {n for n in self.monitor.carried(str(event.get("topic", ""))) if n.startswith("out.")}
+        known = {n: v for n, v in self.monitor.values.items() if n.startswith("in.")} if names else {}
+        self.monitor.step(event)
+        heard = {name: known[name] for name in known.keys() & self.monitor.setup.heard}
+        if not names or not (names & self.said or heard != self.inputs):
+            self.said |= names
+            return None
+        self.said, self.inputs = names, heard
+        return known
 
 
 def _breaks(found: Setup, violation: Violation) -> bool:
@@ -84,6 +124,4 @@ def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str)
 
 
 def _spoken(monitor: Monitor, name: str) -> set[str]:
-    from avow.formulas.formula import free_variables
-
     return {v.qualified for v in free_variables(monitor.setup.node.clause(name).formula)}

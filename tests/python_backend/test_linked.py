@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +13,7 @@ import yaml
 from python_backend.source_nodes import LIMITER, LIMITER_RCL
 
 from avow.assurance.relied import linked
+from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Limits, Report
 from avow.backends.python import BACKEND
 from avow.base.verdict import Verdict
@@ -30,7 +33,7 @@ def written(
     (folder / "model.imp").write_text(model)
     (folder / "params.yaml").write_text(f"vmax: {vmax}\n")
     (folder / "system.rcl").write_text(LIMITER_RCL)
-    options = {"python": {"python": {}}, "hoare": {"hoare": {"program": "model.imp"}}}
+    options = {"python": {"python": {}}, "hoare": {"hoare": {"program": "model.imp"}}, "dafny": {"dafny": {}}}
     entry = {
         "source": {"python": "src/limiter.py", "class": "Limiter", "parameters": "params.yaml"},
         "methods": [options[name] for name in methods],
@@ -105,6 +108,86 @@ def test_the_model_is_in_the_key_and_in_the_slice(tmp_path: Path) -> None:
     (tmp_path / "s" / "model.imp").write_text(MODEL.replace("1.5", "1.4"))
     after = method_work(load_system(tmp_path / "s"), node, method)
     assert all(after.keys[name] != key for name, key in before.keys.items())
+
+
+RECORDED = """\
+    methods:
+    - python: {}
+    - hoare: {program: model.imp}
+    - rosmonitoring:
+        answers: {by: arrival, because: a test}
+        traces: [run.jsonl]
+        mapping: {in.v: {topic: v, field: data}, out.u: {topic: u, field: data}}
+"""
+
+
+def with_recording(folder: Path, values: Sequence[float], model: str = MODEL) -> None:
+    """A node with a source, a model, and a recording of these inputs."""
+    written(folder, model)
+    plan = (folder / "plan.yaml").read_text(encoding="utf-8")
+    (folder / "plan.yaml").write_text(plan[: plan.index("    methods:")] + RECORDED + plan[plan.index("    source:") :])
+    lines = [
+        json.dumps({"topic": topic, "time": at, "data": value})
+        for at, value in enumerate(values)
+        for topic in ("v", "u")
+    ]
+    (folder / "run.jsonl").write_text("\n".join(lines), encoding="utf-8")
+
+
+def test_recorded_steps_are_put_through_both(tmp_path: Path) -> None:
+    """The model differs at one number, which no rule draws: that it was recorded refutes the link."""
+    odd = 0.736328125
+    model = MODEL.replace("u := v", f"IF (v = {odd!r}) THEN u := 0 ELSE u := v")
+    with_recording(tmp_path / "s", [0.1, 0.5], model)
+    (link,) = (o for o in asked(tmp_path / "s").outcomes if o.obligation.endswith("agrees-with-model"))
+    assert link.verdict is Verdict.TESTED
+    assert link.bound["recorded"] == 2
+    with_recording(tmp_path / "t", [0.1, odd, 0.5], model)
+    (link,) = (o for o in asked(tmp_path / "t").outcomes if o.obligation.endswith("agrees-with-model"))
+    assert link.verdict is Verdict.REFUTED
+    assert link.counterexample is not None
+    assert ("model's out.u", "0") in link.counterexample.values
+
+
+def test_a_recording_is_in_the_key_and_in_the_slice(tmp_path: Path) -> None:
+    with_recording(tmp_path / "s", [0.1, 0.5])
+    system = load_system(tmp_path / "s")
+    node = system.contract.nodes[0]
+    method = next(m for m in system.plan.node(node.name).methods if m.backend == "python")
+    before = method_work(system, node, method)
+    cut = method_slice(BACKEND, method_job(system, node, method)).system
+    own = cut.plan.node(node.name).methods[0]
+    assert method_work(cut, cut.contract.node(node.name), own).keys == before.keys
+    job = method_job(cut, cut.contract.node(node.name), own)
+    assert recorded(job, ["v"]).runs == (({"v": 0.1}, {"v": 0.5}),)
+    (tmp_path / "s" / "run.jsonl").write_text("", encoding="utf-8")
+    after = method_work(load_system(tmp_path / "s"), node, method)
+    assert all(after.keys[name] != key for name, key in before.keys.items())
+
+
+def test_a_recording_that_cannot_be_read_is_no_agreement(tmp_path: Path) -> None:
+    with_recording(tmp_path / "s", [0.1, 0.5])
+    (tmp_path / "s" / "run.jsonl").write_text("{", encoding="utf-8")
+    (link,) = (o for o in asked(tmp_path / "s").outcomes if o.obligation.endswith("agrees-with-model"))
+    assert link.verdict is Verdict.UNKNOWN
+    assert "cannot be read" in link.summary
+
+
+def test_a_model_that_is_not_run_is_refused_by_name(tmp_path: Path) -> None:
+    """Alone it leaves the link unknown; beside one that is run it is told."""
+    written(tmp_path / "s", methods=("python", "dafny"))
+    (link,) = (o for o in asked(tmp_path / "s").outcomes if o.obligation.endswith("agrees-with-model"))
+    assert link.verdict is Verdict.UNKNOWN
+    assert "the model of dafny is not held against the program" in link.summary
+    written(tmp_path / "t", methods=("python", "hoare", "dafny"))
+    (link,) = (o for o in asked(tmp_path / "t").outcomes if o.obligation.endswith("agrees-with-model"))
+    assert link.verdict is Verdict.TESTED
+    assert "the model of dafny is not held" in link.hypotheses[0]
+    system = load_system(tmp_path / "t")
+    node, method = system.contract.nodes[0], system.plan.nodes[0].methods[0]
+    cut = method_slice(BACKEND, method_job(system, node, method)).system
+    own = method_work(cut, cut.contract.node(node.name), cut.plan.nodes[0].methods[0])
+    assert own.keys == method_work(system, node, method).keys
 
 
 def test_the_report_says_how_the_link_stands(tmp_path: Path) -> None:
