@@ -87,7 +87,7 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario
     if (tool.uses_scenario or reads_recordings(job)) and scenario:
-        parts.append(scenario.digest if tool.uses_steps else scenario.content)
+        parts.append(scenario.digest if tool.uses_scenario and tool.uses_steps else scenario.content)
     if connected(tool, job):
         parts.append(_wiring(job.system, job.node, told_too(tool, job)))
     parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream(tool, job))]

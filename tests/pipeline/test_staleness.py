@@ -332,7 +332,8 @@ def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     table.write_text("\n".join(rows) + "\n")
     moved = changed(before, keys(folder))
     methods = {method for name, method in moved if "/guarantee/" in name}
-    assert methods == {"ajpf", "driven", "hypothesis", "rosmonitoring"}  # `driven` is hypothesis too
+    # `driven` is hypothesis too; `fuzz` runs recorded steps, which the scenario may interpret
+    assert methods == {"ajpf", "driven", "fuzz", "hypothesis", "rosmonitoring"}
     assert all((name, method) in moved for name, method in before if method in methods)
     assert {name for name, method in moved if name.startswith("system/requirement/")}, (
         "temporal requirements look at it"
@@ -503,13 +504,13 @@ def test_another_backend_tool_or_solver_reruns_what_it_answered(
 
 
 @pytest.mark.slow
-def test_wiring_reruns_the_monitors_and_only_them(tmp_path: Path) -> None:
+def test_wiring_reruns_what_reads_messages_and_nothing_else(tmp_path: Path) -> None:
     folder = copied(SHIPPED, tmp_path)
     before = keys(folder)
     edit(folder / "system.rcl", ("gazebo_radiation_plugins/Snapshot r ", "gazebo_radiation_plugins/Snapshot dose "))
     moved = changed(before, keys(folder))
     assert moved, "monitors listen to topics"
-    assert {method for _, method in moved} == {"rosmonitoring"}
+    assert {method for _, method in moved} == {"rosmonitoring", "fuzz"}  # which runs what was recorded
     # which listens to it, and those to whose assumptions a breach of these would be followed
     assert {name.split("/")[0] for name, _ in moved} == {"agent", "navigation", "radiationSensor"}
 
