@@ -444,6 +444,12 @@ _LINTS = (
         "node n { inputs(s : <REAL>) outputs(b : BOOL) topics() guarantee(b <=> forall(i in <1 upto length(s) - 1> | "
         "s(i - 1) <= s(i))) }",
     ),
+    _lint(
+        "RCL418",
+        "unused definition",
+        "No clause and no other definition speaks of what is defined, or a definition does not speak of its parameter.",
+        "node n { inputs(b : BOOL) outputs(c : BOOL) topics() define d = not in.b; guarantee(out.c <=> in.b) }",
+    ),
 )
 
 CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}

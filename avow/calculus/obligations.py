@@ -29,6 +29,7 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import digest
 from avow.kernel.check import Established
 from avow.kernel.statements import Kind as Claimed
+from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
 from avow.solving.limits import from_seconds, told
@@ -262,7 +263,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 frame.system,
                 f"environment.{name}",
                 f"the environment meets what {name.node} assumes in {name.clause}",
-                show_term(clause.formula),
+                show_clause(clause, node),
                 sha256(f"environment\n{digest(frame.clause(name.node, name.clause))}\n{because}"),
                 (str(name),),
                 clause.span,

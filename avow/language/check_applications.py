@@ -76,6 +76,8 @@ class Applications(Names):
                     if name.casefold() not in ("forall", "exists", "exist"):  # whose variables are unknown
                         self.terms(arguments)
                     return None
+            if name in self.scope.defined and name not in self.scope.bound and self.scope.defined[name].parameters:
+                return self.defined(tree, name, arguments)
             shadowed = name in self.scope.bound or name in self.scope.inputs or name in self.scope.outputs
             if name in self.scope.environment.elements and not shadowed:
                 return self.construct(tree, name, arguments)

@@ -62,6 +62,10 @@ class Base(ABC):
     def history(self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax]) -> Term | None:
         """A form that speaks of other steps than this one."""
 
+    @abstractmethod
+    def defined(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
+        """What a definition of the scope says of these arguments."""
+
     def error(
         self,
         code: str,

@@ -62,7 +62,10 @@ class Names(Base):
         if name in scope.bound:
             bound = scope.bound[name]
             return Variable(bound.role, bound.name, bound.sort, self.span(tree))
-        candidates = [r for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r) and r in scope.roles]
+        if name in scope.defined:
+            return self.defined(tree, name, ())
+        ports = (Role.INPUT, Role.OUTPUT) if scope.bare else ()
+        candidates = [r for r in ports if name in scope.ports(r) and r in scope.roles]
         if len(candidates) == 2:
             hint = f"write `in.{name}` or `out.{name}`"
             self.error("RCL202", f"`{name}` is both an input and an output of node `{scope.node}`", tree, hint=hint)

@@ -2,8 +2,8 @@
 
 A part in error becomes None and is not mentioned again, so that one run reports every independent error of a formula.
 Recursion is as deep as the formula, which the parser bounds (`avow.language.parser.MAX_DEPTH`). The checker is a class
-in five parts: `check_names`, `check_applications`, `check_relations`, `check_history`, and here connectives and
-quantifiers.
+in six parts: `check_names`, `check_applications`, `check_relations`, `check_history`, `check_definitions`, and here
+connectives and quantifiers.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.chains import equivalence, implication
-from avow.language.check_history import Histories
+from avow.language.check_definitions import Definitions
 from avow.language.check_names import BUILTINS
 from avow.language.environment import did_you_mean
 from avow.language.foreign import FOREIGN_TYPES
@@ -72,7 +72,7 @@ from avow.language.terms import (
 )
 
 
-class Checker(Histories):
+class Checker(Definitions):
     """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
 
     def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:

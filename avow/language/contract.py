@@ -67,6 +67,19 @@ class Topic:
 
 
 @dataclass(frozen=True, slots=True)
+class Definition:
+    """``define hot(i : NATURAL) = in.temp(i) > 80``. The parameters are bound variables of the body, in which other
+    definitions are written out."""
+
+    name: str
+    parameters: tuple[Variable, ...]
+    body: Term
+    text: str = field(default="", compare=False)
+    """As written, from `define` on."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Node:
     name: str
     inputs: tuple[Port, ...]
@@ -77,6 +90,8 @@ class Node:
     span: Span | None = field(default=None, compare=False, repr=False)
     relay: bool = field(default=False, compare=False, repr=False)
     """Made of what several outputs say to one input; no contract has it."""
+    definitions: tuple[Definition, ...] = field(default=(), compare=False, repr=False)
+    """What its clauses may call by name; they are written out in every formula."""
 
     @property
     def clauses(self) -> tuple[Clause, ...]:
@@ -107,6 +122,8 @@ class Contract:
     types: tuple[tuple[str, Sort], ...]
     constants: tuple[tuple[str, Term], ...]
     nodes: tuple[Node, ...]
+    definitions: tuple[Definition, ...] = field(default=(), compare=False, repr=False)
+    """Those of the context that speak of no input or output."""
 
     def node(self, name: str) -> Node:
         """The node of that name. Raises KeyError."""

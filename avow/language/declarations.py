@@ -18,7 +18,7 @@ from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.limits import sort_extent, term_extent
-from avow.language.scope import Scope
+from avow.language.scope import Defined, Scope
 from avow.language.sorts import (
     Constructor,
     DataSort,
@@ -30,16 +30,18 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.language.source import Reports
+from avow.language.source import Reports, Source
 from avow.language.syntax import (
     Binder,
     BuiltinType,
     ConstantDeclaration,
     Declaration,
+    Define,
     Element,
     FunctionType,
     Name,
     NamedType,
+    PortName,
     ProductType,
     SequenceType,
     SetDisplay,
@@ -53,7 +55,7 @@ from avow.language.syntax import (
     unparenthesised,
     walk,
 )
-from avow.language.terms import EnumValue, Quantified, SetTerm, Term, subterms
+from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Term, Variable, subterms
 from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 
@@ -81,6 +83,8 @@ class Declarations:
     declared: dict[str, _Declared] = field(default_factory=dict)
     owners: dict[str, str] = field(default_factory=dict)
     """Which type declaration writes down an element or constructor: known before anything is elaborated."""
+    definitions: dict[str, Defined] = field(default_factory=dict)
+    """Those of the contexts; each node checks those anew that speak of its inputs and outputs."""
     open: int = 0
     """How many declarations wait for one that they refer to."""
 
@@ -106,10 +110,14 @@ class Declarations:
 
     def elaborate(self) -> None:
         for name, declared in self.declared.items():
-            if name == "length":
-                declared.reports.error("RCL209", "`length` is built in", declared.name.start, declared.name.end)
+            if name in ("length", "indices") and (name == "length" or isinstance(declared.tree, Define)):
+                declared.reports.error("RCL209", f"`{name}` is built in", declared.name.start, declared.name.end)
         for declared in self.declared.values():
             self.resolve(declared)
+        checker = Checker(Scope(self.environment, bare=False, defined=self.definitions), Reports(Source("", "")))
+        for name in self.definitions:
+            if not self.of_ports(name):
+                checker.definition(self.definitions[name])
         for name, declared in self.declared.items():
             if name in self.environment.elements:
                 sort = self.environment.elements[name]
@@ -141,6 +149,10 @@ class Declarations:
                     environment.types[name] = sort
             case ConstantDeclaration(value=value):
                 self.constant(declared, unparenthesised(value))
+            case Define():
+                self.define(declared.tree, declared.reports, self.definitions, Scope(environment, bare=False))
+            case _:
+                assert_never(declared.tree)
         self.open -= 1
         declared.state = "done"
 
@@ -156,6 +168,43 @@ class Declarations:
         message = f"`{name}` has {what} once all the names in it are written out; {most} is the most"
         reports.error("RCL110", message, place.start, place.end)
         self.environment.broken.add(name)
+        return False
+
+    # --- definitions -------------------------------------------------------------------------------------------------
+
+    def define(self, tree: Define, reports: Reports, into: dict[str, Defined], scope: Scope) -> None:
+        """A definition by its name, its parameters read; its body is checked when it is looked up."""
+        parameters: dict[str, Variable] = {}
+        sound = True
+        for part in tree.parameters:
+            sort = self.type_of(part.type, reports, part.name.text)
+            taken = scope.taken(part.name.text)
+            if part.name.text in parameters:
+                taken = ("a parameter", parameters[part.name.text].span)
+            if taken is not None:
+                notes = ((f"`{part.name.text}` is declared here", taken[1]),) if taken[1] is not None else ()
+                message = f"`{part.name.text}` is already {taken[0]}"
+                reports.error("RCL207", message, part.name.start, part.name.end, notes=notes)
+            sound = sound and sort is not None and taken is None
+            if sort is not None:
+                span = reports.source.span(part.name.start, part.name.end)
+                parameters[part.name.text] = Variable(Role.BOUND, part.name.text, sort, span)
+        if sound:
+            into[tree.name.text] = Defined(tuple(parameters.values()), tree, reports, scope.bare)
+        else:
+            self.environment.broken.add(tree.name.text)
+
+    def of_ports(self, name: str) -> bool:
+        """Whether a definition of the context speaks of inputs or outputs, or one that it names does."""
+        waiting, seen = [name], {name}
+        while waiting:
+            tree = self.definitions[waiting.pop()].tree
+            for part in walk(tree.body) if tree is not None else ():
+                if isinstance(part, PortName):
+                    return True
+                if isinstance(part, Name) and part.text in self.definitions and part.text not in seen:
+                    seen.add(part.text)
+                    waiting.append(part.text)
         return False
 
     # --- constants ---------------------------------------------------------------------------------------------------

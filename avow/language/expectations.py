@@ -33,6 +33,8 @@ def explain(
     """Report the token `found`, which is at that position and where one of `expected` (terminals) should stand."""
     if expected == {"COLON", "COMMA"}:  # after a port's name, most need its type
         expected = frozenset({"COLON"})
+    if expected == {"NAME", "DEFINE"}:  # where a declaration begins, most want the name
+        expected = frozenset({"NAME"})
     hint = _hint(start, tokens, at, found, expected)
     if found.type == "$END" and tokens:
         last = tokens[-1]
@@ -67,6 +69,8 @@ def _expected(start: str, expected: frozenset[str]) -> str:
 def _hint(start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str]) -> str | None:
     before = tokens[at - 1] if at else None
     after = tokens[at + 1] if at + 1 < len(tokens) else None
+    if before is not None and before.type == "DEFINE":
+        return f"{about_keyword(before)}; a definition is written `define name(i : NATURAL) = F;`"
     if expected == {"NAME"} and after is not None and after.type == "IN":  # forall(if in REAL | …)
         return about_keyword(found)
     if start == "formula":

@@ -15,6 +15,7 @@ from avow.language.syntax import (
     Comparison,
     Connective,
     ConstantDeclaration,
+    Define,
     Element,
     FunctionType,
     IfThenElse,
@@ -120,6 +121,8 @@ def flat(tree: Syntax) -> str:
             return f"{tree.name.text} : {flat(tree.type)}"
         case ConstantDeclaration():
             return f"{tree.name.text} = {flat(tree.value)}"
+        case Define():
+            return f"{definition_head(tree)} {flat(tree.body)}"
         case PortList(items=parts) | TopicList(items=parts):
             return _listed(parts)
         case RosType(names=names):
@@ -131,6 +134,11 @@ def flat(tree: Syntax) -> str:
             return f"{whole} matches({port.text if said is None else f'{said}.{port.text}'})"
         case _:
             assert_never(tree)
+
+
+def definition_head(tree: Define) -> str:
+    """``define hot(i : NATURAL) =``."""
+    return f"define {tree.name.text}{f'({_listed(tree.parameters)})' if tree.parameters else ''} ="
 
 
 def quantifier_head(tree: Quantification) -> str:

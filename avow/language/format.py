@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.language.flat import flat, quantifier_head
+from avow.language.flat import definition_head, flat, quantifier_head
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text, in_order, unless_torn
 from avow.language.outline import FileSyntax, NodeSyntax, read
@@ -21,6 +21,7 @@ from avow.language.syntax import (
     Connective,
     ConstantDeclaration,
     Declaration,
+    Define,
     IfThenElse,
     Lasting,
     Limited,
@@ -76,7 +77,7 @@ class _Read:
                 continue
             listings = (part.inputs, part.outputs, part.topics)
             span = self.source.span(part.name.start, part.name.end)
-            found.append(((part.name.text, *map(_shape, listings)), span))
+            found.append(((part.name.text, *map(_shape, (*listings, *part.definitions))), span))
             for clause in part.clauses:
                 said = (clause.kind, *map(_shape, (clause.name, clause.sentence, clause.formula)))
                 found.append((said, self.source.span(clause.start, clause.end)))
@@ -126,6 +127,7 @@ class _Layout:
         self.listings: dict[int, PortList | TopicList] = {}
         self.formulas: dict[int, TermSyntax] = {}
         for node in syntax.nodes:
+            self.declarations |= {tree.start: tree for tree in node.definitions}
             for tree in (node.inputs, node.outputs, node.topics):
                 if tree is not None:
                     self.listings[tree.start] = tree
@@ -193,7 +195,7 @@ class _Layout:
             self.at += 2
             self.lines.append(head + " {")
             while self.kind() != "RBRACE":
-                self.part(head == "context")
+                self.part(head == "context" or self.kind() == "DEFINE")
             self.flush(self.stream[self.at].start, _STEP)
             while self.lines and not self.lines[-1]:
                 self.lines.pop()
@@ -235,6 +237,12 @@ class _Layout:
             case ConstantDeclaration(value=value):
                 head = f"{tree.name.text} = "
                 lines = _broken_set(value, _STEP + len(head), WIDTH - 1) or _lay(value, _STEP + 2, WIDTH - 1)
+            case Define(body=body):
+                head = f"{definition_head(tree)} "
+                fits = _STEP + len(head) + len(flat(body)) < WIDTH
+                lines = [flat(body)] if fits else ["", *_lay(body, _STEP + 2, WIDTH - 1)]
+                lines[1:2] = [" " * (_STEP + 2) + line for line in lines[1:2]]
+                head = head if fits else head.rstrip()
             case _:
                 assert_never(tree)
         return [head + lines[0], *lines[1:-1], lines[-1] + ";"] if len(lines) > 1 else [head + lines[0] + ";"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from avow.language.contract import Clause, Contract, Node, Port
+from avow.language.definitions import show_clause
 from avow.language.printer import show_term, show_type
 from avow.language.styles import latex_escape, latex_name
 
@@ -60,8 +61,8 @@ def _node(node: Node) -> str:
             for t in node.topics
         )
         rows.append(rf"Topics & & {shown} \\ \hline\hline")
-    rows += _clauses("Assume", node.assumptions)
-    rows += _clauses("Guarantee", node.guarantees)
+    rows += _clauses("Assume", node, node.assumptions)
+    rows += _clauses("Guarantee", node, node.guarantees)
     return _TABLE + "\n".join(rows) + "\n\\end{longtable}\n"
 
 
@@ -77,10 +78,10 @@ def _type(port: Port) -> str:
     return show_type(port.sort, "latex")
 
 
-def _clauses(word: str, clauses: tuple[Clause, ...]) -> Iterable[str]:
+def _clauses(word: str, node: Node, clauses: tuple[Clause, ...]) -> Iterable[str]:
     for clause in clauses:
         label = rf"{word}\newline {_breakable(clause.name)}"
-        formula = rf"\textbf{{FOL}} & ${show_term(clause.formula, 'latex')}$ \\ \hline\hline"
+        formula = rf"\textbf{{FOL}} & ${show_clause(clause, node, 'latex')}$ \\ \hline\hline"
         if clause.sentence is None:
             yield f"{label} & {formula}"
         else:

@@ -24,7 +24,10 @@ class Token(NamedTuple):
 
 KEYWORDS = {
     **{word: word.upper() for word in ("context", "node", "inputs", "outputs", "topics", "matches")},
-    **{word: word.upper() for word in ("assume", "guarantee", "forall", "exists", "in", "out", "not", "and", "or")},
+    **{
+        word: word.upper()
+        for word in ("assume", "guarantee", "define", "forall", "exists", "in", "out", "not", "and", "or")
+    },
     "exists_unique": "UNIQUE",
     "upto": "UPTO",
     **{word: word.upper() for word in ("if", "then", "else", "since", "until")},
@@ -146,7 +149,7 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
     return found
 
 
-_STRUCTURE = frozenset(("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE"))
+_STRUCTURE = frozenset(("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "DEFINE", "ASSUME", "GUARANTEE"))
 _SECTIONS = _STRUCTURE - {"MATCHES"}
 _WITHIN = frozenset(("LPAR", "COMMA", "DOT", "EQ", "NE", "LE", "GE", "LT", "GT", "IN", "NOT_IN", "PLUS", "MINUS"))
 _CONNECTIVES = frozenset(("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"))

@@ -16,12 +16,13 @@ from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.lexer import Token
 from avow.language.lookups import lookups
-from avow.language.outline import FileSyntax
+from avow.language.outline import FileSyntax, NodeSyntax
 from avow.language.printer import show_sort, show_term
 from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.spelling import similar
+from avow.language.syntax import Define, Name, Syntax, walk
 from avow.language.terms import (
     TRUE,
     And,
@@ -69,6 +70,7 @@ def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract 
         found.extend(_about_node(node))
     if contract is not None:
         found.extend(_spellings(contract))
+        found.extend(_defined_in_vain(files))
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
     found.extend(unknown for file in files for unknown in _no_lints(file))
@@ -153,6 +155,33 @@ def _about_text(file: LintedFile) -> Iterator[Diagnostic]:
                     source.span(matched.start, matched.end),
                     f"write `matches({which}.{matched.text})`",
                 )
+
+
+def _defined_in_vain(files: Sequence[LintedFile]) -> Iterator[Diagnostic]:
+    """Definitions and parameters that nothing speaks of."""
+    parts: list[tuple[LintedFile, NodeSyntax | None, Define]] = []
+    named: set[tuple[str, str]] = set()
+    for file in files:
+        contexts = [d for d in file.syntax.declarations if isinstance(d, Define)]
+        parts += [(file, None, tree) for tree in contexts]
+        named |= {("", name) for tree in contexts for name in _spoken(tree.body)}
+        for node in file.syntax.nodes:
+            parts += [(file, node, tree) for tree in node.definitions]
+            bodies = [*(d.body for d in node.definitions), *(c.formula for c in node.clauses if c.formula is not None)]
+            named |= {(owner, name) for body in bodies for name in _spoken(body) for owner in ("", node.name.text)}
+    for file, owner, tree in parts:
+        name, span = tree.name.text, file.reports.source.span
+        if (owner.name.text if owner is not None else "", name) not in named:
+            message = f"nothing speaks of the definition `{name}`"
+            yield _warning("RCL418", message, span(tree.name.start, tree.name.end), "remove it, or use it")
+        for part in tree.parameters:
+            if part.name.text not in _spoken(tree.body):
+                message = f"the definition `{name}` does not speak of its parameter `{part.name.text}`"
+                yield _warning("RCL418", message, span(part.name.start, part.name.end), "remove it, or use it")
+
+
+def _spoken(tree: Syntax) -> set[str]:
+    return {part.text for part in walk(tree) if isinstance(part, Name)}
 
 
 # --- about a node ----------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import FileSyntax, NodeSyntax, read
 from avow.language.parser import parse
-from avow.language.scope import BOTH_ROLES, Scope
+from avow.language.scope import BOTH_ROLES, Defined, Scope
 from avow.language.sorts import Sort
 from avow.language.source import Reports, Source
 from avow.language.terms import Role, Term, Variable
@@ -252,6 +252,7 @@ def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declar
         tuple(environment.types.items()),
         tuple(environment.constants.items()),
         nodes,
+        tuple(entry.found for entry in declarations.definitions.values() if entry.found is not None),
     )
 
 
@@ -327,7 +328,9 @@ def _parse(
     term: Term | None = None
     if tree is not None:
         bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
-        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers or clause)
+        definitions = (*contract.definitions, *(node.definitions if node is not None else ()))
+        defined = {d.name: Defined(d.parameters, found=d, state="done") for d in definitions if d.name not in bound}
+        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers or clause, defined=defined)
         if node is None:
             scope.nodes = {n.name: n for n in contract.nodes}
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from avow.base.diagnostics import Span
 from avow.language.checker import Checker
@@ -15,7 +16,7 @@ from avow.language.lexer import Token, unquote
 from avow.language.limits import sort_extent, term_extent
 from avow.language.outline import ClauseSyntax, NodeSyntax
 from avow.language.printer import show_type
-from avow.language.scope import Scope
+from avow.language.scope import Defined, Scope
 from avow.language.source import Reports
 from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
@@ -66,6 +67,7 @@ def check_node(
     broken = set(node.broken)
     scope = Scope(declarations.environment, inputs, outputs, broken=broken, node=node.name.text, remembers=True)
     topics = tuple(_topics(node, scope, reports))
+    scope.defined = _definitions(node, scope, declarations, reports)
     clauses: dict[ClauseKind, list[Clause]] = {ClauseKind.ASSUMPTION: [], ClauseKind.GUARANTEE: []}
     counts = dict.fromkeys(ClauseKind, 0)
     seen: dict[str, Span] = {}
@@ -84,7 +86,34 @@ def check_node(
         tuple(clauses[ClauseKind.ASSUMPTION]),
         tuple(clauses[ClauseKind.GUARANTEE]),
         reports.source.span(node.name.start, node.name.end),
+        definitions=tuple(entry.found for entry in scope.defined.values() if entry.found is not None),
     )
+
+
+def _definitions(node: NodeSyntax, scope: Scope, declarations: Declarations, reports: Reports) -> Mapping[str, Defined]:
+    """What the node's clauses may call by name: of the context, checked where it is used, and its own."""
+    found = {
+        name: entry if entry.found is not None or entry.state == "done" else replace(entry, state="new")
+        for name, entry in declarations.definitions.items()
+    }
+    for tree in node.definitions:
+        name, taken = tree.name, scope.taken(tree.name.text)
+        other = found.get(name.text)
+        if other is not None:
+            taken = ("a definition", other.place)
+        if name.text in ("length", "indices"):
+            reports.error("RCL209", f"`{name.text}` is built in", name.start, name.end)
+            continue
+        if taken is not None:
+            notes = ((f"`{name.text}` is declared here", taken[1]),) if taken[1] is not None else ()
+            reports.error("RCL210", f"`{name.text}` is already {taken[0]}", name.start, name.end, notes=notes)
+            continue
+        declarations.define(tree, reports, found, scope)
+    checker = Checker(replace(scope, defined=found), reports)
+    for tree in node.definitions:
+        if tree.name.text in found:
+            checker.definition(found[tree.name.text])
+    return found
 
 
 def _clause(
@@ -117,7 +146,7 @@ def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bo
     """Whether the formula with its constants written out can still be worked with. Without constants it is as large and
     as deep as it is written, which the parser has seen to."""
     environment = scope.environment
-    if not environment.constants:
+    if not environment.constants and not scope.defined:
         return True
     size, depth = term_extent(formula)
     before = environment.written_out

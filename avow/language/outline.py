@@ -15,14 +15,14 @@ from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keywo
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
-from avow.language.syntax import Declaration, PortList, TermSyntax, TopicList
+from avow.language.syntax import Declaration, Define, PortList, TermSyntax, TopicList
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _CLOSE = frozenset(_OPEN.values())
 _TOP = frozenset(("CONTEXT", "NODE"))
-_SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "ASSUME", "GUARANTEE"))
+_SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "DEFINE", "ASSUME", "GUARANTEE"))
 _SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
-_ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "STEPS": 3, "ASSUME": 4, "GUARANTEE": 5}
+_ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "STEPS": 3, "DEFINE": 4, "ASSUME": 5, "GUARANTEE": 6}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +48,7 @@ class NodeSyntax:
     inputs: PortList | None = None
     outputs: PortList | None = None
     topics: TopicList | None = None
+    definitions: list[Define] = field(default_factory=list)
     clauses: list[ClauseSyntax] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
 
@@ -196,22 +197,25 @@ class _OutlineReader:
                 self.at += 1
                 continue
             count += 1
-            self.declaration()
+            tree = self.declaration(self.out.broken)
+            if tree is not None:
+                self.out.declarations.append(tree)
         if brace is not None:
             self.reports.error("RCL115", "this `{` is never closed", brace.start, brace.end, hint="close it with `}`")
 
-    def declaration(self) -> None:
+    def declaration(self, broken: set[str]) -> Declaration | None:
+        """The declaration here, to its `;`; of one in error, the names go to `broken`."""
         first, relation = self.at, False
         stack: list[str] = []
         while self.at < len(self.tokens):
             kind = self.kind()
-            if kind in _TOP or kind in _SECTIONS:
+            if kind in _TOP or (kind in _SECTIONS and not (kind == "DEFINE" and self.at == first)):
                 break
             if kind == "SEMICOLON" and "RPAR" not in stack:  # also within `{`: that brace lacks its partner
                 break
             if kind == "RBRACE" and not stack:
                 break
-            if kind in ("COLON", "EQUALS", "EQ") and not stack:
+            if kind in ("COLON", "EQUALS", "EQ") and not stack and self.tokens[first].type != "DEFINE":
                 if relation and self.kind(-1) == "NAME":
                     self.at -= 1  # the name before belongs to the next declaration
                     break
@@ -227,7 +231,7 @@ class _OutlineReader:
             )
             self.at += 1
             self.skip_to_top()
-            return
+            return None
         text = self.reports.source.text
         part = [
             t._replace(type="EQUALS") if t.type == "EQ" and text.startswith(":=", t.start) else t
@@ -236,16 +240,15 @@ class _OutlineReader:
         begin = self.tokens[first - 1].end if first else 0
         tree = parse("declaration", part, self.reports, part[-1].end, begin)
         self.out.parts.append((part[0].start, part[-1].end))
-        if tree is not None:
-            self.out.declarations.append(tree)
-        else:
-            self.out.broken.update(t.text for t in part if t.type == "NAME")
+        if tree is None:
+            broken.update(t.text for t in part if t.type == "NAME")
         if self.kind() == "SEMICOLON":
             self.at += 1
         elif tree is not None:
             end = part[-1].end
-            message = f"`;` is missing after the declaration of `{part[0].text}`"
+            message = f"`;` is missing after the declaration of `{tree.name.text}`"
             self.reports.error("RCL113", message, end - 1, end, hint="end every declaration with `;`")
+        return tree
 
     def no_name(self, hint: str) -> str:
         """The hint, after what is to be said of a keyword that stands where a name may stand."""
@@ -289,9 +292,9 @@ class _OutlineReader:
                 notes = ((f"the first `{keyword.text}` is here", earlier),)
                 self.reports.error("RCL117", message, keyword.start, keyword.end, notes=notes)
             elif before and _ORDER[section] < _ORDER[before]:
-                words = {"ASSUME": "an assumption", "GUARANTEE": "a guarantee"}
+                words = {"DEFINE": "a definition", "ASSUME": "an assumption", "GUARANTEE": "a guarantee"}
                 message = f"`{keyword.text}` stands after {words.get(before, f'`{before.lower()}`')}"
-                hint = "the order is: inputs, outputs, topics, steps, assumptions, guarantees"
+                hint = "the order is: inputs, outputs, topics, steps, definitions, assumptions, guarantees"
                 self.reports.error("RCL116", message, keyword.start, keyword.end, hint=hint)
             else:
                 before = section
@@ -402,6 +405,10 @@ class _OutlineReader:
 
     def read_section(self, section: str, node: NodeSyntax) -> None:
         keyword = self.tokens[self.at]
+        if section == "DEFINE":
+            tree = self.declaration(node.broken)
+            node.definitions += [tree] if isinstance(tree, Define) else []
+            return
         self.at += 1
         name = sentence = None
         if section in ("ASSUME", "GUARANTEE"):

@@ -24,6 +24,7 @@ from avow.language.syntax import (
     Connective,
     ConstantDeclaration,
     Declaration,
+    Define,
     Element,
     FunctionType,
     IfThenElse,
@@ -245,6 +246,12 @@ class _Build:
 
     def constant_declaration(self, c: list[Any]) -> ConstantDeclaration:
         return ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
+
+    def plain_definition(self, c: list[Any]) -> Define:
+        return Define(c[0].start, c[3].end, c[3].depth + 1, c[1], (), c[3])
+
+    def definition(self, c: list[Any]) -> Define:
+        return Define(c[0].start, c[6].end, _deepest((c[3], c[6])), c[1], c[3].items, c[6])
 
     def ports(self, c: list[Any]) -> PortList:
         ports = tuple(port for group in c[::2] for port in group)

@@ -32,7 +32,9 @@ class RclLexer(RegexLexer):  # type: ignore[misc]  # pygments has no types
                 bygroups(Keyword.Declaration, Whitespace, Name.Label),
             ),
             (
-                words(("context", "node", "inputs", "outputs", "topics", "assume", "guarantee"), suffix=r"\b"),
+                words(
+                    ("context", "node", "inputs", "outputs", "topics", "define", "assume", "guarantee"), suffix=r"\b"
+                ),
                 Keyword.Declaration,
             ),
             (r"\b[AG](?=\s*[\"(])", Keyword.Declaration),

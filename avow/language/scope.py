@@ -6,9 +6,32 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from avow.base.diagnostics import Span
-from avow.language.contract import Node, Port
+from avow.language.contract import Definition, Node, Port
 from avow.language.environment import Environment
+from avow.language.source import Reports
+from avow.language.syntax import Define
 from avow.language.terms import Role, Variable
+
+
+@dataclass(slots=True)
+class Defined:
+    """A definition in a scope: its text until it is looked up, and then what it says there."""
+
+    parameters: tuple[Variable, ...]
+    tree: Define | None = None
+    reports: Reports | None = None
+    bare: bool = True
+    """Whether its inputs and outputs may be named without `in.` and `out.`: a context does not know them."""
+    found: Definition | None = None
+    state: str = "new"
+    """new, open (being checked: meeting it again is a circle), or done."""
+
+    @property
+    def place(self) -> Span | None:
+        if self.tree is None or self.reports is None:
+            return None if self.found is None else self.found.span
+        return self.reports.source.span(self.tree.name.start, self.tree.name.end)
+
 
 BOTH_ROLES = frozenset((Role.INPUT, Role.OUTPUT))
 
@@ -31,6 +54,9 @@ class Scope:
     node: str | None = None
     remembers: bool = False
     """Whether it may speak of other steps than this one."""
+    bare: bool = True
+    """Whether inputs and outputs may be named without `in.` and `out.`."""
+    defined: Mapping[str, Defined] = field(default_factory=dict)
 
     @property
     def named(self) -> str:
@@ -49,9 +75,12 @@ class Scope:
         environment = self.environment
         if name in self.bound:
             return "a variable of an enclosing quantifier", self.bound[name].span
-        if name in self.inputs:
+        if name in self.defined:
+            found = self.defined[name]
+            return "a definition", found.place
+        if self.bare and name in self.inputs:
             return "an input", self.inputs[name].span
-        if name in self.outputs:
+        if self.bare and name in self.outputs:
             return "an output", self.outputs[name].span
         for what, table in (
             ("an element of a type", environment.elements),
@@ -65,6 +94,7 @@ class Scope:
     def known(self) -> Iterator[str]:
         """Every name that may stand for a value here."""
         yield from self.bound
+        yield from self.defined
         for name in self.inputs:
             yield name if name not in self.outputs else f"in.{name}"
         for name in self.outputs:

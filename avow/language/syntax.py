@@ -342,6 +342,15 @@ class PortList(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
+class Define(_Placed):
+    """``define hot(i : NATURAL) = in.temp(i) > 80``; `end` is where the body ends."""
+
+    name: Token
+    parameters: tuple[PortDeclaration, ...]
+    body: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
 class RosType(_Placed):
     """``package/msg/Type``, without the slashes."""
 
@@ -363,7 +372,7 @@ class TopicList(_Placed):
     items: tuple[TopicDeclaration, ...]
 
 
-Declaration = TypeDeclaration | ConstantDeclaration
+Declaration = TypeDeclaration | ConstantDeclaration | Define
 Listing = PortList | TopicList
 Syntax = (
     TermSyntax
@@ -425,6 +434,8 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return (tree.type,)
         case ConstantDeclaration():
             return (tree.value,)
+        case Define():
+            return (*tree.parameters, tree.body)
         case _:
             assert_never(tree)
 

@@ -15,7 +15,7 @@ from avow.language.operators import OPERATORS
 from avow.language.terms import Builtin, Past
 
 SCOPE = "source.rcl"
-_STRUCTURE = ("context", "node", "inputs", "outputs", "topics", "matches", "assume", "guarantee")
+_STRUCTURE = ("context", "node", "inputs", "outputs", "topics", "matches", "define", "assume", "guarantee")
 _CONTROL = ("forall", "exists", "exists_unique", "upto", "if", "then", "else")
 _CONSTANTS = ("TRUE", "FALSE")
 _PUNCTUATION = frozenset(":;,.|(){}=")

@@ -14,6 +14,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Clause, Contract, Node, Port, Topic
+from avow.language.definitions import show_clause
 from avow.language.format import format_text
 from avow.language.latex import to_latex
 from avow.language.lexer import quote
@@ -192,7 +193,7 @@ def _for_people(contract: Contract, style: StyleName) -> str:
                 out.append(f"  {word}")
             for clause in clauses:
                 out.append(f"    {clause.name}" + (f": {clause.sentence}" if clause.sentence else ""))
-                out.append(f"      {show_term(clause.formula, style)}")
+                out.append(f"      {show_clause(clause, node, style)}")
         out.append("")
     return "\n".join(out)
 

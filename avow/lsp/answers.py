@@ -6,16 +6,18 @@ Places are offsets into the text; the server converts them to the protocol's lin
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Span
-from avow.language.contract import Clause, Node, Port
+from avow.language.contract import Clause, Definition, Node, Port
+from avow.language.definitions import show_clause
 from avow.language.environment import of_contract
 from avow.language.lexer import Token
 from avow.language.load import clean_text
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.source import Source
-from avow.language.syntax import TypeDeclaration
+from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.language.terms import Quantified, Variable
 from avow.lsp.background import Answer
 from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
@@ -36,7 +38,7 @@ class Symbol:
     name: str
     detail: str
     kind: str
-    """node, type, constant, assumption or guarantee"""
+    """node, type, constant, definition, assumption or guarantee"""
     span: Span
     inner: tuple[Symbol, ...] = ()
 
@@ -147,15 +149,27 @@ def symbols(document: Document) -> tuple[Symbol, ...]:
     found = [
         Symbol(tree.name.text, kind, kind, source.span(tree.start, tree.end))
         for tree in syntax.declarations
-        for kind in ("type" if isinstance(tree, TypeDeclaration) else "constant",)
+        for kind in (_kind(tree),)
     ]
     for node in syntax.nodes:
-        inner = []
+        inner = [Symbol(d.name.text, "definition", "definition", source.span(d.start, d.end)) for d in node.definitions]
         for clause, (meaning, _, _, _) in zip(node.clauses, clause_names(node), strict=True):
             detail = clause.sentence.text.strip('"') if clause.sentence else ""
             inner.append(Symbol(meaning.name, detail, str(clause.kind), source.span(clause.start, clause.end)))
         found.append(Symbol(node.name.text, "node", "node", source.span(node.start, node.end), tuple(inner)))
     return tuple(found)
+
+
+def _kind(tree: Declaration) -> str:
+    match tree:
+        case TypeDeclaration():
+            return "type"
+        case ConstantDeclaration():
+            return "constant"
+        case Define():
+            return "definition"
+        case _:
+            assert_never(tree)
 
 
 # --- finding out -----------------------------------------------------------------------------------------------------
@@ -180,11 +194,20 @@ def _about(document: Document, name: Occurrence, status: StatusLookup, sanity: S
             return f"type `{meaning.name}` = `{show_type(dict(contract.types)[meaning.name])}`"
         case What.CONSTANT:
             return f"constant `{meaning.name}` = `{show_term(dict(contract.constants)[meaning.name], 'rcl')}`"
+        case What.DEFINITION:
+            found = next((d for n in contract.nodes for d in n.definitions if _is_of(d, n, meaning)), None)
+            found = found or next((d for d in contract.definitions if d.name == meaning.name), None)
+            return f"`{found.text}`" if found is not None else f"definition `{meaning.name}`"
         case What.ELEMENT:
             sort = of_contract(contract).elements.get(meaning.name)
             return f"`{meaning.name}`: an element of `{sort.name}`" if sort is not None else None
         case What.VARIABLE:
             return _about_variable(document, meaning)
+
+
+def _is_of(definition: Definition, node: Node, meaning: Meaning) -> bool:
+    """Whether a node's definition is the one that is meant; one of a context is the same for each that uses it."""
+    return definition.name == meaning.name and meaning.owner in ("", node.name)
 
 
 def _about_variable(document: Document, meaning: Meaning) -> str:
@@ -215,7 +238,8 @@ def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: Sani
     lines = [f"**{clause.kind} {_plain(clause.name)}**"]
     if clause.sentence:
         lines.append(_plain(clause.sentence))
-    lines.append(f"```\n{show_term(clause.written or clause.formula, 'unicode')}\n```")
+    shown = show_clause(replace(clause, formula=clause.written or clause.formula), node)
+    lines.append(f"```\n{shown}\n```")
     said = status(node.name, clause.name)
     if said:
         lines.append(_plain(said))

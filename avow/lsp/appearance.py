@@ -24,6 +24,7 @@ _OF_MEANING: Mapping[What, str] = {
     What.GUARANTEE: "function",
     What.TYPE: "type",
     What.CONSTANT: "variable",
+    What.DEFINITION: "function",
     What.ELEMENT: "enumMember",
     What.VARIABLE: "parameter",
 }

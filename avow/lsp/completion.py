@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from avow.language.contract import Contract, Node, Port
+from avow.language.contract import Contract, Definition, Node, Port
 from avow.language.environment import of_contract
 from avow.language.lexer import LONG_UNITS, STEPS, UNITS
 from avow.language.nodes import ROS_BUILTINS
@@ -23,7 +23,8 @@ class Offer:
 
     label: str
     kind: str
-    """keyword, operator, function, type, element, constant, input, output, variable, node, guarantee, unit, key"""
+    """keyword, operator, function, type, element, constant, definition, input, output, variable, node, guarantee, unit,
+    key"""
     detail: str = ""
     template: str = ""
     about: str = ""
@@ -57,7 +58,9 @@ def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
             yield Offer("node", "keyword", "a node's contract", NODE)
             yield Offer("context", "keyword", "types and constants", CONTEXT)
         case "CONTEXT", _:
-            if place.last == "COLON" or any(t.type == "COLON" for t in place.before):
+            if place.defines and any(t.type == "EQUALS" for t in place.before):
+                yield from _of_formula(place, node, contract)
+            elif place.last == "COLON" or any(t.type == "COLON" for t in place.before):
                 yield from _types(contract)
             elif any(t.type == "EQUALS" for t in place.before):
                 yield from _values(contract)
@@ -75,6 +78,11 @@ def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
                 yield Offer("at most", "keyword", "no further apart")
         case "NODE", "TOPICS":
             yield from _of_topic(place, node)
+        case "NODE", "DEFINE":
+            if any(t.type == "EQUALS" for t in place.before):
+                yield from _of_formula(place, node, contract)
+            elif place.last == "COLON":
+                yield from _types(contract)
         case "NODE", "ASSUME" | "GUARANTEE":
             yield from _of_formula(place, node, contract)
         case _:  # a name that is yet to be made up
@@ -107,9 +115,13 @@ def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator
     if words[-1:] in (["IN"], ["NOT_IN"]):
         yield from _types(contract)
     yield from (Offer(name, "variable", "quantified") for name in place.bound)
+    yield from (Offer(name, "variable", "a parameter") for name in place.parameters)
     for role in (Role.INPUT, Role.OUTPUT):
         yield from _ports(node, role, f"{role}.")
     yield from _values(contract)
+    for definition in _definitions(node, contract):
+        stops = ", ".join(f"${{{k}:{p.name}}}" for k, p in enumerate(definition.parameters, 1))
+        yield Offer(definition.name, "definition", definition.text, f"{definition.name}({stops})" if stops else "")
     for form in (form for form in FORMS.values() if form.name != Past.STEPS):
         yield Offer(form.name, "function", form.label, form.template, form.meaning)
     for word, meaning in QUANTIFIERS.items():
@@ -117,6 +129,10 @@ def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator
     yield Offer("if", "operator", "if F then s else t", "if ${1:F} then ${2:s} else ${3:t}")
     yield from (Offer(word, "operator", detail) for word, detail in CONNECTIVES.items())
     yield from (Offer(word, "constant", "BOOL") for word in ("TRUE", "FALSE"))
+
+
+def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...]:
+    return node.definitions if node is not None else contract.definitions
 
 
 def _ports(node: Node | None, role: Role, before: str) -> Iterator[Offer]:
@@ -144,7 +160,8 @@ def _values(contract: Contract) -> Iterator[Offer]:
 def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
     """How what stands before the innermost open parenthesis is applied."""
     place = place_of(text, offset)
-    if place is None or place.section not in ("ASSUME", "GUARANTEE"):
+    inside = place is not None and (place.section in ("ASSUME", "GUARANTEE") or place.defines)
+    if place is None or not inside:
         return None
     commas, closed = 0, 0
     for at in range(len(place.before) - 1, 0, -1):
@@ -196,6 +213,10 @@ def _applied(place: Place, name: str, role: str | None, contract: Contract) -> S
                 return Signature(f"{name}(i)", ("i",), 0, f"the element at position i, from 0: {show_sort(item)}")
             case _:  # takes no arguments
                 pass
+    for definition in _definitions(node, contract):
+        if role is None and definition.name == name and definition.parameters:
+            shown = tuple(f"{p.name} : {show_sort(p.sort)}" for p in definition.parameters)
+            return Signature(f"{name}({', '.join(shown)})", shown, 0, definition.text)
     sort = of_contract(contract).elements.get(name)
     if role is None and isinstance(sort, DataSort) and (parameters := sort.constructor(name).parameters):
         shown = tuple(map(show_sort, parameters))

@@ -21,6 +21,7 @@ from avow.language.parser import QUANTIFIERS
 from avow.language.source import Reports, Source
 from avow.language.syntax import (
     ConstantDeclaration,
+    Define,
     Element,
     NamedType,
     NodePort,
@@ -47,18 +48,21 @@ class What(StrEnum):
     GUARANTEE = "guarantee"
     TYPE = "type"
     CONSTANT = "constant"
+    DEFINITION = "definition"
     ELEMENT = "element"
     VARIABLE = "variable"
 
 
 PORTS = (What.INPUT, What.OUTPUT)
 CLAUSES = (What.ASSUMPTION, What.GUARANTEE)
+OWNED = (*PORTS, *CLAUSES, What.DEFINITION)
+"""What belongs to a node; a definition may belong to the context."""
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """One thing that names stand for. `owner` is the node of a port or clause; of a quantified variable, where it is
-    bound."""
+    """One thing that names stand for. `owner` is the node of a port, a clause or a definition of its own; of what a
+    quantifier or a definition binds, where it is bound."""
 
     what: What
     name: str
@@ -105,7 +109,11 @@ def taken_apart(file: str, text: str) -> Text:
 def occurrences(texts: tuple[Text, ...], contract: Contract) -> tuple[Occurrence, ...]:
     """Every name in the texts that stands for something, in each text by its place. `contract` is what they declare, as
     far as it can be read."""
-    reader = _Reader(of_contract(contract), {t.name.text: _ports(t) for text in texts for t in text.syntax.nodes})
+    nodes = [node for text in texts for node in text.syntax.nodes]
+    own = {node.name.text: frozenset(d.name.text for d in node.definitions) for node in nodes}
+    shared = (d.name.text for text in texts for d in text.syntax.declarations if isinstance(d, Define))
+    defined = {**own, "": frozenset(shared)}
+    reader = _Reader(of_contract(contract), {node.name.text: _ports(node) for node in nodes}, defined)
     found: dict[tuple[str, int], Occurrence] = {}
     for text in texts:
         for one in reader.text(text):
@@ -152,6 +160,8 @@ def _ports(node: NodeSyntax) -> Ports:
 class _Reader:
     environment: Environment
     nodes: Mapping[str, Ports]
+    defined: Mapping[str, frozenset[str]]
+    """The definitions of each node; of the contexts under no name."""
     node: str = ""
     text_: Text = field(default_factory=lambda: Text("", "", FileSyntax(), (), ()))
 
@@ -166,6 +176,9 @@ class _Reader:
             return Meaning(What.ELEMENT, name)
         if name in environment.constants:
             return Meaning(What.CONSTANT, name)
+        for owner in (self.node, ""):
+            if name in self.defined.get(owner, ()):
+                return Meaning(What.DEFINITION, name, owner)
         return Meaning(What.TYPE, name) if name in environment.types else None
 
     def text(self, text: Text) -> Iterator[Occurrence]:
@@ -181,6 +194,8 @@ class _Reader:
                     names_set = isinstance(body, SetDisplay) and name.text in self.environment.types
                     for one in self.in_formula(value, {}):
                         yield _declaring(one) if names_set and one.meaning.what is What.ELEMENT else one
+                case Define():
+                    yield from self.in_definition(declaration)
                 case _:
                     assert_never(declaration)
         for node in text.syntax.nodes:
@@ -197,6 +212,10 @@ class _Reader:
             if topic.port is not None:
                 meaning = self.nodes[self.node].meaning(self.node, topic.port.text, topic.role)
                 yield from self.at(meaning, topic.port.start, topic.port.end)
+        for definition in node.definitions:
+            name = definition.name
+            yield from self.at(self.global_name(name.text), name.start, name.end, True)
+            yield from self.in_definition(definition)
         for clause, (meaning, start, end, written) in zip(node.clauses, clause_names(node), strict=True):
             yield Occurrence(meaning, self.text_.file, start, end, True, written)
             if clause.formula is not None:
@@ -204,6 +223,15 @@ class _Reader:
             else:
                 yield from self.in_words([t for t in self.text_.tokens if _within(t, clause.inside)])
         self.node = ""
+
+    def in_definition(self, tree: Define) -> Iterator[Occurrence]:
+        bound: dict[str, Meaning] = {}
+        for part in tree.parameters:
+            token = part.name
+            bound[token.text] = Meaning(What.VARIABLE, token.text, f"{self.text_.file}:{token.start}")
+            yield from self.at(bound[token.text], token.start, token.end, True)
+            yield from self.in_type(part.type)
+        yield from self.in_formula(tree.body, bound)
 
     def in_type(self, tree: Syntax) -> Iterator[Occurrence]:
         for part in walk(tree):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from avow.language.lexer import Token
 from avow.language.parser import QUANTIFIERS
@@ -14,7 +15,7 @@ from avow.language.terms import Past
 from avow.lsp.names import Text
 
 _TOP = ("CONTEXT", "NODE")
-_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "STEPS", "ASSUME", "GUARANTEE")
+_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "STEPS", "DEFINE", "ASSUME", "GUARANTEE")
 _WORDS = {"A": "ASSUME", "G": "GUARANTEE"}
 
 
@@ -33,6 +34,17 @@ class Place:
     def last(self) -> str:
         """The kind of the word before; empty where there is none."""
         return self.before[-1].type if self.before else ""
+
+    @property
+    def defines(self) -> bool:
+        """Whether it is in a definition."""
+        return self.section == "DEFINE" or any(t.type == "DEFINE" for t in self.before)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Of a definition."""
+        pairs = pairwise(self.before) if self.defines else ()
+        return tuple(t.text for t, then in pairs if t.type == "NAME" and then.type in ("COLON", "COMMA"))
 
 
 def place_of(text: Text, offset: int) -> Place | None:
@@ -65,10 +77,10 @@ def _scan(found: Sequence[Token]) -> Place:
             kind = "STEPS"
         if kind in _TOP:
             top, node, section, start, depth, brace, opened = kind, "", "", at + 1, 0, 0, False
-        elif kind in _SECTIONS:
+        elif kind in _SECTIONS and (kind, top) != ("DEFINE", "CONTEXT"):
             section, start, depth, opened = kind, at + 1, 0, False
         elif kind == "LPAR":
-            depth, opened = depth + 1, True
+            depth, opened = depth + 1, section != "DEFINE"
         elif kind == "RPAR":
             depth = max(depth - 1, 0)
         elif kind == "LBRACE" and depth == 0:
@@ -79,11 +91,11 @@ def _scan(found: Sequence[Token]) -> Place:
                 top, node, section, start, opened = "", "", "", at + 1, False
         elif kind == "NAME" and top == "NODE" and not brace and not node:
             node = token.text
-        elif kind == "SEMICOLON" and top == "CONTEXT" and depth == 0:
-            start = at + 1
+        elif kind == "SEMICOLON" and depth == 0 and (top == "CONTEXT" or section == "DEFINE"):
+            section, start = "", at + 1
     if section and opened and depth == 0:
         section, start = "", len(found)
-    elif section and not opened:
+    elif section and not opened and section != "DEFINE":
         section = "HEAD"
     elif top == "NODE" and not section:
         section = "" if brace else "HEAD"

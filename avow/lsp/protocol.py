@@ -24,6 +24,7 @@ _SYMBOLS = {
     "node": types.SymbolKind.Class,
     "type": types.SymbolKind.Struct,
     "constant": types.SymbolKind.Constant,
+    "definition": types.SymbolKind.Function,
     "assumption": types.SymbolKind.Event,
     "guarantee": types.SymbolKind.Function,
 }
@@ -34,6 +35,7 @@ _OFFERS = {
     "type": types.CompletionItemKind.Struct,
     "element": types.CompletionItemKind.EnumMember,
     "constant": types.CompletionItemKind.Constant,
+    "definition": types.CompletionItemKind.Function,
     "input": types.CompletionItemKind.Field,
     "output": types.CompletionItemKind.Field,
     "variable": types.CompletionItemKind.Variable,

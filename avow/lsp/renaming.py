@@ -24,7 +24,7 @@ from avow.language.load import check_in_part
 from avow.language.sorts import Constructor, DataSort, EnumSort, OpaqueSort
 from avow.language.source import Source
 from avow.language.terms import Builtin, Construct, EnumValue, Past, Role, Variable
-from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
+from avow.lsp.names import CLAUSES, OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.project import Project, faults_of_plan
 from avow.system.load import PLAN_FILE
@@ -146,7 +146,7 @@ def _compare(project: Project, after: Project, before: Sequence[Occurrence], mea
             return replace(one, name=new if one == meaning else one.name, owner="")
         if renamed_with(meaning, one):
             return replace(one, name=new)
-        of_node = meaning.what is What.NODE and one.what in (*PORTS, *CLAUSES) and one.owner == meaning.name
+        of_node = meaning.what is What.NODE and one.what in OWNED and one.owner == meaning.name
         return replace(one, owner=new) if of_node else one
 
     now = [_bare(o.meaning) for o in all_occurrences(after)]

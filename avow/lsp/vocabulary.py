@@ -92,6 +92,7 @@ SECTIONS: Mapping[str, tuple[str, str]] = {
     "outputs": ("outputs( ${1:name} : ${2:REAL} )", "what the node gives out"),
     "topics": ("topics( ${1:package/Type} ${2:name} matches(${3:in.name}) )", "the ROS topics that carry them"),
     Past.STEPS: ("steps( ${1|every,at most|} ${2:20} ms )", "how far apart its steps are"),
+    "define": ("define ${1:name}(${2:i : NATURAL}) = ${3:TRUE};", "a name for what several clauses say"),
     "assume": ('assume ${1:name} "${2:what the node may rely on}"\n  ( ${3:TRUE} )', "what the node may rely on"),
     "guarantee": ('guarantee ${1:name} "${2:what the node promises}"\n  ( ${3:TRUE} )', "what the node promises"),
 }

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from avow.backend_kit.linked import connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import digest, sort_digest
-from avow.language.contract import Contract, Node
+from avow.language.contract import Contract, Definition, Node
 from avow.language.sorts import DataSort, EnumSort, Sort, components
 from avow.language.terms import Term
 from avow.system.graph import dataflow
@@ -52,6 +52,10 @@ class Named:
         """The node's guarantees that the method does not take on, but names."""
         taken = {o.name for o in job.obligations}
         return frozenset(c.name for c in job.node.guarantees if c.name not in taken and self(c.name))
+
+    def definitions(self, given: Iterable[Definition]) -> tuple[Definition, ...]:
+        """Those that are named, without how they are written."""
+        return tuple(replace(definition, text="") for definition in given if self(definition.name))
 
     def constants(self, contract: Contract) -> tuple[tuple[str, Term], ...]:
         return tuple((name, value) for name, value in contract.constants if self(name))
@@ -83,6 +87,10 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     """As text; `options` are the method's, as they enter its key."""
     named = Named.of(options, tool.files(job))
     constants = sorted([name, digest(value)] for name, value in named.constants(job.contract))
+    definitions = named.definitions((*job.contract.definitions, *job.node.definitions))
+    constants += sorted(
+        [d.name, digest(d.body), *(f"{p.name} {sort_digest(p.sort)}" for p in d.parameters)] for d in definitions
+    )
     types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
     parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario

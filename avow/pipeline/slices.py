@@ -115,7 +115,8 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
         scenario=plan.scenario if tool.uses_scenario or reads_recordings(job) else None,
         plugins=() if is_portable(tool) else plan.plugins,
     )
-    cut_contract = Contract((), named.types(contract), named.constants(contract), nodes)
+    told = named.definitions(contract.definitions)
+    cut_contract = Contract((), named.types(contract), named.constants(contract), nodes, told)
     return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id)
 
 
@@ -131,14 +132,15 @@ def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> 
         return replace(_bare_clause(clause), sentence=clause.sentence if sentences else None)
 
     promised = (seen(c) for c in node.guarantees if c.name in taken | others)
-    return replace(node, assumptions=tuple(map(seen, node.assumptions)), guarantees=tuple(promised))
+    told = named.definitions(node.definitions)
+    return replace(node, assumptions=tuple(map(seen, node.assumptions)), guarantees=tuple(promised), definitions=told)
 
 
 def _other(node: Node, upstream: Collection[str]) -> Node:
     """Another node, with its clauses where data reaches the method's own node from there."""
     clauses = node if node.name in upstream else replace(node, assumptions=(), guarantees=())
     assumed, promised = (tuple(map(_bare_clause, part)) for part in (clauses.assumptions, clauses.guarantees))
-    return replace(node, assumptions=assumed, guarantees=promised)
+    return replace(node, assumptions=assumed, guarantees=promised, definitions=())
 
 
 def _bare_clause(clause: Clause) -> Clause:

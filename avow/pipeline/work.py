@@ -25,7 +25,7 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClai
 from avow.formulas.formula import digest as formula_digest
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
-from avow.language.printer import show_term
+from avow.language.definitions import show_clause
 from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import method_options, surroundings
 from avow.pipeline.run_info import asked_seconds
@@ -287,7 +287,7 @@ def guarantee(system: System, node: Node, name: str) -> Obligation:
         Kind.GUARANTEE,
         name,
         sentence,
-        show_term(clause.formula, "unicode"),
+        show_clause(clause, node),
         node_digest(node, clause),
         (f"{node.name}.{name}",),
         clause.span,

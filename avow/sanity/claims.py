@@ -30,6 +30,7 @@ from avow.base.files import digest as text_digest
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port
+from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.language.terms import RESPONSES, TRUE, History, Term, subterms
 
@@ -139,7 +140,7 @@ def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:
 
 
 def _of_guarantee(node: Node, clause: Clause) -> list[Claim]:
-    common = (show_term(clause.formula), _names(node, (clause,)))
+    common = (show_clause(clause, node), _names(node, (clause,)))
     found = [
         _claim(
             Property.NOT_TAUTOLOGICAL, clause, f"Guarantee {clause.name} of {node.name} rules something out.", *common
@@ -157,7 +158,7 @@ def _of_guarantee(node: Node, clause: Clause) -> list[Claim]:
 def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
     if clause.formula == TRUE:
         return []
-    common = (show_term(clause.formula), _names(node, (clause,)))
+    common = (show_clause(clause, node), _names(node, (clause,)))
     found = [
         _claim(
             Property.NOT_TAUTOLOGICAL, clause, f"Assumption {clause.name} of {node.name} rules some input out.", *common

@@ -19,14 +19,18 @@ from avow.lsp.renaming import rename as renamed
 from avow.system.load import load_system
 
 CONTRACT = """\
-context { Colour : {red, green}; Way : { go(REAL), stop }; Limit = 3; Map : REAL x REAL --> BOOL; Same = (Limit); }
+context {
+  Colour : {red, green}; Way : { go(REAL), stop }; Limit = 3; define over(a : REAL) = a > Limit;
+  Map : REAL x REAL --> BOOL; Same = (Limit);
+}
 node one {
   inputs( r : REAL, seen : Map )
   outputs( colour : Colour, r2 : REAL )
   topics( float64 r matches(in.r), string seen matches(in.seen), string c matches(colour), float64 d matches(r2) )
+  define most = forall(x in REAL | x > r -> x > out.r2);
   assume in_range ( forall(x, y in REAL | seen(x, y) -> (exists(z in REAL | z > x and z < y))) )
-  guarantee low ( (exists(x in REAL | x > Limit and x < in.r)) -> colour == green )
-  guarantee r3 ( (forall(x in REAL | x > r -> x > out.r2)) and colour in Colour )
+  guarantee low ( (exists(x in REAL | over(x) and x < in.r)) -> colour == green )
+  guarantee r3 ( most and colour in Colour )
 }
 node two {
   inputs( colour : Colour, r2 : REAL )

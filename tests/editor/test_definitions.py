@@ -1,0 +1,56 @@
+"""What an editor offers and says of local definitions."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("pygls")
+
+from avow.lsp.answers import analyse, definition, hover, references, symbols
+from avow.lsp.appearance import coloured
+from avow.lsp.completion import offers, signature
+
+TEXT = """\
+context { define far(r : REAL) = r > 9; }
+node n {
+  inputs( x : REAL )
+  outputs( y : BOOL )
+  topics()
+  define beyond(a, b : REAL) = far(a) and b < in.x;
+  guarantee g ( beyond(1, 2) -> y )
+}
+"""
+
+
+def test_it_knows_them() -> None:
+    document = analyse(TEXT, "n.rcl")
+    assert [d for d in document.diagnostics if d.is_error] == []
+    use = TEXT.index("beyond(1")
+    assert hover(document, use) == "`define beyond(a, b : REAL) = far(a) and b < in.x`"
+    assert hover(document, TEXT.index("far(a)")) == "`define far(r : REAL) = r > 9`"
+    assert [TEXT[o.start - 7 : o.end] for o in definition(document, use)] == ["define beyond"]
+    assert [o.start for o in references(document, use)] == [TEXT.index("beyond"), use]
+    assert [s.name for s in symbols(document)] == ["far", "n"]
+    assert [(s.name, s.kind) for s in symbols(document)[1].inner] == [("beyond", "definition"), ("g", "guarantee")]
+    kinds = {TEXT[c.start : c.end]: c.kind for c in coloured(document.taken_apart, document.names)}
+    assert [kinds[word] for word in ("define", "beyond", "far", "a", "x")] == [
+        *("keyword", "function", "function", "parameter", "property")
+    ]
+
+
+def test_it_completes_them() -> None:
+    document = analyse(TEXT, "n.rcl")
+
+    def offered(before: str) -> dict[str, str]:
+        at = TEXT.index(before) + len(before)
+        return {o.label: o.kind for o in offers(document.taken_apart, document.project.contract, at)}
+
+    in_clause = offered("guarantee g ( ")
+    assert (in_clause["beyond"], in_clause["far"]) == ("definition", "definition")
+    in_body = offered("define beyond(a, b : REAL) = ")
+    assert (in_body["far"], in_body["a"], in_body["in.x"]) == ("definition", "variable", "input")
+    assert "far" not in offered("topics()\n  ")
+    assert "define" in offered("topics()\n  ")
+    told = signature(document.taken_apart, document.project.contract, TEXT.index("beyond(1, 2)") + len("beyond(1, "))
+    assert told is not None
+    assert (told.label, told.active) == ("beyond(a : REAL, b : REAL)", 1)
