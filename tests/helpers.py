@@ -6,7 +6,7 @@ import io
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -45,6 +45,16 @@ def avow(*words: str, cwd: Path, stdin: str = "") -> subprocess.CompletedProcess
         stream.flush()
         texts.append(stream.buffer.getvalue().decode())  # type: ignore[attr-defined]
     return subprocess.CompletedProcess(["avow", *words], code, *texts)
+
+
+def keys_of(schema: Any) -> Iterator[str]:
+    """Every key that a JSON schema allows by name, at any depth."""
+    for part in schema if isinstance(schema, list) else ():
+        yield from keys_of(part)
+    for word, part in schema.items() if isinstance(schema, dict) else ():
+        if word == "properties":
+            yield from part
+        yield from keys_of(list(part.values()) if word in ("properties", "$defs") else part)
 
 
 def alive(pid: int) -> bool:

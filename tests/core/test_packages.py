@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import re
 import subprocess
 import sys
@@ -10,9 +11,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from helpers import keys_of
 
 import avow.backends
-from avow.backend_kit.registry import installed
+from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.backend_kit.registry import backend, installed
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,6 +46,25 @@ def test_each_folder_is_declared_and_documented() -> None:
     assert apart == {f"backends.{name}" for name in folders}, "the import-linter's contract in pyproject.toml"
     pages = {path.stem for path in (ROOT / "docs" / "backends").glob("*.md")}
     assert folders <= pages, "a page in docs/backends/ for each"
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [name for name in folders if f"docs/backends/{name}.md" not in readme] == [], "README.md: Where to go next"
+
+
+@pytest.mark.parametrize("name", sorted(p.parent.name for p in (ROOT / "backends").glob("*/__init__.py")))
+def test_its_page_has_every_option(name: str) -> None:
+    """Itself, or a backend's page that it links to: options that several have are described once."""
+    folder = ROOT / "docs" / "backends"
+    own = (folder / f"{name}.md").read_text(encoding="utf-8")
+    page = own + "".join((folder / other).read_text(encoding="utf-8") for other in re.findall(r"\((\w+\.md)", own))
+    options = keys_of(backend(name).options_schema)
+    assert [option for option in options if not re.search(rf"\b{option}\b", page)] == []
+
+
+def test_the_page_for_those_who_write_one_has_every_member() -> None:
+    page = (ROOT / "docs" / "adding-a-backend.md").read_text(encoding="utf-8")
+    members = {name for name in (*vars(Backend), *Backend.__annotations__) if not name.startswith("_")}
+    members |= {field.name for kind in (Job, Report, Limits) for field in dataclasses.fields(kind)}
+    assert {name for name in members if not re.search(rf"\b{name}\b", page)} == set()
 
 
 def test_every_file_that_the_map_names_is_there() -> None:

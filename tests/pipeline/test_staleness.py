@@ -9,7 +9,7 @@ import random
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -24,7 +24,7 @@ from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requir
 from avow.calculus.variables import frame
 from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.evidence_keys import surroundings
-from avow.pipeline.slices import sanity_slice
+from avow.pipeline.slices import compose_slice, sanity_slice
 from avow.pipeline.work import catalogue, method_job, planned_method
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
@@ -532,3 +532,39 @@ def test_a_change_in_one_node_of_the_case_study_leaves_the_others(tmp_path: Path
 
 def test_keys_do_not_depend_on_where_the_workspace_is(tmp_path: Path) -> None:
     assert keys(copied(FERRY, tmp_path / "a")) == keys(copied(FERRY, tmp_path / "b"))
+
+
+# -- what an engine sees of a plan --------------------------------
+
+KEYED = {
+    "system": "the obligations' names",
+    "path": "a place, of which no answer speaks",
+    "connections": "the obligations' digests: what meets each assumption",
+    "environment": "the obligations' digests",
+    "scenario": "a part of its own",
+    "requirements": "an obligation each, with the formula in its digest",
+    "compose": "an obligation for each side condition",
+    "nodes": "their names alone are left",
+    "subsystems": "an obligation for each side condition",
+    "ros": "the obligations' digests: what is linked",
+}
+"""Field of a plan that the calculus may see → where the key of its answers has it."""
+
+
+class Opaque:
+    """A value of which the slice can only pass on all or nothing."""
+
+
+def test_what_the_calculus_sees_of_a_plan_is_in_its_key() -> None:
+    """Whoever adds a field says here where the key has it, or leaves it out of the slice."""
+    system = load_system(FERRY)
+    seen = set()
+    for field in fields(system.plan):
+        value = Opaque()
+        try:
+            cut = compose_slice(replace(system, plan=replace(system.plan, **{field.name: value}))).system.plan
+        except TypeError:  # it looks into it
+            seen.add(field.name)
+        else:
+            seen |= {field.name} if getattr(cut, field.name) is value else set()
+    assert seen == KEYED.keys(), "avow/pipeline/slices.py: leave it out there, or put it into a key and name it here"

@@ -16,7 +16,9 @@ import pytest
 import yaml
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
 
-from avow.assurance.answers import Tone
+import avow.report
+from avow.assurance.answers import EARLIER, Tone
+from avow.assurance.case import as_of_earlier
 from avow.assurance.codec import case_schema
 from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
@@ -377,3 +379,18 @@ def test_the_trend_is_what_the_ledger_said_after_each_run() -> None:
     points = trend(case(subject, [g, h], records, keys={(g.id, "hoare"): "3", (h.id, "hoare"): records[2].key}))
     assert [(p.run, p.supported, p.refuted, p.open) for p in points] == [("a", 0, 0, 2), ("b", 1, 1, 0), ("c", 2, 0, 0)]
     assert Status.PROVED.supports
+
+
+def test_every_format_is_described() -> None:
+    names = [name for name, _ in formats(rover_case())]
+    page = (Path(__file__).parents[2] / "docs" / "reading-a-report.md").read_text(encoding="utf-8")
+    table = re.findall(r"`([\w.]+)`", "\n".join(re.findall(r"^\| (.*?) \|", page, re.MULTILINE)))
+    assert set(names) <= set(table), "the table of files in docs/reading-a-report.md"
+    assert set(names) <= set((avow.report.__doc__ or "").split()), "the docstring of avow/report/__init__.py"
+
+
+def test_every_format_says_that_it_is_of_an_earlier_state() -> None:
+    """Of a system that cannot be read any more; a PDF's text is packed."""
+    for made, said in ((as_of_earlier(rover_case()), True), (rover_case(), False)):
+        texts = [(name, text) for name, text in formats(made) if isinstance(text, str)]
+        assert [name for name, text in texts if (EARLIER in text) != said] == []

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+from helpers import keys_of
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
@@ -223,6 +225,20 @@ def test_published_schema_is_the_one_in_use() -> None:
 
     published = Path(__file__).parents[2] / "docs/schemas/plan.schema.json"
     assert json.loads(published.read_text()) == plan_schema()
+
+
+def test_every_key_is_read_and_described() -> None:
+    root = Path(__file__).parents[2]
+    pages = "".join((root / "docs" / name).read_text("utf-8") for name in ("plan.md", "policy.md"))
+    code = "".join(
+        p.read_text("utf-8")
+        for room in ("system", "assurance", "backend_kit")
+        for p in (root / "avow" / room).glob("*.py")
+    )
+    found = set(keys_of(plan_schema()))
+    assert len(found) > 60
+    assert {key for key in found if not re.search(rf"\b{key}\b", pages)} == set(), "docs/plan.md says what it is"
+    assert {key for key in found if f'"{key}"' not in code} == set(), "avow/system/plan_file.py reads it"
 
 
 @pytest.mark.parametrize("path", ["x" * 300, "a/" * 3000 + "b", "x" * 70_000 + ".csv"])
