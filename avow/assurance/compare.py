@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from avow.assurance.answers import How
 from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
@@ -212,8 +213,10 @@ def _gone(item: EvidenceView, view: ObligationView) -> str:
             return "the plan no longer uses the method for this claim"
         case Currency.SET_ASIDE:
             return "this run believed no earlier answer"
-        case _:  # current: another answer was preferred to it
+        case Currency.CURRENT | Currency.SUPERSEDED:  # current: another answer was preferred to it
             return "a newer answer takes its place"
+        case _:
+            assert_never(item.currency)
 
 
 def _asked_again(before: Told, after: Told) -> Iterator[str]:

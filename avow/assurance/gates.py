@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
+from typing import assert_never
 
 from avow.assurance.answers import EARLIER, How
 from avow.assurance.certification import ProofView, certifiable, claimed
@@ -377,8 +378,10 @@ def _asked(kind: Kind, facts: Facts) -> Sequence[Status]:
             return facts.policy.composition
         case Kind.REQUIREMENT:
             return facts.policy.requirements
-        case _:  # its gate names no methods
+        case Kind.WELL_FORMED | Kind.GUARANTEE | Kind.PROGRAM:  # its gate names no methods
             return ()
+        case _:
+            assert_never(kind)
 
 
 def _all_excused(below: Sequence[str], excused: set[str]) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, assert_never
 
 from avow.base.graphs import components
 from avow.base.verdict import Verdict
@@ -213,8 +213,11 @@ def scope_of(claim: Statement) -> str | None:
             return requirement_scope(claim.name)
         case Kind.POSSIBLE | Kind.IMPOSSIBLE | Kind.START:
             return existence_scope(possible_name(claim))
-        case _:  # a clause or a formula of the plan: its derivation's, or none
+        case Kind.ASSUMPTION | Kind.GUARANTEE | Kind.ENVIRONMENT | Kind.INITIAL | Kind.DEFINITION:
+            # a clause or a formula of the plan: its derivation's, or none
             return None
+        case _:
+            assert_never(claim.kind)
 
 
 def possible_name(claim: Statement) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import assert_never
 
 from avow.base.diagnostics import Severity
 from avow.base.files import digest as sha256
@@ -160,8 +161,10 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             # The providers' own contracts leave no room for anything: a finding of theirs.
             verdict, text = Verdict.REFUTED, f"{listing(answer.core)} cannot hold together: no value comes from there"
             because = f"{_owner(answer.core)}/consistent"
-        case _:  # unknown
+        case "unknown":
             verdict, text = Verdict.UNKNOWN, answer.reason
+        case _:
+            assert_never(answer.status)
     return SanityResult(
         node.name,
         claim.about,

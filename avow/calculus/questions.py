@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, assert_never
 
 from avow.base.files import digest as sha256
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
@@ -259,8 +259,10 @@ class LoopQuestion:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
                 return Answer(Verdict.JUSTIFIED, self.entered, details=details, link=Link.GUIDED)
-            case _:  # neither well-founded nor shown to be circular
+            case LoopForm.ENTERED | LoopForm.OPEN:  # neither well-founded nor shown to be circular
                 return Answer(Verdict.UNKNOWN, loop.note, details=details)
+            case _:
+                assert_never(loop.form)
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,8 +300,10 @@ class StartQuestion:
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"
                 return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))
-            case _:  # unknown
+            case "unknown":
                 return Answer(Verdict.UNKNOWN, f"whether there are such initial values: {solution.reason}")
+            case _:
+                assert_never(solution.status)
 
 
 # -- arguments ---------------------------------------------------------------------------------------------------------

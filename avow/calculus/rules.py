@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.graphs import components
@@ -250,9 +251,11 @@ class _Builder:
                     if all(source in self.providers(sink) for source in sources):
                         return self.union([self.premise(source) for source in sources], sources, sink)
                 return None
-            case _:  # R4
+            case Rule.R4 | Rule.PREMISE | Rule.ALL:  # R4: a plan names no other
                 whole = self.found()
                 return whole if any(part.rule is Rule.R4 for part in whole.walk()) else None
+            case _:
+                assert_never(rule)
 
     # -- as it is found ------------------------------------------------------------------------------------------------
 

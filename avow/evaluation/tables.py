@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from typing import assert_never
 
 from avow.evaluation.compiler import Compiler, NotEvaluable, finite_values
 from avow.evaluation.evaluate import SEARCHES, compile_term, filler, guarded
@@ -14,13 +15,16 @@ from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.formulas.values import Sequence as Items
 from avow.language.sorts import (
     BOOL,
+    BoolSort,
     DataSort,
+    EnumSort,
     FunctionSort,
     IntegerSort,
     NaturalSort,
     OpaqueSort,
     RealSort,
     SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -96,5 +100,7 @@ def unnamed(sort: Sort) -> Value:
             if not any(isinstance(part, DataSort) for part in made.parameters):
                 return Data(made.name, tuple(map(unnamed, made.parameters)))
             raise NotEvaluable(f"something is remembered for each value of {sort}")
-        case _:  # functions
+        case BoolSort() | EnumSort() | FunctionSort() | SetSort():  # one value of many, or none of its own
             raise NotEvaluable(f"something is remembered for each value of {sort}")
+        case _:
+            assert_never(sort)

@@ -5,10 +5,25 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.contract import Contract
-from avow.language.sorts import DataSort, EnumSort, FunctionSort, SequenceSort, Sort, TupleSort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
 from avow.language.terms import Term
 
 
@@ -56,8 +71,11 @@ class Environment:
                     self._inner(item)
             case SequenceSort(item=item):
                 self._inner(item)
-            case _:  # a sort without parts
+            case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | OpaqueSort() | SetSort():
+                # a sort without parts
                 pass
+            case _:
+                assert_never(sort)
 
 
 def of_contract(contract: Contract) -> Environment:

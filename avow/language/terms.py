@@ -36,6 +36,29 @@ class _Leaf:
         return self
 
 
+class _Pair:
+    """A term of two subterms."""
+
+    __slots__ = ()
+    left: Term
+    right: Term
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.left, self.right)
+
+
+class _Several:
+    """A term of as many subterms as are written."""
+
+    __slots__ = ()
+    items: tuple[Term, ...]
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+
 _Self = TypeVar("_Self")
 
 
@@ -156,7 +179,7 @@ class Widen:
 
 
 @dataclass(frozen=True, slots=True)
-class Arithmetic:
+class Arithmetic(_Pair):
     """``+ - * /``; both sides have the sort of the whole, up to NATURAL within INTEGER. ``/`` is REAL."""
 
     operator: str
@@ -164,10 +187,6 @@ class Arithmetic:
     right: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.left, self.right)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Arithmetic(self.operator, parts[0], parts[1], self.sort, self.span)
@@ -190,30 +209,22 @@ class Negative:
 
 
 @dataclass(frozen=True, slots=True)
-class TupleTerm:
+class TupleTerm(_Several):
     items: tuple[Term, ...]
     sort: TupleSort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return TupleTerm(parts, self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
-class SequenceTerm:
+class SequenceTerm(_Several):
     """``<a, b, c>``."""
 
     items: tuple[Term, ...]
     sort: SequenceSort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return SequenceTerm(parts, self.sort, self.span)
@@ -237,23 +248,19 @@ class SequenceRange:
 
 
 @dataclass(frozen=True, slots=True)
-class SetTerm:
+class SetTerm(_Several):
     """``{red, orange}``."""
 
     items: tuple[Term, ...]
     sort: SetSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
-
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return SetTerm(parts, self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
-class Compare:
+class Compare(_Pair):
     """``== != < <= > >=`` between terms of one sort (NATURAL and INTEGER count as one)."""
 
     operator: str
@@ -261,10 +268,6 @@ class Compare:
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.left, self.right)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Compare(self.operator, parts[0], parts[1], self.span)
@@ -302,58 +305,42 @@ class Not:
 
 
 @dataclass(frozen=True, slots=True)
-class And:
+class And(_Several):
     items: tuple[Term, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return And(parts, self.span)
 
 
 @dataclass(frozen=True, slots=True)
-class Or:
+class Or(_Several):
     items: tuple[Term, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Or(parts, self.span)
 
 
 @dataclass(frozen=True, slots=True)
-class Implies:
+class Implies(_Pair):
     left: Term
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.left, self.right)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Implies(parts[0], parts[1], self.span)
 
 
 @dataclass(frozen=True, slots=True)
-class Iff:
+class Iff(_Pair):
     left: Term
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.left, self.right)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Iff(parts[0], parts[1], self.span)

@@ -10,7 +10,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, assert_never
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Clause, Contract, Node, Port, Topic
@@ -21,12 +21,18 @@ from avow.language.lexer import quote
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import (
     BOOL,
+    BoolSort,
     DataSort,
     EnumSort,
     FunctionSort,
+    IntegerSort,
+    NaturalSort,
     OpaqueSort,
+    RealSort,
     SequenceSort,
+    SetSort,
     Sort,
+    StringSort,
     TupleSort,
 )
 from avow.language.styles import StyleName
@@ -150,8 +156,10 @@ def _written(sort: Sort, names: Mapping[str, Sort], declared: str | None = None)
             return f"({', '.join(_written(i, names) for i in items)})"
         case SequenceSort(item=item):
             return f"<{_written(item, names)}>"
-        case _:  # a built-in sort
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | SetSort():  # a built-in sort
             return show_sort(sort)
+        case _:
+            assert_never(sort)
 
 
 def _factor(sort: Sort, names: Mapping[str, Sort]) -> str:

@@ -10,11 +10,11 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, assert_never
 
 from avow.ros.bags import message_of
 from avow.ros.calls import is_part, named
-from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Scalar, Wire
+from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 from avow.ros.listing import Listed, Listing
 from avow.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
 
@@ -207,8 +207,10 @@ class _Draft:
                 return "BOOL"
             case Scalar():
                 return "STRING"
-            case _:  # a message within a message: its fields are drafted
+            case Nested():  # a message within a message: its fields are drafted
                 return None
+            case _:
+                assert_never(wire)
 
     def free(self, name: str) -> str:
         found, count = name, 1

@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, assert_never
 
 from avow.base.diagnostics import Severity
 from avow.base.verdict import Counterexample, Outcome, Verdict
@@ -68,7 +68,7 @@ def analyse(
             continue
         start = time.monotonic()
         finding = analysis.settle(claim)
-        results.append(_result(node, claim, finding, time.monotonic() - start))
+        results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
     return tuple(results)
 
 
@@ -85,28 +85,6 @@ def outcomes(
     found = analyse(node, scenario=scenario, ranges=ranges, bounds=bounds, wanted=wanted)
     results = {result.name: result for result in found}
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
-
-
-def _result(node: Node, claim: Claim, finding: Finding, seconds: float) -> SanityResult:
-    return SanityResult(
-        node.name,
-        claim.about,
-        claim.subject,
-        claim.name,
-        claim.sentence,
-        finding.verdict,
-        claim.severity,
-        finding.clauses,
-        finding.counterexample,
-        finding.explanation,
-        finding.conflicts,
-        finding.cut_short,
-        finding.because,
-        finding.engine,
-        finding.bounded,
-        seconds,
-        claim.span,
-    )
 
 
 def _analysis(node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> _Analysis | OverRuns:
@@ -465,8 +443,10 @@ class _Analysis:
             case "unsat":
                 text = several if len(answer.core) > 1 else one
                 return Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
-            case _:  # unknown
+            case "unknown":
                 return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+            case _:
+                assert_never(answer.status)
 
     def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
         """Whether these hold together, for functions that have no finite table."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from avow.base.diagnostics import Severity, Span
 from avow.base.verdict import Counterexample, Outcome, Verdict, bound
-from avow.sanity.claims import Property
+from avow.sanity.claims import Claim, Property
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +61,15 @@ class SanityResult:
     """The answer is about the scenario only."""
     seconds: float = 0.0
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def of(cls, node: str, claim: Claim, found: Finding, seconds: float) -> SanityResult:
+        """What was found of a claim, in so many seconds."""
+        return cls(
+            *(node, claim.about, claim.subject, claim.name, claim.sentence, found.verdict, claim.severity),
+            *(found.clauses, found.counterexample, found.explanation, found.conflicts, found.cut_short, found.because),
+            *(found.engine, found.bounded, seconds, claim.span),
+        )
 
     @property
     def fails(self) -> bool:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice, pairwise, product
+from typing import assert_never
 
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
@@ -32,6 +33,7 @@ from avow.language.sorts import (
     OpaqueSort,
     RealSort,
     SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -230,8 +232,10 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             if constant not in found.constants:
                 found.constants.append(constant)
             return [constant]
-        case _:  # nothing unspecified in it
+        case DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SetSort():  # nothing unspecified in it
             return seen
+        case _:
+            assert_never(sort)
 
 
 def _spread(combination: tuple[tuple[int, Term], ...]) -> tuple[int, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 from typing import Literal as OneOf
 
 import z3
@@ -111,8 +111,10 @@ def _ask(
             return "sat", loaded.solver.model(), (), ""
         case "unsat":
             return "unsat", None, loaded.core(), ""
-        case _:  # unknown
+        case "unknown":
             return "unknown", None, (), said.reason
+        case _:
+            assert_never(said.status)
 
 
 def _granted(effort: int) -> int:

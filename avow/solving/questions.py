@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import assert_never
 
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
@@ -160,8 +161,10 @@ def entails(
         case "sat":
             shown = Counterexample(show_values(solution.values))
             return Entailment(Verdict.REFUTED, shown, solution.values, engine=engine, seconds=seconds)
-        case _:  # unknown
+        case "unknown":
             return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
+        case _:
+            assert_never(solution.status)
 
 
 def replay(

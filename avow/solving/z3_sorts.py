@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, Value
@@ -172,8 +172,11 @@ class Sorts:
                 return z3.ForAll([at], z3.Implies(z3.And(at >= 0, at < z3.Length(expr)), inside))
             case FunctionSort():
                 return self.function_member(sort, lambda *arguments: z3.Select(expr, *arguments))
-            case _:  # every value of its Z3 sort is one of it
+            case BoolSort() | RealSort() | IntegerSort() | StringSort() | EnumSort() | OpaqueSort() | SetSort():
+                # every value of its Z3 sort is one of it
                 return None
+            case _:
+                assert_never(sort)
 
     def clamped(self, expr: Expr, sort: Sort) -> Expr:
         """The expression where it is a value of the sort, else some value of the sort that depends on it alone."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.formulas.formula import free_variables
@@ -18,8 +19,10 @@ from avow.language.sorts import (
     FunctionSort,
     IntegerSort,
     NaturalSort,
+    OpaqueSort,
     RealSort,
     SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -122,8 +125,10 @@ def some_value(sort: Sort) -> Term | None:
                 if None not in arguments:
                     return Construct(made.name, tuple(a for a in arguments if a is not None), sort)
             return None
-        case _:  # nothing is known of it
+        case EnumSort() | OpaqueSort() | FunctionSort() | SetSort():  # nothing is known of it
             return None
+        case _:
+            assert_never(sort)
 
 
 def equal(left: Term, right: Term) -> Term:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar, assert_never
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
@@ -158,8 +158,10 @@ class Mind:
             case DeedKind.LOCK | DeedKind.UNLOCK:
                 locked = replace(intention, locked=deed.kind is DeedKind.LOCK)
                 return self.after(base, goals, locked, {})
-            case _:  # goals are looked at with the queue in view
+            case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL | DeedKind.NULL:  # goals are looked at with the queue in view
                 return self.after(base, goals, intention, {})
+            case _:
+                assert_never(deed.kind)
 
     def after(
         self,

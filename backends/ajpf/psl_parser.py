@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import assert_never
 
 from .psl import (
     AGENT_NAME,
@@ -24,6 +25,7 @@ from .psl import (
     Not,
     Or,
     Release,
+    Truth,
     Until,
     atoms,
 )
@@ -228,8 +230,10 @@ def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
             return Until(instantiate(left, values), instantiate(right, values))
         case Release(left=left, right=right):
             return Release(instantiate(left, values), instantiate(right, values))
-        case _:  # an atom
+        case Truth():
             return formula
+        case _:
+            assert_never(formula)
 
 
 def _instantiate(term: Term, values: Mapping[str, int]) -> Term:

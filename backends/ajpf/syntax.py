@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import count
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 
@@ -206,8 +207,11 @@ def show_deed(deed: Deed) -> str:
             return str(deed.kind)
         case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL:
             return f"{deed.kind}{show(deed.term)} [{deed.goal}]"
-        case _:  # belief and action: the sign before the term
+        case DeedKind.ADD_BELIEF | DeedKind.DROP_BELIEF | DeedKind.WAIT | DeedKind.WAIT_NOT:
+            # belief and action: the sign before the term
             return f"{deed.kind}{show(deed.term)}"
+        case _:
+            assert_never(deed.kind)
 
 
 def variables(term: Term) -> Iterator[str]:

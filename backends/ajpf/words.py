@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any
+from typing import Any, assert_never
 
 from avow.base.verdict import Counterexample
 
@@ -19,7 +19,7 @@ from .automaton import compiled
 from .checker import Property, label_states
 from .explore import Graph, System
 from .mapping import Row
-from .psl import Formula
+from .psl import Always, Atom, Eventually, Formula, Implies, Release, Until
 from .psl_parser import Malformed, index_names, instantiate
 from .structure import Lasso
 from .syntax import Struct, Term, show
@@ -51,8 +51,10 @@ class Wording:
                 return " ∧ ".join(self._junction(items, psl.And))
             case psl.Or(items=items):
                 return " ∨ ".join(f"({part})" if " ∧ " in part else part for part in self._junction(items, psl.Or))
-            case _:  # one part
+            case Atom() | Implies() | Always() | Eventually() | Until() | Release():  # one part
                 return self._part_of(formula)
+            case _:
+                assert_never(formula)
 
     def _junction(self, items: Sequence[Formula], kind: type[psl.And] | type[psl.Or]) -> Iterator[str]:
         """Several items may be what one row stands for: the rows that cover most come first."""

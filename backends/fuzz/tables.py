@@ -8,10 +8,24 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
 from avow.language.contract import Port
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
 from avow.stepping.samples import around, numbers_of
 
 from .guide import Guide
@@ -127,8 +141,11 @@ def sort_name(sort: Sort) -> str:
             return "element"
         case RealSort():
             return "real"
-        case _:  # refused when the source is read
+        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+            # refused when the source is read
             raise TypeError(f"{sort} is no machine value")
+        case _:
+            assert_never(sort)
 
 
 def _item(sort: Sort) -> Sort:

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, assert_never
 
 from avow.backend_kit.linked import Recorded, settled
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
@@ -15,7 +15,21 @@ from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import CASE
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
 from avow.stepping.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
 
 from .drawn import Step
@@ -459,8 +473,11 @@ def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
         case SequenceSort(item=item):
             one = _values(item, made, single)
             return [[_simple(item)] * n for n in made.lengths] + [row for v in one for row in ([v], [_simple(item), v])]
-        case _:  # refused when the source is read
+        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SetSort():
+            # refused when the source is read
             return []
+        case _:
+            assert_never(sort)
 
 
 def _finite(value: Any) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations, pairwise
+from typing import assert_never
 
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
@@ -21,7 +22,7 @@ from avow.solving.questions import entails, solve
 
 from .guesses import NUMERIC, filled, guesses, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State
-from .program import Assign, Block, If, Program, Update, While, statements, variable
+from .program import Assign, Block, If, Match, Program, Skip, Update, While, statements, variable
 from .triples import Triple, equation
 from .tuning import LASTING_EFFORT, UNENDED_RUNS
 from .witness import Breach, first_state
@@ -79,8 +80,10 @@ def _reached(block: Block, loop: While, goal: Term) -> Term:
             case If(condition=condition, then=then, otherwise=otherwise):
                 yes, no = (_reached(part, loop, goal) for part in (then, otherwise))
                 inner = Or((conjunction((condition, yes)), conjunction((negation(condition), no))))
-            case _:  # holds no loop
+            case Skip() | Assign() | Update() | Match():  # holds no loop
                 continue
+            case _:
+                assert_never(statement)
         found.append(negation(weakest(block[:at], negation(inner), Conditions(TRUE))))
     return Or((Literal(False, TRUE.sort), *found))
 

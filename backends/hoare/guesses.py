@@ -7,6 +7,7 @@ import math
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
+from typing import assert_never
 
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import subterms
@@ -30,7 +31,7 @@ from avow.solving.models import default_value
 from avow.solving.questions import solve
 from avow.solving.translation import Unsupported
 
-from .program import Assign, If, Match, Program, Statement, Update, While, statements
+from .program import Assign, If, Match, Program, Skip, Statement, Update, While, statements
 from .triples import Triple
 from .tuning import GUESS_EFFORT, INPUTS_TRIED, LENGTHS, VALUE_DEPTH
 
@@ -151,8 +152,10 @@ def _terms(statement: Statement) -> tuple[Term, ...]:
             return (condition,)
         case Match(subject=subject):
             return (subject,)
-        case _:  # tests nothing
+        case Skip():  # tests nothing
             return ()
+        case _:
+            assert_never(statement)
 
 
 def numbers(terms: Iterable[Term]) -> tuple[list[Fraction], list[Fraction]]:

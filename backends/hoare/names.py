@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from avow.language.contract import Contract, Node
 from avow.language.sorts import (
@@ -41,6 +42,7 @@ from .syntax import (
     Number,
     Quantification,
     Sequence,
+    SkipStatement,
     Statement,
     Text,
     Truth,
@@ -150,8 +152,10 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
         case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
             sort = join(estimate(left, names, local), estimate(right, names, local))
             return join(INTEGER, sort) if operator == "-" else sort
-        case _:  # a comparison or a connective
+        case Unary() | Binary():  # a comparison or a connective
             return BOOL
+        case _:
+            assert_never(expression)
 
 
 def expect(expression: Expression, sort: Sort, names: Names) -> None:
@@ -214,5 +218,7 @@ def assignments(body: tuple[Statement, ...], names: Names) -> Iterator[tuple[Ass
                 stack.extend((s, inner) for s in reversed(then))
             case WhileStatement(body=inside):
                 stack.extend((s, local) for s in reversed(inside))
-            case _:  # holds no statement
+            case SkipStatement():  # holds no statement
                 pass
+            case _:
+                assert_never(statement)

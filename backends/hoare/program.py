@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.sorts import DataSort, Sort
@@ -121,8 +122,10 @@ def statements(block: Block) -> Iterator[Statement]:
                 stack.extend(reversed((*then, *otherwise)))
             case While(body=body):
                 stack.extend(reversed(body))
-            case _:  # holds no statement
+            case Skip() | Assign() | Update():  # holds no statement
                 pass
+            case _:
+                assert_never(statement)
 
 
 def has_loops(program: Program) -> bool:

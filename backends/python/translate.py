@@ -9,10 +9,24 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, assert_never
 
 from avow.language.contract import Node
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
 
 from .expressions import Expressions
 from .machine import Failed, run_block
@@ -53,8 +67,11 @@ def kind_of(sort: Sort) -> Kind | None:
             return Kind.INT
         case EnumSort():
             return Kind.TEXT
-        case _:  # held by no number, truth value or text
+        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+            # held by no number, truth value or text
             return None
+        case _:
+            assert_never(sort)
 
 
 @dataclass(slots=True)

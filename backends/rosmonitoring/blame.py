@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import assert_never
 
 from avow.language.contract import Node
 from avow.language.terms import Role
@@ -64,8 +65,11 @@ class Blame:
                     self._note(violation, _Origin(f"{_place(violation)}{self._doubt(violation)}", violation.index))
                 case Fault.EXCUSED if origin := self._excuse(violation):
                     self._note(violation, origin)
-                case _:  # no output of the node is wrong by it
+                case Fault.EXCUSED | Fault.ASSUMPTION | Fault.PROVIDER | Fault.SILENT | Fault.RATE | Fault.MAPPING:
+                    # no output of the node is wrong by it
                     pass
+                case _:
+                    assert_never(violation.fault)
         self._open += origins
         settled = list(self._settle(late=False))
         if over or len(self._open) > BREACHES_OPEN:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, assert_never
 
 from avow.formulas.values import Data, FunctionValue, Sequence, Value
 from avow.language.sorts import (
@@ -19,6 +19,7 @@ from avow.language.sorts import (
     OpaqueSort,
     RealSort,
     SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -113,8 +114,10 @@ def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
             return _relation_literal(raw, sort, names)
         case OpaqueSort(name=name):
             raise MappingError(f"{name} is an unspecified sort: no message can be read as one of its values")
-        case _:
+        case SetSort():
             raise MappingError("no message can be read as a value of this sort")
+        case _:
+            assert_never(sort)
 
 
 def _number(raw: Any) -> Fraction | int:

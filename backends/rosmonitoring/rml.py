@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
+from typing import assert_never
 
 from avow.formulas.flattening import flattened
 from avow.language.operators import OPPOSITE
@@ -105,6 +107,32 @@ def opposite(condition: Condition) -> Condition:
             return some([opposite(item) for item in items])
         case Some(items=items):
             return every([opposite(item) for item in items])
+
+
+def negations(complete: Condition) -> list[Condition]:
+    """Of the parts of a condition that says that all values are there: in each, one or more are still missing."""
+    parts = complete.items if not isinstance(complete, Comparison) else (complete,)
+    return [compare("!=", p.left, p.right) for p in parts if isinstance(p, Comparison)]
+
+
+def substitute(condition: Condition, new: Mapping[str, Numeric]) -> Condition:
+    """The condition with numbers in the place of names."""
+    if isinstance(condition, Comparison):
+        return compare(condition.operator, _put(condition.left, new), _put(condition.right, new))
+    items = [substitute(item, new) for item in condition.items]
+    return every(items) if isinstance(condition, Every) else some(items)
+
+
+def _put(number: Numeric, new: Mapping[str, Numeric]) -> Numeric:
+    match number:
+        case Name(name=name):
+            return new.get(name, number)
+        case Calculation(operator=operator, left=left, right=right):
+            return Calculation(operator, _put(left, new), _put(right, new))
+        case Number():  # a number that is written down
+            return number
+        case _:
+            assert_never(number)
 
 
 def size(condition: Condition) -> int:

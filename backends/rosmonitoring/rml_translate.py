@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 from pathlib import PurePath
+from typing import assert_never
 
 from avow.backend_kit.one_step import refusal
 from avow.evaluation.evaluate import free_names
@@ -28,12 +29,9 @@ from .quantifiers import Eliminator
 from .rml import (
     FALSE,
     TRUE,
-    Calculation,
-    Comparison,
     Condition,
     Derived,
     EventType,
-    Every,
     Machine,
     Name,
     NotRml,
@@ -45,9 +43,11 @@ from .rml import (
     every,
     key,
     names_in,
+    negations,
     opposite,
     some,
     string,
+    substitute,
     write,
 )
 from .rules import Choice, Constant, Fields, Lookup, Path, Previous, Rule
@@ -150,7 +150,7 @@ class _Machine:
         self._choose(names)
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = every([compare("==", Name(self.flags[n]), Number(Fraction(1))) for n in names if n in self.flags])
-        judged = some([*_negations(complete), guard])
+        judged = some([*negations(complete), guard])
         triggers = self._triggers(names)
         together = self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
         if together and len(triggers) > 1:
@@ -283,7 +283,7 @@ class _Machine:
             for name, case in zip(updated, cases, strict=True):
                 new[self.flags[name]] = Number(Fraction(1))
                 new.update(zip(components(self.symbols[name]), case.values, strict=True))
-            guard = every([*(case.guard for case in cases), _substitute(mode.guard, new)])
+            guard = every([*(case.guard for case in cases), substitute(mode.guard, new)])
             binds = tuple(b for case in cases for b in case.binds)
             used = [n for n in state if n in names_in(guard)]
             fields = tuple(f for case in cases for f in case.fields)
@@ -331,8 +331,10 @@ class _Machine:
             case Choice(variable=variable):
                 assert isinstance(variable.sort, DataSort)
                 return self._choice_cases(rule, variable.sort, at)
-            case _:
+            case Constant() | Previous():
                 raise NotRml(f"{name} has no message")
+            case _:
+                assert_never(rule)
 
     def _choice_cases(self, rule: Choice, sort: DataSort, at: int) -> list[_Case]:
         found: list[_Case] = []
@@ -472,29 +474,7 @@ def _numbers(symbol: Symbol, sort: Sort) -> list[Numeric]:
             return [Number(Fraction(0))] * (1 + len(sort.parameters))
         case Points(tuples=((_, parts),)):
             return [Number(Fraction(1)), *(n for p in parts for n in _numbers(p, sort))]
-        case _:
+        case Points() | Tracked():
             raise NotRml("an initial value with more than one tuple")
-
-
-def _negations(complete: Condition) -> list[Condition]:
-    """One or more values are still missing."""
-    parts = complete.items if not isinstance(complete, Comparison) else (complete,)
-    return [compare("!=", p.left, p.right) for p in parts if isinstance(p, Comparison)]
-
-
-def _substitute(condition: Condition, new: dict[str, Numeric]) -> Condition:
-    if isinstance(condition, Comparison):
-        return compare(condition.operator, _replace(condition.left, new), _replace(condition.right, new))
-    items = [_substitute(item, new) for item in condition.items]
-    return every(items) if isinstance(condition, Every) else some(items)
-
-
-def _replace(number: Numeric, new: dict[str, Numeric]) -> Numeric:
-
-    match number:
-        case Name(name=name):
-            return new.get(name, number)
-        case Calculation(operator=operator, left=left, right=right):
-            return Calculation(operator, _replace(left, new), _replace(right, new))
-        case _:  # a number that is written down
-            return number
+        case _:
+            assert_never(symbol)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import assert_never
 
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import (
@@ -19,8 +20,13 @@ from avow.language.sorts import (
     FunctionSort,
     IntegerSort,
     NaturalSort,
+    OpaqueSort,
     RealSort,
+    SequenceSort,
+    SetSort,
     Sort,
+    StringSort,
+    TupleSort,
 )
 from avow.ros import definitions as wires
 
@@ -125,8 +131,10 @@ def blank(sort: Sort) -> Symbol:
     match sort:
         case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | EnumSort():
             return Scalar(Number(Fraction(0)))
-        case _:
+        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
             raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
+        case _:
+            assert_never(sort)
 
 
 def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
@@ -161,8 +169,10 @@ def _named(sort: Sort, prefix: str, name: str) -> Symbol:
                     row.append(Scalar(Name(f"{prefix}_{at}_{k}")))
                 arguments.append(tuple(row))
             return Variant(Name(f"{prefix}_t"), tuple(arguments))
-        case _:
+        case StringSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
             raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
+        case _:
+            assert_never(sort)
 
 
 def no_pattern(rule: Fields) -> str:
@@ -206,5 +216,7 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return tuple(flags.values())
         case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
-        case _:  # no flag of its own
+        case Scalar() | Variant() | Points():  # no flag of its own
             return ()
+        case _:
+            assert_never(symbol)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path as File
+from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.formulas.formula import free_variables
@@ -19,7 +20,7 @@ from avow.ros.definitions import FLOATS, Scalar
 from .bags import Origin, carried, conflicts, is_bag
 from .options import Setup, same_topic
 from .reading import shown
-from .rules import Choice, Fields, Rule
+from .rules import Choice, Constant, Fields, Previous, Rule
 from .wires import of_type
 
 
@@ -71,8 +72,10 @@ def reading(name: str, rule: Rule) -> str:
             return f"{name} ← {taken}{', '.join(parts)}{each} ({rule.topic})"
         case Choice():
             return f"{name} ← {shown(rule.tag)} and its arguments ({rule.topic})"
-        case _:  # the scenario, or the step before
+        case Constant() | Previous():  # the scenario, or the step before
             return ""
+        case _:
+            assert_never(rule)
 
 
 def unholdable(setup: Setup, clause: Clause) -> Iterator[Diagnostic]:
