@@ -183,7 +183,7 @@ def conclude(facts: Facts) -> Case:
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)
     grade, reason = _grade(facts, proofs)
-    found = gates(facts, views, requirements, derived, findings, proofs, fresh)
+    found = gates(facts, views, requirements, derived, findings, proofs, relied, fresh)
     listed = (
         *open_items(facts, views, requirements, derived, findings),
         *(OpenItem("program", name, text, advice=True) for name, (_, text) in by_program.items()),

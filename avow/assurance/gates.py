@@ -13,7 +13,9 @@ from avow.assurance.findings import FINDINGS
 from avow.assurance.gap import shortfall, suggest
 from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
-from avow.evidence.obligation import Kind
+from avow.assurance.relied import Relied, looked_at
+from avow.base.verdict import Object
+from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.status import Status
 
 _TOOL = frozenset({Status.ERROR, Status.NOT_RUN})
@@ -26,6 +28,7 @@ def gates(
     derivations: Sequence[DerivationView],
     findings: Sequence[Handled],
     proofs: Sequence[ProofView],
+    relied: Mapping[str, Relied],
     fresh: bool,
 ) -> tuple[Gate, ...]:
     """Every gate, in the order in which a reader should look at them."""
@@ -40,6 +43,7 @@ def gates(
         _kind(facts, obligations, excused, Kind.SANITY, "Contracts are worth verifying", facts.policy.sanity),
         _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition holds", facts.policy.composition),
         *_guarantees(facts, obligations, excused),
+        *_programs(facts, obligations, relied, excused),
         _derivations(facts, derivations, views, excused),
         _requirements(facts, requirements, derivations, views, excused),
         *_certified(facts, proofs, fresh),
@@ -183,6 +187,30 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
             demand.text() if demand.one_of else "",
             idle=not demand.one_of,
         )
+
+
+def _programs(
+    facts: Facts, obligations: Sequence[ObligationView], relied: Mapping[str, Relied], excused: set[str]
+) -> Iterable[Gate]:
+    """That a program answers as its model matters where a guarantee of its node is relied upon of a model."""
+    own = [v for v in obligations if v.obligation.kind is Kind.PROGRAM]
+    if not own:
+        return
+    guarantees = [v for v in obligations if v.obligation.kind is Kind.GUARANTEE and v.id in relied]
+    of_models = {v.obligation.node for v in guarantees if looked_at(relied[v.id]) is Object.MODEL}
+    asked = [v for v in own if v.obligation.name != ProgramClaim.LINKED or v.obligation.node in of_models]
+    good = facts.policy.programs
+    yield _gate(
+        facts,
+        Kind.PROGRAM.value,
+        "Programs run without fault, and answer as the models that are relied upon",
+        [v for v in asked if good and v.status not in good],
+        excused,
+        lambda view: _short_of(view.status, good),
+        _holding([v.status.supports for v in asked], asked=bool(good)),
+        _in_words(good),
+        idle=not good,
+    )
 
 
 def _criticality(view: ObligationView, facts: Facts) -> str:
@@ -378,7 +406,9 @@ def _asked(kind: Kind, facts: Facts) -> Sequence[Status]:
             return facts.policy.composition
         case Kind.REQUIREMENT:
             return facts.policy.requirements
-        case Kind.WELL_FORMED | Kind.GUARANTEE | Kind.PROGRAM:  # its gate names no methods
+        case Kind.PROGRAM:
+            return facts.policy.programs
+        case Kind.WELL_FORMED | Kind.GUARANTEE:  # its gate names no methods
             return ()
         case _:
             assert_never(kind)

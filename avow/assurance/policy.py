@@ -4,7 +4,7 @@
     policy:
       profile: default                                      where to start from (``default`` if left out)
       guarantees: {high: {one_of: [proved], methods: 2, independent: true}}        replaces that criticality's demand
-      sanity: [proved]        composition: […]        requirements: […]
+      sanity: [proved]        composition: […]        requirements: […]        programs: […]
       reviewers: [A. Person]  who may review; without it, anybody
       certified: true         every answer must be of this run, every digest verified
       proved: certified       a proof of the calculus or of a requirement needs a certificate that the kernel checked
@@ -92,6 +92,8 @@ class Policy:
     sanity: tuple[Status, ...]
     composition: tuple[Status, ...]
     requirements: tuple[Status, ...]
+    programs: tuple[Status, ...] = ()
+    """Of what is claimed of a node's program besides its guarantees."""
     reviewers: tuple[str, ...] = ()
     certified: bool = False
     proved: bool = False
@@ -155,7 +157,10 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
     return profile("default"), [fault]
 
 
-_KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified", "proved")
+_KEYS = (
+    *("profile", "guarantees", "sanity", "composition", "requirements", "programs"),
+    *("reviewers", "certified", "proved"),
+)
 _DEMAND_KEYS = (
     *("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation"),
     *("of", "numbers"),
@@ -172,7 +177,7 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
     reader = _PolicyReader(located, faults)
     policy = replace(base, name=f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name)
     for key in data:
-        if key in ("sanity", "composition", "requirements"):
+        if key in ("sanity", "composition", "requirements", "programs"):
             good = reader.statuses(data[key], (key,))
             match key:
                 case "sanity":
@@ -181,6 +186,8 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
                     policy = replace(policy, composition=good)
                 case "requirements":
                     policy = replace(policy, requirements=good)
+                case "programs":
+                    policy = replace(policy, programs=good)
     if "reviewers" in data:
         policy = replace(policy, reviewers=reader.texts(data["reviewers"], ("reviewers",)))
     if "certified" in data:
@@ -327,6 +334,7 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
             sanity=reader.statuses(raw["sanity"], ("sanity",)),
             composition=reader.statuses(raw["composition"], ("composition",)),
             requirements=reader.statuses(raw["requirements"], ("requirements",)),
+            programs=reader.statuses(raw["programs"], ("programs",)),
             certified=raw.get("certified", False),
         )
     if faults:

@@ -1,8 +1,8 @@
 """The record of each guarantee that is relied upon, and what was seen, in words with its bound.
 
 Of several records that support a claim one is chosen: one whose suppositions have not expired before any other, then
-one that is a proof or an exhaustive check, then one whose suppositions all have an owner. So losing a record never
-makes a case look better: what is left was there to be chosen before.
+one that is a proof or an exhaustive check, then one of the program itself before one no stronger of a model, then one
+whose suppositions all have an owner. A proof of the node's source supposes in the open what one of a model leaves out.
 """
 
 from __future__ import annotations
@@ -64,17 +64,19 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
     if not view.status.supports:
         return None
     ways = []
-    for item in view.counting:
-        record = item.entry.evidence
-        status = weigh(record).support
-        if status is None:
-            continue
+    records = [item.entry.evidence for item in view.counting]
+    supporting = [(record, status) for record in records if (status := weigh(record).support) is not None]
+    for record, status in supporting:
+        outdone = record.of is Object.MODEL and any(
+            other.of is not Object.MODEL and rank.rank >= status.rank for other, rank in supporting
+        )
         open_ones = in_words(record.rests_on, record.hypotheses)
         limits = (h for h in record.rests_on if h.kind is HypothesisKind.BOUND and h.name.startswith("scenario."))
         thought = [opinion(record.method, text) for text in open_ones]
         badness = (
             any(t.expired for t in thought),
             status not in EXHAUSTIVE,
+            outdone,
             not all(t.owned for t in thought),
             -status.rank,
             len(open_ones),

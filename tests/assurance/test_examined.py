@@ -1,0 +1,67 @@
+"""What was looked at: a proof of the program before one of a model, and the gate of what is claimed of programs."""
+
+from __future__ import annotations
+
+import pytest
+
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
+from avow.assurance.model import Case, Gate
+from avow.base.verdict import Object, Verdict
+from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.record import Evidence
+
+G = guarantee("n", "g")
+FAULTLESS, LINKED = (obligation("n", Kind.PROGRAM, name) for name in (ProgramClaim.FAULTLESS, ProgramClaim.LINKED))
+FINITE = ("inputs are finite: in.r: no NaN, no infinity",)
+MODEL = evidence(G, Verdict.PROVED, "hoare")
+SOURCE = evidence(G, Verdict.PROVED, "dafny", of=Object.SOURCE, numbers="float64", hypotheses=FINITE)
+TESTED = evidence(G, Verdict.TESTED, "hypothesis", of=Object.SOURCE, numbers="float64")
+
+
+def made(*records: Evidence, policy: object = None) -> Case:
+    whole = system({"n": ["g"]}, plans=[node_plan("n", "medium", "hoare", "dafny")], policy=policy)
+    return case(whole, [G, FAULTLESS, LINKED], list(records))
+
+
+def words(*records: Evidence) -> str:
+    (basis,) = made(*records).answers.bases
+    return basis.words
+
+
+def test_a_proof_of_the_source_is_named_before_one_of_a_model() -> None:
+    assert words(MODEL, SOURCE) == words(SOURCE, MODEL) == "1 proved (source in float64)"
+    assert words(MODEL) == "1 proved (model; program agrees: missing)"
+
+
+def test_a_test_of_the_source_is_no_proof() -> None:
+    assert words(MODEL, TESTED).startswith("1 proved (model")
+    assert words(SOURCE, TESTED) == "1 proved (source in float64)"
+
+
+def gate(*records: Evidence, policy: object = None) -> Gate:
+    return next(g for g in made(*records, policy=policy).gates if g.id == "program")
+
+
+GOOD = evidence(FAULTLESS, Verdict.TESTED, "hypothesis")
+AGREES = evidence(LINKED, Verdict.TESTED, "hypothesis")
+
+
+@pytest.mark.parametrize(
+    ("records", "passed"),
+    [
+        ([GOOD, AGREES, MODEL], True),
+        ([GOOD, MODEL], False),  # what is relied upon is a model, and whether the program is it is not known
+        ([GOOD, SOURCE], True),
+        ([AGREES, SOURCE], False),
+        ([GOOD, evidence(LINKED, Verdict.UNKNOWN, "hypothesis"), MODEL], False),
+        ([GOOD, evidence(LINKED, Verdict.UNKNOWN, "hypothesis"), MODEL, SOURCE], True),
+    ],
+)
+def test_what_is_claimed_of_programs_has_a_gate(records: list[Evidence], passed: bool) -> None:
+    assert gate(*records).passed is passed
+    assert gate(*records, policy={"programs": []}).passed
+
+
+def test_a_system_without_programs_has_no_such_gate() -> None:
+    found = case(system({"n": ["g"]}), [G], [MODEL])
+    assert not [g for g in found.gates if g.id == "program"]
