@@ -27,7 +27,8 @@ from .engine import Monitor
 from .numbers import Decimal
 from .options import same_topic
 from .pace import SEQUENCE
-from .plans import Plan, Token, Watch, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
+from .paired import Paired
+from .plans import Plan, Token, Watch, below, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
 from .rules import Path, Previous
 from .shapes import Shape, scanner, shape
 from .timed import Timed
@@ -36,8 +37,9 @@ from .tuning import BATCH, CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT, TEX
 from .watched import Fault, Violation, time_text
 
 Match = re.Match[bytes]
-Handler = Callable[[Match], Any]
-"""False: the engine has to judge the event; True: all is well; else what is to be told, by monitors."""
+Handler = Callable[[Match, int], Any]
+"""Of a line and its number. False: the engine has to judge the event; True: all is well; else what is to be told, by
+monitors: a list of what was found now, or a tuple of what was told of another event like it."""
 
 
 @dataclass(slots=True)
@@ -49,6 +51,8 @@ class _Topic:
     """Events that the engine has not counted."""
     last: Match | None = None
     """The latest, if the engine has not read it."""
+    line: int = 0
+    """Its line."""
 
 
 class Compiled:
@@ -66,6 +70,8 @@ class Compiled:
         self._watches = [watch_of(monitor) for monitor in monitors]
         self._by_values = any(monitor.by_values for monitor in monitors)
         """Else the engine judges all that is listened to, and nothing of it is remembered."""
+        self._blank = [0]
+        """How many lines so far are no events."""
         self._fresh = itertools.count(1 << 40)
         self._shapes: list[Shape] = []
         self._known: dict[tuple[int, int, str], dict[Any, Token]] = {}
@@ -78,8 +84,6 @@ class Compiled:
         self._scan, self._handlers = self._compile()
         self._line = 0
         """How many lines have been read."""
-        self._counted = (b"", 0, 0)
-        """What is being read, and how many lines of the trace end before a place in it."""
         for monitor in monitors:
             monitor.catch_up = self._flush
 
@@ -120,12 +124,11 @@ class Compiled:
     def _judged(self, chunk: bytes, name: str) -> Iterator[tuple[int, list[Violation]]]:
         """Judge some whole lines, which come after those before."""
         at, line = 0, self._line
-        self._counted = (chunk, 0, line)
         while at < len(chunk):
             before, handlers = len(self._shapes), self._handlers
             done = line
             for line, match in enumerate(self._scan.finditer(chunk, at), done + 1):
-                known = handlers[match.lastindex](match)
+                known = handlers[match.lastindex](match, line)
                 if known is True:
                     continue
                 found = self._again(known, line) if known else self._slow(match, name, line)
@@ -146,7 +149,10 @@ class Compiled:
         except UnicodeDecodeError:
             raise not_text(name) from None
         event = event_of(words, name, line)
-        return [] if event is None else self._engine(event, text, line)
+        if event is None:
+            self._blank[0] += 1
+            return []
+        return self._engine(event, text, line)
 
     def _engine(self, event: Event, text: bytes | None, line: int) -> list[Violation]:
         """The engine judges an event; what it finds is remembered for others with a text like its own."""
@@ -161,8 +167,11 @@ class Compiled:
         plans = [self._plan(watch, topic) for watch in self._watches]
         before = [[*watch.tokens] for watch in self._watches]
         tallies = [[counts_of(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
+        for watch in self._watches:
+            watch.monitor.settled.clear()
         self._heard(topic, 1)
         found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
+        self._blank[0] = line - max((watch.monitor.events for watch in self._watches), default=line)
         which, groups = self._shaped(text, topic) if raw is topic and text is not None else (-1, None)
         for watch, plan, old, tally in zip(self._watches, plans, before, tallies, strict=True):
             unreadable = {
@@ -180,19 +189,23 @@ class Compiled:
         self._clock[0] = max((watch.monitor.timing.newest for watch in self._watches), default=-math.inf)
         self._clock[1] = min((watch.monitor.deadline for watch in self._watches), default=math.inf)
 
-    def _again(self, known: list[tuple[Violation, ...]], line: int) -> list[Violation]:
-        """What was told before of an event like the latest."""
+    def _again(self, known: list[list[Violation] | tuple[Violation, ...]], line: int) -> list[Violation]:
+        """What was told before of an event like the latest, and what was found in answers that waited for it."""
         self._count()
         found: list[Violation] = []
         raw = self._last[0].decode()
         time = time_text(Decimal(raw) if "." in raw else int(raw))
         monitors = {watch.monitor.setup.node.name: watch.monitor for watch in self._watches}
-        for violation in itertools.chain.from_iterable(known):
-            monitor = monitors[violation.node]
-            monitor.tallies[violation.clause].broken += 1
-            monitor.tallies[violation.clause].excused += violation.fault is Fault.EXCUSED
-            heard = {name: (line, by) for name, (_, by) in violation.heard.items()}
-            found.append(replace(violation, index=monitor.events, time=time, heard=heard))
+        for some in known:
+            if isinstance(some, list):
+                found += some
+                continue
+            for violation in some:
+                monitor = monitors[violation.node]
+                monitor.tallies[violation.clause].broken += 1
+                monitor.tallies[violation.clause].excused += violation.fault is Fault.EXCUSED
+                heard = {name: (line, by) for name, (_, by) in violation.heard.items()}
+                found.append(replace(violation, index=monitor.events, time=time, heard=heard))
         return list(self._told(found))
 
     # -- the engine's state ------------------------------------------------------------------------------------------
@@ -209,6 +222,8 @@ class Compiled:
                 if plan is None:
                     continue
                 watch.monitor.relevant += count
+                for watched in plan.asked:
+                    watched.tally.published += count
                 for watched in plan.due:
                     watched.tally.published += count
                     watched.tally.judged += count
@@ -221,11 +236,11 @@ class Compiled:
         """Bring the engine up to date with what was passed over."""
         self._count()
         # in the order of the lines, since one topic may be written in two ways: `/scan` and `scan`
-        last = sorted((t.last.start(), t, t.last) for t in self._topics.values() if t.last is not None)
+        last = sorted((t.line, t, t.last) for t in self._topics.values() if t.last is not None)
         waiting = [topic for _, topic, _ in last]
         if not waiting:
             return
-        events = [(event_of(m.group(0)[:-1].decode(), "", 0), self._line_at(m.start())) for _, _, m in last]
+        events = [(event_of(match.group(0)[:-1].decode(), "", 0), line) for line, _, match in last]
         for watch in self._watches:
             for topic, (event, line) in zip(waiting, events, strict=True):
                 if event is not None and watch.plans.get(same_topic(topic.name)) is not None:
@@ -235,13 +250,6 @@ class Compiled:
                 watch.values[at] = watch.monitor.values.get(name)
         for topic in waiting:
             topic.last = None
-
-    def _line_at(self, place: int) -> int:
-        """The line that begins at a place of what is being read, which is none before those asked for."""
-        chunk, known, lines = self._counted
-        lines += chunk.count(b"\n", known, place)
-        self._counted = (chunk, place, lines)
-        return lines + 1
 
     def _look(self, watch: Watch, read: set[str], which: int, groups: tuple[bytes, ...] | None) -> None:
         """Set the tokens by what the engine now knows; `read`: the variables of this event's message."""
@@ -258,6 +266,7 @@ class Compiled:
         for name, rule in watch.monitor.setup.rules.items():
             if isinstance(rule, Previous) and values.get(name) is values.get(rule.source):
                 watch.tokens[watch.slots[name]] = watch.tokens[watch.slots[rule.source]]
+        watch.sources[:] = watch.values
 
     def _token(self, watch: Watch, name: str, which: int, groups: tuple[bytes, ...]) -> Token | None:
         at = watch.slots[name]
@@ -314,10 +323,13 @@ class Compiled:
         plan = self._plan(watch, topic)
         for name in plan.names if plan else ():
             yield leads(watch.monitor.setup.rules[name])
+        if plan is not None and watch.monitor.pairing is not None:
+            answers = watch.monitor.pairing.answers
+            yield below(path for path in (answers.input, answers.output) if path)
 
     def _compile(self) -> tuple[re.Pattern[bytes], dict[int | None, Handler]]:
         scan, offsets = scanner(self._shapes)
-        handlers: dict[int | None, Handler] = {scan.groups: lambda match: False}
+        handlers: dict[int | None, Handler] = {scan.groups: _never}
         for which, (each, offset) in enumerate(zip(self._shapes, offsets, strict=True)):
             handlers[offset + len(each.paths)] = self._handler(which, each, offset)
         return scan, handlers
@@ -326,6 +338,7 @@ class Compiled:
         """The code for one shape of line."""
         topic = self._topics.setdefault(made.topic, _Topic(made.topic))
         scope: dict[str, Any] = {"bisect": bisect, "clock": self._clock, "topic": topic, "last": self._last}
+        scope["blank"] = self._blank
         timed = Timed()
         checks, acts = timed.checks, timed.acts
         loud: list[str] = []
@@ -335,13 +348,18 @@ class Compiled:
             if plan is None:
                 continue
             scope[f"tok{number}"] = watch.tokens
+            paired = Paired(watch, plan, made, str(number), scope)
+            if not paired.possible:
+                return _never
+            acts += paired.settles
+            loud += paired.found
             fresh: dict[int, str] = {}
             for name in plan.names:
                 at = watch.slots[name]
                 rule = watch.monitor.setup.rules[name]
                 texts = texts_of(made, rule)
                 if not texts:
-                    return lambda match: False
+                    return _never
                 used.update(texts)
                 variable = f"x{number}_{at}"
                 key = f"a{texts[0]}" if len(texts) == 1 else "(" + ", ".join(f"a{k}" for k in texts) + ")"
@@ -370,11 +388,14 @@ class Compiled:
                 ]
                 loud.append(f"v{number}")
             acts += [f"tok{number}[{at}] = {variable}" for at, variable in fresh.items()]
+            paired.add(checks, acts, fresh)
+            used |= paired.used
             inputs = tuple(dict.fromkeys(name for watched in plan.due for name in watched.inputs))
             timed.add(watch.monitor.timing, plan.names, (inputs, plan.ages), made, str(number), scope)
             for name, rule in watch.monitor.setup.rules.items():
                 if isinstance(rule, Previous) and rule.source in plan.names:
                     acts.append(f"tok{number}[{watch.slots[name]}] = tok{number}[{watch.slots[rule.source]}]")
+                    acts += paired.copied(watch.slots[name], watch.slots[rule.source])
         used |= {made.time, *timed.used}
         groups = sorted(used)
         names = ", ".join(f"a{k}" for k in groups)
@@ -390,12 +411,18 @@ class Compiled:
             "clock[0] = t",
             "topic.count += 1",
             "topic.last = match",
+            "topic.line = line",
             *([f"if {' or '.join(loud)}: return [v for v in ({', '.join(loud)},) if v]"] if loud else []),
             "return True",
         ]
-        exec("def handle(match):\n" + "".join(f"    {each}\n" for each in code), scope)
+        exec("def handle(match, line):\n" + "".join(f"    {each}\n" for each in code), scope)
         handle: Handler = scope["handle"]
         return handle
+
+
+def _never(match: Match, line: int) -> bool:
+    """The engine judges."""
+    return False
 
 
 def _line_of(event: Event, size: int) -> str | None:

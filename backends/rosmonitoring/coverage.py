@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
-
-from .pairing import time_of
 
 
 @dataclass(slots=True)
@@ -61,11 +58,12 @@ class Tally:
         """Answers that were to be decided."""
         return self.published - self.supposed
 
-    def aged(self, heard: Mapping[str, float], event: Mapping[str, Any]) -> None:
-        """An answer has come; `heard`: when its inputs had."""
-        now = float(time_of(event))
-        for name, then in heard.items():
-            self.ages[name] = max(self.ages.get(name, 0.0), now - then)
+    def aged(self, now: float, heard: Mapping[str, float], names: Iterable[str]) -> None:
+        """An answer has come; `heard`: when its inputs had, those of these names among them."""
+        for name in names:
+            age = now - heard[name]
+            if age > self.ages.get(name, -1.0):
+                self.ages[name] = max(age, 0.0)
 
     def unnamed(self, topic: str) -> None:
         """A message of a topic that other nodes publish too has come, which does not say whose it is."""

@@ -20,11 +20,12 @@ from avow.language.printer import show_term
 from avow.ros.bags import publisher
 from avow.temporal.cells import remembers
 
+from .answering import accused, ask, judge_answer, saw
 from .coverage import Tally
 from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
-from .pairing import EARLY, Asked, Pairing, backwards, time_of
+from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
@@ -60,14 +61,16 @@ class Monitor:
     timing: Timing = field(init=False)
     pairing: Pairing | None = None
     """Answers and the inputs that they are held against; None: the latest."""
-    _paired: frozenset[str] = frozenset()
+    paired: frozenset[str] = frozenset()
     """The observed inputs."""
     assumed: tuple[str, ...] = ()
     """What the assumptions speak of."""
     backwards: str = ""
     """Where the events' times contradict the order in which they came, though the plan goes by that order."""
+    settled: set[int] = field(default_factory=set)
+    """The clauses of which answers were judged since this was last emptied."""
     _latest: Fraction | None = None
-    _supposed: set[str] = field(default_factory=set)
+    supposed: set[str] = field(default_factory=set)
     """What has an initial value of the plan, and no message yet."""
     _questions: int = OPEN_QUESTIONS
     _constant: list[Watched] = field(default_factory=list)
@@ -83,7 +86,7 @@ class Monitor:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
         self._observe()
         answers = self.setup.answers
-        self._paired = self.setup.heard
+        self.paired = self.setup.heard
         spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         if answers is not None and answers.by != "arrival":
@@ -109,7 +112,7 @@ class Monitor:
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self.values |= {} if rule.initial is None else {name: rule.initial}
                     if rule.initial is not None and getattr(rule, "hold", Hold.LATEST) is Hold.LATEST:
-                        self._supposed.add(name)  # of tuples seen so far, none is what was seen
+                        self.supposed.add(name)  # of tuples seen so far, none is what was seen
         for name, source in self._previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
@@ -142,7 +145,7 @@ class Monitor:
             self.backwards, self._latest = backwards(now, before, self.events), now
         pairing = self.pairing
         if pairing is not None and pairing.waiting:
-            self._settle(pairing.ready(time_of(event)), found)
+            self.settle(ticks(time_of(event)), found)
         self.at.update(dict.fromkeys(names, (place or self.events, publisher(event))))
         updated: list[str] = []
         unreadable: dict[int, Watched] = {}
@@ -152,19 +155,19 @@ class Monitor:
             try:
                 new = read(event, old)
             except MappingError as error:
-                found.append(self._violation(Fault.MAPPING, name, event, str(error)))
+                found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self._miss({name})
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
-                    if pairing is not None and name in self._paired:
-                        pairing.saw(name, event, None, self.at[name][0])
+                    if pairing is not None and name in self.paired:
+                        saw(self, pairing, name, event, None)
                 unreadable |= {id(watched): watched for watched in self.clauses.get(name, ())}
                 continue
-            self._supposed.discard(name)
+            self.supposed.discard(name)
             updated.append(name)
-            if pairing is not None and name in self._paired:
-                pairing.saw(name, event, new, self.at[name][0])
+            if pairing is not None and name in self.paired:
+                saw(self, pairing, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
@@ -175,10 +178,10 @@ class Monitor:
             watched.tally.published += 1
             watched.tally.unreadable += 1
         for watched in self._due(updated, event, found):
-            if watched.paired or self._accused(watched, event):
-                self._ask(watched, event)
+            if watched.paired or accused(self, watched, event):
+                ask(self, watched, event)
             else:
-                watched.tally.aged({n: self.timing.heard[n] for n in watched.inputs if n in self.timing.heard}, event)
+                self._aged(watched, event)
                 self._judge(watched, event, found)
             for name, source in watched.held:
                 watched.memory.pop(name, None)
@@ -186,6 +189,10 @@ class Monitor:
                     watched.memory[name] = self.values[source]
         self.settle_previous()
         return found
+
+    def _aged(self, watched: Watched, event: Mapping[str, Any]) -> None:
+        names = [name for name in watched.inputs if name in self.timing.heard]
+        watched.tally.aged(float(time_of(event)), self.timing.heard, names)
 
     def _own(self, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
         """Those of variables that a message carries, whoever else publishes its topic."""
@@ -198,7 +205,7 @@ class Monitor:
     def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
         """Time has passed, with or without a message of these variables: deadlines do not wait for one."""
         late = self.timing.passes(event, names)
-        found = [self._violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
+        found = [self.violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
         for watched, deadline in overdue(self._timed, event):
             if self._so_far is not None:
                 self._so_far.note(watched)
@@ -234,8 +241,15 @@ class Monitor:
 
     @property
     def by_values(self) -> bool:
-        """Whether a verdict depends on the latest values alone, and changes nothing for the next."""
-        return self.pairing is None and self._so_far is None
+        """Whether a verdict depends on values alone, the latest or those that an answer answered, and changes nothing
+        for the next."""
+        return self._so_far is None
+
+    def reader(self, name: str) -> Reader | None:
+        """What reads a variable's messages; None of one whose value is made of several."""
+        if getattr(self.setup.rules.get(name), "hold", Hold.LATEST) is not Hold.LATEST:
+            return None
+        return next((read for all_ in self._readers.values() for of, read in all_ if of == name), None)
 
     def carried(self, topic: str) -> tuple[str, ...]:
         """The variables that a topic's messages carry."""
@@ -259,7 +273,7 @@ class Monitor:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
         if self.pairing is not None:
-            self._settle(self.pairing.ready(None), found)
+            self.settle(None, found)
             self.backwards = self.backwards or self.pairing.uneven()
         for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
             if watched.fresh:
@@ -273,64 +287,17 @@ class Monitor:
                 watched.only_supposed()
         return found
 
-    def _accused(self, watched: Watched, event: Mapping[str, Any]) -> bool:
-        """Whether a guarantee about outputs alone is broken, of a node that assumes something of its inputs: whose
-        fault it is hangs on what the answer answered."""
-        if self.pairing is None or not watched.outputs or self._paired.isdisjoint(self.assumed):
-            return False
-        values = {**self.values, **watched.memory} if watched.held else self.values
-        known = all(name in values and name not in self._supposed for name in watched.names)
-        if known and watched.truth_of(values, self.solver) is False:
-            return True
-        self.pairing.ask((watched, {}), event, self.events, {}, (), waits=False)  # it counts among the answers
-        return False
-
-    def _ask(self, watched: Watched, event: Mapping[str, Any]) -> None:
-        """An answer, which will be judged once it is known what it may have answered."""
+    def settle(self, now: Ticks | None, found: list[Violation]) -> None:
+        """Judge the answers whose inputs are known by a time (None: the run is over)."""
         assert self.pairing is not None
-        values = {**self.values, **watched.memory} if watched.held else self.values
-        own = [n for n in (*watched.names, *self.assumed) if n not in self._paired]
-        early = any(n not in values or n in self._supposed for n in watched.names if n not in self._paired)
-        watched.tally.early += early
-        known = {n: values[n] for n in own if n in values}
-        inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self.assumed if n in self._paired))))
-        inputs = tuple(n for n in inputs if n in watched.paired or n in self.pairing.seen)
-        about = (watched, self._heard(watched.outputs))
-        self.pairing.ask(about, event, self.events, known, inputs, waits=not early)
+        for asked, choices in self.pairing.ready(now):
+            self.settled.add(id(asked.watched))
+            self.judge_answer(asked, choices, found)
 
-    def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
-        for asked, cases in ready:
-            watched, heard = asked.about
-            tally = watched.tally
-            if isinstance(cases, str):
-                if cases == EARLY:
-                    tally.early += 1
-                else:
-                    tally.order += 1
-                    tally.reason = tally.reason or cases
-                continue
-            tally.aged({name: asked.since[name] for name in watched.paired}, asked.event)
-            verdicts = {self._verdict(watched, values) for values in cases}
-            if len(verdicts) > 1:
-                tally.order += 1
-                tally.reason = tally.reason or "it depends on which of its inputs the answer answered"
-                continue
-            tally.judged += 1
-            tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
-            (verdict,) = verdicts
-            if verdict is None:
-                tally.undecided += 1
-            elif isinstance(verdict, Fault):
-                tally.broken += 1
-                tally.excused += verdict is Fault.EXCUSED
-                said = watched.clause.sentence or watched.clause.text or watched.clause.name
-                if verdict is Fault.EXCUSED:
-                    said += "; but an assumption does not hold"
-                name = watched.clause.name
-                wrong = self._violation(verdict, name, asked.event, said, watched, cases[0])
-                found.append(replace(wrong, index=asked.index, heard=heard))
+    def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
+        judge_answer(self, asked, choices, found)
 
-    def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
+    def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         return verdict_of(watched, self._assumptions, values, self.solver)
 
     def _due(self, updated: Iterable[str], event: Mapping[str, Any], found: list[Violation]) -> list[Watched]:
@@ -352,7 +319,7 @@ class Monitor:
                     watched.tally.published += 1
                     self._judge_part(watched, watched.fresh[name], event, found)
                 part = self._part(watched, name) if len(watched.outputs) > 1 else {}
-                watched.fresh[name] = part, self._heard((name,))
+                watched.fresh[name] = part, self.heard_of((name,))
             if watched.outputs <= watched.fresh.keys():
                 watched.fresh.clear()
                 due.append(watched)
@@ -364,7 +331,7 @@ class Monitor:
         """One output, and all that is known but the other outputs of the answer."""
         values = {**self.values, **watched.memory}
         held = {n for n, _ in watched.held}
-        paired = self._paired if self.pairing is not None else frozenset()
+        paired = self.paired if self.pairing is not None else frozenset()
         spoken = (*watched.names, *(n for assumed in self._assumptions for n in assumed.names))
         return {
             n: values[n]
@@ -373,7 +340,7 @@ class Monitor:
             and (n == name or n not in watched.outputs)
             and (n not in held or n in watched.memory)
             and n not in paired
-            and n not in self._supposed
+            and n not in self.supposed
         }
 
     def _judge_part(
@@ -390,7 +357,7 @@ class Monitor:
             tally.broken += 1
             said = watched.clause.sentence or watched.clause.text or show_term(watched.clause.formula, "unicode")
             said += ", whatever the rest of the answer was"
-            wrong = self._violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
+            wrong = self.violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
             found.append(replace(wrong, heard=heard))
 
     def _open(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
@@ -429,7 +396,7 @@ class Monitor:
             if watched.steps is not None and (watched.steps.answers or watched.steps.stepped):
                 self._lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
             return
-        supposed = any(name in self._supposed for name in watched.names)
+        supposed = any(name in self.supposed for name in watched.names)
         lost = watched.steps is not None and watched.steps.lost
         key = (*[versions[n] for n in watched.names], supposed)
         if watched.steps is not None:
@@ -465,7 +432,7 @@ class Monitor:
         fault, why = blame
         if fault is Fault.EXCUSED:
             tally.excused += 1
-        found.append(self._violation(fault, watched.clause.name, event, why + late, watched, values))
+        found.append(self.violation(fault, watched.clause.name, event, why + late, watched, values))
 
     def _miss(self, names: Set[str]) -> None:
         """Messages of these variables were lost, or could not be read."""
@@ -480,16 +447,16 @@ class Monitor:
         if self._so_far is not None and watched.clause.kind is ClauseKind.ASSUMPTION:
             self._so_far.unsure = True
 
-    def _violation(
+    def violation(
         self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: Watched | None = None,
         snapshot: Mapping[str, Value] | None = None,
     ) -> Violation:  # fmt: skip
         values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
-        heard = self._heard(watched.names) if watched is not None else {}
+        heard = self.heard_of(watched.names) if watched is not None else {}
         name, time = self.setup.node.name, time_text(event.get("time"))
         return Violation(fault, name, clause, self.events, time, values, pairs, explanation, heard)
 
-    def _heard(self, names: Iterable[str]) -> Heard:
+    def heard_of(self, names: Iterable[str]) -> Heard:
         return {name: self.at[name] for name in names if name in self.at}
 
     def failing(self) -> bool:

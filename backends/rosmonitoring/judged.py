@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -14,7 +14,7 @@ from avow.language.terms import And, Compare, Term
 
 from .coverage import Tally
 from .engine import Monitor
-from .pairing import Asked, time_of
+from .pairing import TICKS, Asked, Choices, time_of
 from .watched import Fault, Heard, Violation, Watched
 
 
@@ -43,7 +43,7 @@ class Telling(Monitor):
 
     def __post_init__(self) -> None:
         self._margins: dict[str, Margin | None] = {}
-        self._cases: list[float] = []
+        self._cases: list[float | None] = []
         self._now = Fraction(0)
         Monitor.__post_init__(self)
 
@@ -65,20 +65,18 @@ class Telling(Monitor):
         Monitor._judge_part(self, watched, part, event, found)
         self._tell(watched, before, self.events, self._now, None)
 
-    def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
+    def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         margin = self._margin(watched, values)
-        self._cases += [] if margin is None else [margin]
-        return Monitor._verdict(self, watched, values)
+        self._cases.append(margin)
+        return Monitor.verdict(self, watched, values)
 
-    def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
-        for one in ready:
-            asked, cases = one
-            watched, _ = asked.about
-            before, self._cases = replace(watched.tally), []
-            Monitor._settle(self, [one], found)
-            whole = not isinstance(cases, str) and len(self._cases) == len(cases)
-            margin = min(self._cases) if whole and self._cases else None
-            self._tell(watched, before, asked.index, time_of(asked.event), margin)
+    def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
+        watched = asked.watched
+        before, self._cases = replace(watched.tally), []
+        Monitor.judge_answer(self, asked, choices, found)
+        known = [margin for margin in self._cases if margin is not None]
+        margin = min(known) if known and len(known) == len(self._cases) else None
+        self._tell(watched, before, asked.index, Fraction(asked.time) / TICKS, margin)
 
     def _margin(self, watched: Watched, values: Mapping[str, Value]) -> float | None:
         name = watched.clause.name

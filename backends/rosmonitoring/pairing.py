@@ -11,8 +11,9 @@ combinations than there were, so that both verdicts are right as long as the two
 from __future__ import annotations
 
 import itertools
+import math
 from bisect import insort
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -22,8 +23,9 @@ from typing import TYPE_CHECKING, Any
 from avow.formulas.values import Value, show
 
 from .numbers import Decimal, NotANumber, exact
-from .reading import at
+from .reading import Reader, at
 from .rules import Path
+from .traces import parse_event
 from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME
 from .wires import MappingError, seconds
 
@@ -43,45 +45,81 @@ class Answers:
     jitter: Fraction = Fraction(0)
 
 
-@dataclass(slots=True)
+Ticks = int | Fraction
+"""A time in units of 10^-20 seconds, exact: a whole number wherever a trace writes it in so many decimals."""
+
+TICKS = 10**20
+
+
+def ticks(seconds: Fraction) -> Ticks:
+    found = seconds * TICKS
+    return found.numerator if found.denominator == 1 else found
+
+
+def ticks_of(text: bytes) -> int:
+    """The time that a line has, as `shapes` knows it: digits, and at most 20 decimals."""
+    whole, _, rest = text.partition(b".")
+    return int(whole + rest) * _SCALES[len(rest)]
+
+
+_SCALES: tuple[int, ...] = tuple(10 ** (20 - k) for k in range(21))
+
+
+@dataclass(slots=True, eq=False)
 class Asked:
     """An answer that waits for its inputs."""
 
-    about: tuple[Watched, Heard]
-    """The clause, and the messages that make the answer."""
-    event: Mapping[str, Any]
+    watched: Watched
+    event: Mapping[str, Any] | bytes
+    """The answer's event; its line, where that was not parsed."""
     index: int
-    values: dict[str, Value]
-    """Of all but the inputs."""
+    own: tuple[str, ...]
+    """What its verdict depends on, but for the inputs; and what that then was: a line is one whose message has it."""
+    values: tuple[Value | bytes, ...]
     inputs: tuple[str, ...]
-    time: Fraction
-    key: object = None
+    time: Ticks
+    seconds: float
+    """The same, in binary."""
+    key: object
+    heard: Heard | None
+    """The messages that make the answer; None: all are this event's."""
+    places: tuple[int, ...]
+    """Their places in the trace."""
+    tokens: tuple[int, ...] | None = None
+    """What stands for those of `values` that the clause speaks of (`plans.Token`)."""
     since: dict[str, float] = field(default_factory=dict)
     """When the oldest message came that each input's value may be of."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """The places in the trace of the messages that each input's value may be of."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Said:
-    """One message of an input. `value` None: it could not be read."""
+@dataclass(slots=True, eq=False)
+class Said:
+    """One message of an input. `value` None: it could not be read; a line: it was not read yet. `token` stands for
+    it, where one is known."""
 
-    time: Fraction
+    time: Ticks
+    seconds: float
     key: object
-    value: Value | None
+    value: Value | bytes | None
     place: int
+    token: int | None
+
+
+Choices = list[list[Said]] | str
+"""The messages of each input that an answer may have answered, or why there are none."""
 
 
 @dataclass(slots=True)
 class _Seen:
     """The latest messages of one input, in the order of their coming (by latency: of time), and by their keys."""
 
-    messages: deque[_Said] = field(default_factory=deque)
-    by_key: dict[object, list[_Said]] = field(default_factory=dict)
+    messages: deque[Said] = field(default_factory=deque)
+    by_key: dict[object, list[Said]] = field(default_factory=dict)
     count: int = 0
     """Of all, also of those that are no longer kept."""
 
-    def keep(self, said: _Said) -> None:
+    def keep(self, said: Said) -> None:
         self.messages.append(said)
         self.by_key.setdefault(said.key, []).append(said)
         if len(self.messages) > KEYS_KEPT:
@@ -93,54 +131,89 @@ class _Seen:
 
 
 @dataclass(slots=True)
+class _Count:
+    """The answers of one clause: how many, when the last of them came, and the inputs that any was held against."""
+
+    count: int = 0
+    time: Ticks = 0
+    inputs: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
 class Pairing:
     """The inputs that have been seen, and the answers that wait for theirs."""
 
     answers: Answers
     seen: dict[str, _Seen] = field(default_factory=dict)
     waiting: deque[Asked] = field(default_factory=deque)
-    asked: dict[int, tuple[int, Asked]] = field(default_factory=dict)
-    """By what is judged: how many answers, and the last of them."""
-    answered: dict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
+    counts: dict[int, _Count] = field(default_factory=dict)
+    """By the clause."""
+    answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """The place of an answer's message → those of the messages that it was held against."""
-    settled: Fraction | None = None
+    readers: Mapping[str, Reader] = field(default_factory=dict, repr=False)
+    """What reads the variables of which lines are kept."""
+    settled: Ticks | None = None
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
     """Why it is no evidence: one came."""
+    _latency: Ticks = field(init=False)
+    _jitter: Ticks = field(init=False)
 
-    def saw(self, name: str, event: Mapping[str, Any], value: Value | None, place: int) -> None:
-        """A message of an input, which stands at a place of the trace."""
-        known = self.seen.setdefault(name, _Seen())
-        known.count += 1
-        now = time_of(event)
-        if self.answers.by != "latency":
-            key = known.count if self.answers.by == "order" else self._key(event, self.answers.input)
-            known.keep(_Said(now, key, value, place))
-            return
-        if self.settled is not None and now <= self.settled:
-            self.late = self.late or (
-                f"a message of {name} has the time {show(now)}, and comes after answers up to then were judged: by "
-                "latency, a trace has to be in the order of time"
-            )
-        insort(known.messages, _Said(now, None, value, place), key=_time)
-        # what is older than any window that is still open, but for the last of it, can no longer be asked for
-        first = self.waiting[0].time if self.waiting else known.messages[-1].time
-        since = first - self.answers.latency - 2 * self.answers.jitter
-        while len(known.messages) > 1 and known.messages[1].time <= since:
-            known.messages.popleft()
+    def __post_init__(self) -> None:
+        self._latency, self._jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
 
-    def ask(
-        self, about: tuple[Watched, Heard], event: Mapping[str, Any], index: int, values: dict[str, Value],
-        inputs: tuple[str, ...], *, waits: bool = True,
+    def begin(self, readers: Mapping[str, Reader]) -> None:
+        """Lines will be kept, and tokens mean what they mean from now on."""
+        self.readers = readers
+        for asked in self.waiting:
+            asked.tokens = None
+        for said in (said for seen in self.seen.values() for said in seen.messages):
+            said.token = None
+
+    def saw(
+        self, name: str, time: Ticks, seconds: float, key: object, value: Value | bytes | None, place: int,
+        token: int | None = None,
     ) -> None:  # fmt: skip
-        """An answer has come. One that does not wait to be judged counts among the others all the same."""
-        of = id(about[0])
-        count = self.asked[of][0] + 1 if of in self.asked else 1
-        key = count if self.answers.by == "order" else self._key(event, self.answers.output)
-        asked = Asked(about, event, index, values, inputs, time_of(event), key)
-        self.asked[of] = count, asked
-        if waits:
-            self.waiting.append(asked)
+        """A message of an input, which stands at a place of the trace."""
+        known = self.seen.get(name)
+        if known is None:
+            known = self.seen[name] = _Seen()
+        known.count += 1
+        if self.answers.by != "latency":
+            known.keep(Said(time, seconds, known.count if self.answers.by == "order" else key, value, place, token))
+            return
+        if self.settled is not None and time <= self.settled:
+            self.late = self.late or (
+                f"a message of {name} has the time {show(Fraction(time) / TICKS)}, and comes after answers up to then "
+                "were judged: by latency, a trace has to be in the order of time"
+            )
+        messages, said = known.messages, Said(time, seconds, None, value, place, token)
+        if messages and messages[-1].time > time:
+            insort(messages, said, key=_time)
+        else:
+            messages.append(said)
+        # what is older than any window that is still open, but for the last of it, can no longer be asked for
+        first = self.waiting[0].time if self.waiting else messages[-1].time
+        since = first - self._latency - 2 * self._jitter
+        while len(messages) > 1 and messages[1].time <= since:
+            messages.popleft()
+
+    def count(self, watched: Watched, time: Ticks) -> _Count:
+        """An answer has come, which need not wait: it counts among the others all the same."""
+        found = self.counts.get(id(watched))
+        if found is None:
+            found = self.counts[id(watched)] = _Count()
+        found.count += 1
+        found.time = time
+        return found
+
+    def ask(self, asked: Asked) -> None:
+        """An answer has come."""
+        counted = self.count(asked.watched, asked.time)
+        counted.inputs = asked.inputs
+        if self.answers.by == "order":
+            asked.key = counted.count
+        self.waiting.append(asked)
 
     def waits(self, event: int) -> bool:
         """Whether an answer of this event or an earlier one is not judged yet."""
@@ -151,64 +224,92 @@ class Pairing:
         need not have been answered yet."""
         if self.late:
             return self.late
-        for count, asked in self.asked.values() if self.answers.by == "order" else ():
-            for name in asked.inputs:
+        for counted in self.counts.values() if self.answers.by == "order" else ():
+            for name in counted.inputs:
                 known = self.seen.get(name, _Seen())
-                late = sum(said.time > asked.time for said in known.messages)
-                if count not in (known.count, known.count - late):
+                late = sum(said.time > counted.time for said in known.messages)
+                if counted.count not in (known.count, known.count - late):
                     return (
-                        f"{known.count} messages of {name} and {count} answers: which answer was to which is not told "
-                        "by their order (`answers: {by: order}`)"
+                        f"{known.count} messages of {name} and {counted.count} answers: which answer was to which is "
+                        "not told by their order (`answers: {by: order}`)"
                     )
         return ""
 
-    def ready(self, now: Fraction | None) -> Iterator[tuple[Asked, list[dict[str, Value]] | str]]:
-        """The answers whose inputs are known by a time (None: the run is over), each with the combinations of values
+    def ready(self, now: Ticks | None) -> Iterator[tuple[Asked, Choices]]:
+        """The answers whose inputs are known by a time (None: the run is over), each with the messages of each input
         that it may have answered, or why there are none."""
-        while self.waiting and (now is None or self._passed(self.waiting[0], now)):
-            asked = self.waiting.popleft()
-            if self.answers.by == "latency":
-                self.settled = max(self.settled or Fraction(0), asked.time + self.answers.jitter)
-            found = self._values(asked)
-            for message, _ in asked.about[1].values():
-                self.answered[message] = asked.messages
+        waiting, latency = self.waiting, self.answers.by == "latency"
+        while waiting and (now is None or self._passed(waiting[0], now)):
+            asked = waiting.popleft()
+            if latency:
+                self.settled = max(self.settled or 0, asked.time + self._jitter)
+            found: Choices = []
+            for name in asked.inputs:
+                one = self._current(name, asked) if latency else self._same_key(name, asked)
+                if isinstance(one, str):
+                    found = one
+                    break
+                found.append(one)  # type: ignore[union-attr]
+            for place in asked.places:
+                self.answered[place] = asked.messages
             while len(self.answered) > KEYS_KEPT:
-                del self.answered[next(iter(self.answered))]
+                self.answered.popitem(last=False)
             yield asked, found
 
-    def _passed(self, asked: Asked, now: Fraction) -> bool:
-        if self.answers.by == "latency":
-            return now > asked.time + self.answers.jitter
-        known = all(name in self.seen and asked.key in self.seen[name].by_key for name in asked.inputs)
-        return known or len(self.waiting) > KEYS_KEPT
-
-    def _values(self, asked: Asked) -> list[dict[str, Value]] | str:
-        choices: list[list[Value]] = []
-        for name in asked.inputs:
-            found = self._latency(name, asked) if self.answers.by == "latency" else self._same_key(name, asked)
-            if isinstance(found, str):
-                return found
-            choices.append(found)
-        if all(len(values) == 1 for values in choices):
-            return [{**asked.values, **{name: one for name, (one,) in zip(asked.inputs, choices, strict=True)}}]
-        count = 1
-        for values in choices:
-            count *= len(values)
-        if count > COMBINATIONS:
+    def cases(self, asked: Asked, choices: list[list[Said]]) -> list[dict[str, Value]] | str:
+        """The combinations of values that an answer may have answered, or why there are none."""
+        distinct: list[list[Value]] = []
+        for name, alike in zip(asked.inputs, choices, strict=True):
+            values: list[Value] = []
+            for said in alike:
+                value = self.value_of(name, said)
+                if value is None:
+                    return f"a message of {name} could not be read"
+                if value not in values:
+                    values.append(value)
+            if len(values) > 1 and self.answers.by != "latency":
+                return f"several messages of {name} bear the key"
+            distinct.append(values)
+        if (count := math.prod(map(len, distinct))) > COMBINATIONS:
             return f"{count} combinations of inputs may have been answered"
-        return [
-            {**asked.values, **dict(zip(asked.inputs, values, strict=True))} for values in itertools.product(*choices)
-        ]
+        known = self.known(asked)
+        return [{**known, **dict(zip(asked.inputs, values, strict=True))} for values in itertools.product(*distinct)]
 
-    def _latency(self, name: str, asked: Asked) -> list[Value] | str:
-        start = asked.time - self.answers.latency - self.answers.jitter
-        end = asked.time + self.answers.jitter
-        current: list[_Said] = []
+    def known(self, asked: Asked) -> dict[str, Value]:
+        """What an answer's verdict depends on, but for the inputs."""
+        pairs = zip(asked.own, asked.values, strict=True)
+        return {name: self._read(name, value) if isinstance(value, bytes) else value for name, value in pairs}
+
+    def _read(self, name: str, line: bytes) -> Value:
+        """A variable's value, from the line of the message that has it."""
+        return self.readers[name](parse_event(line.decode()), None)
+
+    def event_of(self, asked: Asked) -> Mapping[str, Any]:
+        return parse_event(asked.event.decode()) if isinstance(asked.event, bytes) else asked.event
+
+    def value_of(self, name: str, said: Said) -> Value | None:
+        if isinstance(said.value, bytes):
+            said.value = self._read(name, said.value)
+        return said.value
+
+    def _passed(self, asked: Asked, now: Ticks) -> bool:
+        if self.answers.by == "latency":
+            return now > asked.time + self._jitter
+        for name in asked.inputs:
+            known = self.seen.get(name)
+            if known is None or asked.key not in known.by_key:
+                return len(self.waiting) > KEYS_KEPT
+        return True
+
+    def _current(self, name: str, asked: Asked) -> list[Said] | str:
+        start = asked.time - self._latency - self._jitter
+        end = asked.time + self._jitter
+        current: list[Said] = []
         before = False
         for said in self.seen[name].messages if name in self.seen else ():
             if said.time <= start:
                 current, before = [said], True
-                asked.since[name] = float(said.time)
+                asked.since[name] = said.seconds
             elif said.time <= end:
                 current.append(said)
         if not current:
@@ -216,40 +317,34 @@ class Pairing:
         if not before:
             return f"{name} may have had no value yet"
         asked.messages[name] = tuple(said.place for said in current)
-        distinct: list[Value] = []
-        for said in current:
-            if said.value is None:
-                return f"a message of {name} could not be read"
-            if said.value not in distinct:
-                distinct.append(said.value)
-        return distinct
+        return current
 
-    def _same_key(self, name: str, asked: Asked) -> list[Value] | str:
+    def _same_key(self, name: str, asked: Asked) -> list[Said] | str:
         if asked.key is None:
             return "the answer has no key"
-        alike = self.seen[name].by_key.get(asked.key, ()) if name in self.seen else ()
+        known = self.seen.get(name)
+        alike = known.by_key.get(asked.key) if known is not None else None
         if not alike:
             return f"no message of {name} bears the answer's {self.answers.by}"
-        asked.since[name] = float(min(said.time for said in alike))
+        if len(alike) == 1:
+            asked.since[name] = alike[0].seconds
+            asked.messages[name] = (alike[0].place,)
+            return alike
+        asked.since[name] = min(said.seconds for said in alike)
         asked.messages[name] = tuple(said.place for said in alike)
-        value = alike[-1].value
-        if value is None:
-            return f"a message of {name} could not be read"
-        same = len(alike) == 1 or all(said.value == value for said in alike)
-        return [value] if same else f"several messages of {name} bear the key"
+        return [*alike]
 
-    def _key(self, event: Mapping[str, Any], path: Path) -> object:
+    def key(self, event: Mapping[str, Any], path: Path) -> object:
+        """By what a message is paired; None of one that does not say it."""
         if not path:
             return None
         try:
             raw = at(event, path)
+            if isinstance(raw, Mapping):
+                return ticks(seconds(raw)), "s"
         except MappingError:
             return None
-        try:
-            key = seconds(raw) if isinstance(raw, Mapping) else raw.text if isinstance(raw, Decimal) else raw
-        except MappingError:
-            return None
-        return str(key) if isinstance(key, list) else key
+        return raw.text if isinstance(raw, Decimal) else str(raw) if isinstance(raw, list) else raw
 
 
 def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:

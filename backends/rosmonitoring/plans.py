@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
-from avow.ros.bags import WHOLE
+from avow.ros.bags import ENVELOPE, WHOLE
 
 from .coverage import Tally
 from .engine import Monitor
 from .regions import regions
-from .rules import Choice, Fields, Hold, Lookup, Path, Previous
+from .rules import Choice, Fields, Hold, Lookup, Path, Previous, heard_through
 from .shapes import Shape
 from .tuning import REMEMBERED
 from .watched import Violation, Watched
@@ -30,6 +30,9 @@ class Plan:
     names: tuple[str, ...]
     """The variables that the topic carries."""
     due: tuple[Watched, ...]
+    """The clauses that are judged by the latest values."""
+    asked: tuple[Watched, ...]
+    """Those whose answers wait for the inputs that they answered."""
     key: tuple[int, ...]
     """The slots of the variables that the due clauses speak of."""
     excuse: tuple[int, ...]
@@ -51,6 +54,8 @@ class Watch:
     tokens: list[Token | None]
     values: list[Value | None]
     """What the tokens stand for, as far as it was looked at."""
+    sources: list[Value | bytes | None]
+    """What the tokens stand for now, where answers are paired: a value, or the line of the message that has it."""
     regional: dict[str, list[float]]
     plans: dict[str, Plan | None] = field(default_factory=dict)
     """By topic; None: the engine judges all its events."""
@@ -64,7 +69,12 @@ def watch_of(monitor: Monitor) -> Watch:
     found |= {rule.source: None for rule in rules.values() if isinstance(rule, Previous)}
     slots = {name: at for at, name in enumerate(rules)}
     regional = {name: bounds for name, bounds in found.items() if bounds is not None}
-    return Watch(monitor, slots, [None] * len(slots), [None] * len(slots), regional)
+    if monitor.pairing is not None:
+        monitor.pairing.begin({name: read for name in rules if (read := monitor.reader(heard_through(rules[name])))})
+    for watched in (each for all_ in monitor.clauses.values() for each in all_):
+        watched.alike.clear()  # the tokens of a run before are others
+    nothing: list[None] = [None] * len(slots)
+    return Watch(monitor, slots, [*nothing], [*nothing], [*nothing], regional)
 
 
 def plan_of(watch: Watch, topic: str) -> Plan | None:
@@ -73,16 +83,19 @@ def plan_of(watch: Watch, topic: str) -> Plan | None:
     names = monitor.carried(topic)
     if not names or not monitor.by_values or not monitor.setup.shared.keys().isdisjoint(names):
         return None
-    due: dict[int, Watched] = {id(w): w for name in names for w in monitor.clauses.get(name, ())}
-    for watched in due.values():
-        if watched.held or watched.paired or not watched.outputs <= set(names):
+    found: dict[int, Watched] = {id(w): w for name in names for w in monitor.clauses.get(name, ())}
+    for watched in found.values():
+        if watched.held or not watched.outputs <= set(names):
             return None
-    spoken = dict.fromkeys(name for watched in due.values() for name in watched.names)
+    answers = monitor.pairing.answers if monitor.pairing is not None else None
+    if answers is not None and {*answers.input[:1], *answers.output[:1]} & {*ENVELOPE}:
+        return None
+    due = tuple(watched for watched in found.values() if not watched.paired)
+    asked = tuple(watched for watched in found.values() if watched.paired)
+    spoken = dict.fromkeys(name for watched in due for name in watched.names)
     more = dict.fromkeys((*spoken, *monitor.assumed))
-    return Plan(
-        monitor, names, tuple(due.values()), tuple(map(watch.slots.__getitem__, spoken)),
-        tuple(map(watch.slots.__getitem__, more)),
-    )  # fmt: skip
+    slots = watch.slots
+    return Plan(monitor, names, due, asked, tuple(slots[name] for name in spoken), tuple(slots[name] for name in more))
 
 
 def remember(
@@ -92,6 +105,8 @@ def remember(
     own = {watch.slots[name] for name in plan.names}
     broken: set[str] = set()
     for watched, then in zip(plan.due, tallies, strict=True):
+        if id(watched) in watch.monitor.settled:
+            return  # an answer that waited was judged, too
         now = counts_of(watched.tally)
         if now[:2] != (then[0] + 1, then[1] + 1) or now[3:] != then[3:]:
             return
@@ -148,6 +163,11 @@ def leads(rule: object) -> Callable[[Path], bool]:
                 wanted += [place.key if isinstance(place, Lookup) else place for place in places]
         case _:  # no message carries it
             pass
+    return below(wanted)
+
+
+def below(wanted: Iterable[Path]) -> Callable[[Path], bool]:
+    """Whether something lies at one of these paths of a message, or within it."""
     # which item `ranges[-1]` is depends on how many there are: all of them count
     wanted = [tuple(itertools.takewhile(lambda step: isinstance(step, str) or step >= 0, path)) for path in wanted]
     wanted += [(place, *path) for path in wanted for place in ("data", WHOLE)]

@@ -18,7 +18,7 @@ _TOKEN = re.compile(
     rb'("[^"\\\x00-\x1f\x80-\xff]*")|(-?[0-9][0-9.eE+-]*)|(true|false)|null|([{}\[\]:,])|[ \t\r]+'
 )  # strings with escapes or beyond ASCII have no shape
 _NUMBER = rb"-?(?:0|[1-9][0-9]{0,17})(?:\.[0-9]{1,24})?(?:[eE][+-]?[0-9]{1,2})?"
-_TIME = rb"(?:0|[1-9][0-9]{0,17})(?:\.[0-9]{1,20})?"
+_TIME = rb"(?:0|[1-9][0-9]{0,11})(?:\.[0-9]{1,20})?"
 _WORD = rb'"[^"\\\x00-\x1f\x80-\xff]*"'
 
 

@@ -39,7 +39,7 @@ def both(found: Setup, path: Path) -> tuple[int, int]:
     """Judge a trace twice; the numbers of violations, and of events that the compiled monitor did not judge anew."""
     plain, fast = Monitor(found), Counting(found)
     Counting.steps = 0
-    expected = [(r.line, v) for r in read_trace(path) for v in plain.step(r.event)]
+    expected = [(r.line, v) for r in read_trace(path) for v in plain.step(r.event, r.line)]
     expected += [(0, v) for v in plain.finish()]
     heard: dict[str, int] = {}
 
@@ -49,6 +49,9 @@ def both(found: Setup, path: Path) -> tuple[int, int]:
     got = [(line, v) for line, all_ in Compiled([fast], heard=note).run(path) for v in all_]
     got += [(0, v) for v in fast.finish()]
     assert got == expected
+    assert all(v.heard.items() <= w.heard.items() for (_, v), (_, w) in zip(got, expected, strict=True))
+    if plain.pairing is not None and fast.pairing is not None:
+        assert fast.pairing.answered == plain.pairing.answered
     assert fast.tallies == plain.tallies
     assert (fast.events, fast.relevant, fast.heard) == (plain.events, plain.relevant, plain.heard)
     assert (fast.backwards, fast.values) == (plain.backwards, plain.values)
@@ -103,6 +106,86 @@ def test_generated_contracts_are_judged_alike(seed: int, make_system: Callable[.
         broken += found
     assert passed > 300
     assert broken > 20
+
+
+ANSWERS: list[dict[str, Any]] = [
+    {"by": "order", "because": "every link stood"},
+    {"by": "key", "input": "id", "output": "id"},
+    {"by": "stamp"},
+    {"latency": "200 ms", "jitter": "20 ms", "because": "measured"},
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("answers", ANSWERS)
+@pytest.mark.parametrize("seed", some(range(12), 1))
+def test_paired_answers_are_judged_alike(
+    seed: int, answers: dict[str, Any], make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """Generated contracts; keys that are missing, doubled, of another form; answers that come first, or late."""
+    rng = random.Random(seed)
+    passed = broken = 0
+    for at in range(3):
+        when = rng.choice(("outputs", "outputs", "any"))
+        text = " and ".join(f"({formula(rng, rng.choice((0, 1, 1, 2)))})" for _ in range(2))
+        assumed = rng.choice(("", f"assume a ( {rng.choice(('in.r <= 2', 'in.k < 4', 'in.colour == red'))} )\n"))
+        alone = rng.choice(("", "guarantee alone ( out.s <= 2 or out.light == red )\n"))
+        contract = RCL.format(formula=text).replace("  guarantee g", f"  {assumed}  {alone}  guarantee g")
+        system = make_system(contract, MAPPING, when=when, answers=answers)
+        events = trace(rng, 250)
+        clock = 0.0
+        counts: dict[str, int] = {}
+        for event in events:
+            clock += rng.choice((0, 0.01, 0.05, 0.1)) if rng.random() < 0.99 else -0.15
+            event["time"] = round(max(0.0, clock), 2)
+            number = counts[event["topic"]] = counts.get(event["topic"], 0) + (rng.random() > 0.01)
+            event["id"] = event.get("id", number)
+            if rng.random() < 0.98:
+                stamp = {"secs": number, "nsecs": 0} if rng.random() < 0.9 else {"sec": number, "nanosec": 0}
+                event["header"] = {"stamp": stamp}
+            if rng.random() < 0.03:
+                event["id"] = rng.choice((str(number), float(number), True, None))
+        found, quiet = both(setup_of(system), written(tmp_path / f"{at}.jsonl", events, rng))
+        passed += quiet
+        broken += found
+    assert passed > 30
+    assert broken > 0
+
+
+STEADY = """
+context { Level : {low, high}; }
+node n {
+  inputs( r : REAL )
+  outputs( s : Level )
+  topics( a/R r matches(in.r), a/S s matches(out.s) )
+  assume sane ( in.r >= 0 )
+  guarantee low ( in.r < 10 -> out.s == low )
+  guarantee high ( in.r >= 10 -> out.s == high )
+  guarantee some ( out.s == low or out.s == high )
+}
+"""
+
+
+@pytest.mark.parametrize("answers", ANSWERS)
+def test_of_paired_answers_hardly_any_is_judged_anew(
+    answers: dict[str, Any], make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """A fresh reading each time, now and then outside what is assumed; one answer in a hundred is wrong, some come
+    before what they answer."""
+    rng = random.Random(5)
+    system = make_system(STEADY, {"in.r": "value", "out.s": "level"}, answers=answers)
+    events = []
+    for k in range(1000):
+        value = round(rng.uniform(0, 20), 3) if rng.random() > 0.01 else -1.0
+        level = "high" if (value >= 10) is not (rng.random() < 0.01) else "low"
+        both_ = {"id": k, "header": {"stamp": {"secs": k, "nsecs": 5}}}
+        pair = [{"topic": "r", "value": value, **both_}, {"topic": "s", "level": level, **both_}]
+        if "latency" not in answers and rng.random() < 0.3:
+            pair.reverse()
+        events += [{**event, "time": round(k / 2 + at * 0.1, 2)} for at, event in enumerate(pair)]
+    found, quiet = both(setup_of(system), written(tmp_path / "t.jsonl", events, random.Random(1)))
+    assert found > 10
+    assert quiet > 1500
 
 
 NODE = """

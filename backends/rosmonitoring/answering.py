@@ -1,0 +1,155 @@
+"""What a monitor does with answers that are paired with their inputs (`pairing`): they wait, and are judged."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from avow.formulas.values import Value
+from avow.ros.bags import publisher
+
+from .pairing import EARLY, Asked, Choices, Pairing, Said, ticks, time_of
+from .tuning import COMBINATIONS, REMEMBERED
+from .watched import Fault, Violation, Watched
+
+if TYPE_CHECKING:
+    from .engine import Monitor
+
+
+def speaks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
+    """What the verdict on an answer depends on, but for the inputs that it is paired with: first what the clause speaks
+    of, then the assumptions."""
+    return tuple(dict.fromkeys(n for n in (*watched.names, *monitor.assumed) if n not in monitor.paired))
+
+
+def asks(monitor: Monitor, watched: Watched) -> tuple[str, ...]:
+    """The inputs that an answer is paired with."""
+    return tuple(dict.fromkeys((*watched.paired, *(n for n in monitor.assumed if n in monitor.paired))))
+
+
+def judges_answers_alone(monitor: Monitor, watched: Watched) -> bool:
+    """Whether a clause is about outputs alone, of a node that assumes something of its inputs: where it is broken,
+    whose fault that is hangs on what the answer answered."""
+    alone = monitor.pairing is not None and watched.outputs and not watched.paired
+    return bool(alone) and not monitor.paired.isdisjoint(monitor.assumed)
+
+
+def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any], value: Value | None) -> None:
+    """A message of an input has come (None: it could not be read)."""
+    now, key = time_of(event), pairing.key(event, pairing.answers.input)
+    pairing.saw(name, ticks(now), float(now), key, value, monitor.at[name][0])
+
+
+def accused(monitor: Monitor, watched: Watched, event: Mapping[str, Any]) -> bool:
+    """Whether such a clause is broken."""
+    if monitor.pairing is None or not judges_answers_alone(monitor, watched):
+        return False
+    values = {**monitor.values, **watched.memory} if watched.held else monitor.values
+    known = all(name in values and name not in monitor.supposed for name in watched.names)
+    if known and watched.truth_of(values, monitor.solver) is False:
+        return True
+    monitor.pairing.count(watched, ticks(time_of(event)))
+    return False
+
+
+def ask(monitor: Monitor, watched: Watched, event: Mapping[str, Any]) -> None:
+    """An answer, which will be judged once it is known what it may have answered."""
+    assert monitor.pairing is not None
+    pairing, now = monitor.pairing, time_of(event)
+    values = {**monitor.values, **watched.memory} if watched.held else monitor.values
+    if any(n not in values or n in monitor.supposed for n in watched.names if n not in monitor.paired):
+        watched.tally.early += 1
+        pairing.count(watched, ticks(now))
+        return
+    own = tuple(n for n in speaks(monitor, watched) if n in values)
+    inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
+    key, heard = pairing.key(event, pairing.answers.output), monitor.heard_of(watched.outputs)
+    known, places = tuple(values[n] for n in own), tuple({place for place, _ in heard.values()})
+    at, time = ticks(now), float(now)
+    pairing.ask(Asked(watched, event, monitor.events, own, known, inputs, at, time, key, heard, places))
+
+
+def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[Violation]) -> None:
+    """An answer's inputs are known, or why they are not."""
+    assert monitor.pairing is not None
+    watched, tally = asked.watched, asked.watched.tally
+    if not isinstance(choices, str) and (met := _alike(monitor, monitor.pairing, asked, choices)) is not None:
+        tally.aged(asked.seconds, asked.since, watched.paired)
+        tally.judged += 1
+        tally.triggered = tally.triggered or met
+        return
+    cases = choices if isinstance(choices, str) else monitor.pairing.cases(asked, choices)
+    if isinstance(cases, str):
+        tally.early += cases == EARLY
+        tally.order += cases != EARLY
+        tally.reason = tally.reason or ("" if cases == EARLY else cases)
+        return
+    tally.aged(asked.seconds, asked.since, watched.paired)
+    verdicts = {monitor.verdict(watched, values) for values in cases}
+    if len(verdicts) > 1:
+        tally.order += 1
+        tally.reason = tally.reason or "it depends on which of its inputs the answer answered"
+        return
+    tally.judged += 1
+    tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
+    (verdict,) = verdicts
+    if verdict is None:
+        tally.undecided += 1
+    elif isinstance(verdict, Fault):
+        tally.broken += 1
+        tally.excused += verdict is Fault.EXCUSED
+        said = watched.clause.sentence or watched.clause.text or watched.clause.name
+        if verdict is Fault.EXCUSED:
+            said += "; but an assumption does not hold"
+        event, heard = monitor.pairing.event_of(asked), asked.heard
+        if heard is None:
+            heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
+        wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])
+        found.append(replace(wrong, index=asked.index, heard=heard))
+
+
+def _alike(monitor: Monitor, pairing: Pairing, asked: Asked, choices: list[list[Said]]) -> bool | None:
+    """Whether the antecedent was met, of an answer that holds whatever it answered; None where it has to be judged by
+    all its values. Answers whose values are alike, by their tokens, are judged once."""
+    known, key = asked.watched.alike, asked.tokens
+    if key is None:
+        return None
+    for one in choices:
+        if len(one) > 1 or one[0].token is None:
+            break
+        key += (one[0].token,)
+    else:
+        met = known.get(key)
+        return _held(monitor, pairing, asked, [one for (one,) in choices], key) if met is None else met
+    if pairing.answers.by != "latency" or math.prod(map(len, choices)) > COMBINATIONS:
+        return None
+    if any(said.token is None for one in choices for said in one):
+        return None
+    all_met = True
+    for some in itertools.product(*({said.token: said for said in one}.values() for one in choices)):
+        key = (*(asked.tokens or ()), *(said.token or 0 for said in some))
+        met = known.get(key)
+        met = _held(monitor, pairing, asked, list(some), key) if met is None else met
+        if met is None:
+            return None
+        all_met = all_met and met
+    return all_met
+
+
+def _held(monitor: Monitor, pairing: Pairing, asked: Asked, inputs: list[Said], key: tuple[int, ...]) -> bool | None:
+    """The same of one combination of inputs, which is remembered where it held."""
+    watched = asked.watched
+    values = pairing.known(asked)
+    for name, said in zip(asked.inputs, inputs, strict=True):
+        value = pairing.value_of(name, said)
+        if value is None:
+            return None
+        values[name] = value
+    if monitor.verdict(watched, values) != "held":
+        return None
+    if len(watched.alike) >= REMEMBERED:
+        watched.alike.clear()
+    return watched.alike.setdefault(key, watched.triggered(values))
