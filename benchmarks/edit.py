@@ -56,7 +56,7 @@ def run(root: Path, kind: str) -> tuple[list[float], list[str]]:
         [sys.executable, "-P", "-c", _CHILD, str(root), kind],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": ""},
         check=True,
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -8,10 +8,11 @@ evidence, it is none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.base.codec import LATER
+from avow.base.records import dataclass
 
 
 class Tone(StrEnum):

@@ -8,11 +8,12 @@ Data only: `avow.report` draws it and writes it as gsn2x YAML.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 
 from avow.assurance.model import Case, DerivationView, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 

@@ -6,10 +6,11 @@ No record of the ledger gives a grade: the pipeline hands in what the kernel est
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import date
 from pathlib import Path
 from types import MappingProxyType
@@ -28,6 +28,7 @@ from avow.assurance.model import (
 from avow.assurance.policy import Policy, read_policy
 from avow.base.diagnostics import Span
 from avow.base.plain import words_of
+from avow.base.records import dataclass
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation

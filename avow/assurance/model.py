@@ -8,7 +8,7 @@ Times and dates are texts in ISO 8601; paths are relative to the workspace; ever
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition, Tone, Weakening, WeakestEvidence
@@ -17,6 +17,7 @@ from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.base import codec
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from avow.assurance.answers import How
 from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
 from avow.assurance.relied import word
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 

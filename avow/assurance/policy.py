@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -24,6 +24,7 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.base.verdict import Link, Object, said, unsaid
 from avow.evidence.status import Status
 from avow.isolation.level import Isolation
@@ -321,7 +322,7 @@ def _near(word: str, known: Iterable[str]) -> str | None:
 @cache
 def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
     text = resources.files("avow.assurance").joinpath("profiles.yaml").read_text(encoding="utf-8")
-    data = yaml.safe_load(text)
+    data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # a file of ours, in the package
     faults: list[Diagnostic] = []
     policies = {}
     for name, raw in data["profiles"].items():

@@ -8,11 +8,11 @@ whose suppositions all have an owner. A proof of the node's source supposes in t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Object, in_words
 from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import Evidence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date
 
 from avow.assurance.answers import Sort, Supposition
@@ -14,6 +14,7 @@ from avow.assurance.findings import takes
 from avow.assurance.model import ObligationView
 from avow.assurance.relied import Judged, Relied
 from avow.assurance.support import supposition_claim
+from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import weigh
 

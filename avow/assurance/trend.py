@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
 from avow.assurance.model import Case
+from avow.base.records import dataclass
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, roll_up
 from avow.tuning.shown import TREND_RUNS

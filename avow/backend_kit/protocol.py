@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
+from avow.base.records import dataclass
 from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim

@@ -11,9 +11,10 @@ definition: that it is as the contract says needs no proof.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.formulas.formula import free_variables, substitute
 from avow.formulas.traversal import transform
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from markupsafe import Markup, escape
 
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.tuning.shown import TIMELINE_COLUMNS
 
 KINDS: Mapping[str, tuple[str, str]] = {

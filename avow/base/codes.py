@@ -7,9 +7,8 @@ The tests check every example, and docs/language.md lists every code. The codes 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from avow.base.diagnostics import Severity
+from avow.base.records import dataclass
 
 FRAME = """\
 context {{

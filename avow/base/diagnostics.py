@@ -6,8 +6,10 @@ of them. Only at a boundary where nothing more can be done are they raised, toge
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
+
+from avow.base.records import dataclass
 
 
 class Severity(StrEnum):

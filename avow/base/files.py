@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import functools
 import hashlib
 import os
 import stat
@@ -43,9 +44,16 @@ def _must_be_regular(path: Path) -> None:
 def is_intact(path: Path, sha: str) -> bool:
     """Whether the file is there and has this SHA-256."""
     try:
-        return digest_file(path) == sha
+        info = path.stat()
+        return _digest_as(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns)) == sha
     except OSError:
         return False
+
+
+@functools.lru_cache(maxsize=100_000)
+def _digest_as(path: Path, mark: tuple[int, ...]) -> str:
+    """A file that is as it was a moment ago is not read again."""
+    return digest_file(path)
 
 
 def _open_special(path: Path) -> int:

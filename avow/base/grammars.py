@@ -7,12 +7,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from avow.base.files import digest
+
 
 def lark_of(grammar: Path, name: str, **options: Any) -> Any:
-    """Lark's parser of a grammar's file. `name`: of the file in which its tables are kept."""
+    """Lark's parser of a grammar's file. `name`: with which that of the file in which its tables are kept begins."""
     from lark import Lark
 
-    text, cache = grammar.read_text("utf-8"), _cache_file(name)
+    text = grammar.read_text("utf-8")
+    cache = _cache_file(f"{name}-{digest(text)[:12]}")  # two versions on one machine keep their own
     if cache is not None:
         try:
             return Lark(text, cache=str(cache), **options)

@@ -12,6 +12,16 @@ def absolute_only() -> str:
     return os.pathsep.join(entry for entry in entries if os.path.isabs(entry))  # noqa: PTH117
 
 
+def is_led_here() -> bool:
+    """Whether modules would be found in the folder in which this process stands, other than as Avow's own."""
+    here, own = os.path.realpath(os.curdir), os.path.realpath(_OWN)
+    return here != own and here in map(os.path.realpath, sys.path)
+
+
+_OWN = os.path.join(__file__, "..", "..", "..")  # noqa: PTH118
+"""The folder that Avow itself comes from."""
+
+
 def leave_here() -> None:
     """Take what such entries put on this process's module path off it, and out of its environment. The folder that
     Avow itself comes from stays."""
@@ -19,6 +29,6 @@ def leave_here() -> None:
     if not given:
         return
     relative = {os.path.abspath(entry) for entry in given.split(os.pathsep) if not os.path.isabs(entry)}  # noqa: PTH100, PTH117
-    own = os.path.abspath(os.path.join(__file__, "..", "..", ".."))  # noqa: PTH100, PTH118
+    own = os.path.abspath(_OWN)  # noqa: PTH100
     sys.path[:] = [place for place in sys.path if os.path.abspath(place) not in relative - {own}]  # noqa: PTH100
     os.environ["PYTHONPATH"] = absolute_only()

@@ -26,7 +26,7 @@ _MARK = "mark"
 def write_note(path: Path, data: Mapping[str, Any]) -> None:
     """Raises OSError."""
     body = dict(data)
-    write(path, json.dumps({**body, _MARK: _mark(path, body)}, indent=1) + "\n")
+    write(path, json.dumps({**body, _MARK: _mark(path, body)}) + "\n")
 
 
 def read_note(path: Path) -> dict[str, Any] | None:

@@ -184,8 +184,10 @@ def adopt_orphans() -> None:
 
 
 def forget_orphans() -> None:
-    """In a fork: what the process that it is a fork of adopts is not this one's."""
+    """In a fork: what the process that it is a fork of adopts, runs and was told is not this one's."""
     _adopted_since.clear()
+    _running.clear()
+    _ended_by_others.clear()
 
 
 def end_orphans() -> bool:

@@ -65,7 +65,7 @@ def package_digest(name: str) -> str:
     try:
         told = [(str(file.relative_to(place)), file.stat()) for file in files]
         marks = [[file, i.st_ino, i.st_size, i.st_mtime_ns, i.st_ctime_ns] for file, i in told]
-        note = cache_folder() / f"package-{name}.json"
+        note = cache_folder() / f"package-{name}-{digest(str(place))[:12]}.json"  # one for each environment
         mark = digest(json.dumps([str(place), marks]))
         known = read_note(note) or {}
         if known.get("of") != mark:

@@ -6,10 +6,11 @@ A verdict says what one tool run showed about one claim. Unknown, time-out, cras
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.base.files import digest
+from avow.base.records import dataclass
 
 
 class Verdict(StrEnum):

@@ -8,10 +8,11 @@ unsound as printed, and gets one of the extra premises that the proof needs (`Lo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.system.graph import Edge
 from avow.temporal.cell import CELL

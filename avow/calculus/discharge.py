@@ -10,9 +10,10 @@ prove itself. Where proofs would do that, others are looked for; where there are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.graphs import components, cycle_in
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied

@@ -16,8 +16,9 @@ taken.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from avow.base.records import dataclass
 from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused

@@ -10,8 +10,8 @@ Where neither is found, the claim is unknown, and the state that induction stumb
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame

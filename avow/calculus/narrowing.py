@@ -9,8 +9,9 @@ decide. So one open function stands for all functions that complete it, and a se
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from avow.base.records import dataclass
 from avow.calculus.open_values import Holds, Lazy, Point, Undecided, Values, asking, decided, lazy_names, opened
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.formula import free_variables

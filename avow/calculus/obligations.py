@@ -7,12 +7,13 @@ Pure generation here (`composition_obligations`, `requirement_obligations`); the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from typing import Protocol
 
 from avow.base.diagnostics import Span
 from avow.base.files import digest as sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Outcome
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope

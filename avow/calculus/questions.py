@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Protocol, assert_never
 
 from avow.base.files import digest as sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition

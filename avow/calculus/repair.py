@@ -12,9 +12,9 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame

@@ -8,9 +8,10 @@ contracts otherwise; or by induction over steps, from the initial values on.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.files import digest as sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition

@@ -8,11 +8,12 @@ A function's values are decided where they are looked at first: by its node, or 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from random import Random
 
 from avow.base.graphs import components, cycles_in
+from avow.base.records import dataclass
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.cuts import another_first, first_cut
 from avow.calculus.narrowing import Narrowing, Unknown, forcings

@@ -7,10 +7,11 @@ earlier (what a delayed edge delivers); an input that no node provides is ``in.m
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 
 from avow.base.files import digest as sha256
+from avow.base.records import dataclass
 from avow.formulas.formula import digest, free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort

@@ -7,9 +7,9 @@ kept between calls: deleting an item of evidence and judging again is the same a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from avow.base.graphs import strong_components
+from avow.base.records import dataclass
 from avow.base.verdict import Link
 from avow.evidence.status import Status, weakest_link
 

@@ -21,13 +21,13 @@ import base64
 import json
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
 from avow.base.codec import canonical
 from avow.base.files import digest, read_regular
+from avow.base.records import dataclass
 from avow.evidence.appending import append, locked
 
 GENESIS = "0" * 64

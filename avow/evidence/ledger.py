@@ -20,12 +20,12 @@ import json
 import os
 import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from avow.base.codec import Unreadable, canonical
 from avow.base.files import digest, read_regular, write
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
 from avow.evidence.encoding import decode, encode

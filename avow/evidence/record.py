@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from avow.base.codec import LATER
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Object, Verdict
 
 RETRY = "retry"

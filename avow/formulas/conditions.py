@@ -9,9 +9,9 @@ the rest where something else is left, which is the demand.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth

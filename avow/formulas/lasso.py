@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 from avow.base.graphs import strong_components
+from avow.base.records import dataclass
 from avow.formulas.ltl import A, Automaton
 
 Successors = Callable[[int], Sequence[int]]

@@ -8,9 +8,9 @@ accepted when it meets each acceptance set again and again. `avow.formulas.lasso
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator
-from dataclasses import dataclass
 from typing import Generic, TypeVar, assert_never
 
+from avow.base.records import dataclass
 from avow.tuning.bounds import AUTOMATON_NODES
 
 A = TypeVar("A", bound=Hashable)

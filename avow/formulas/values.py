@@ -8,8 +8,10 @@ a `FunctionValue`; an element of an unspecified sort is an `Opaque`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
+
+from avow.base.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,11 @@ the system as it is now, hypotheses are computed (`avow.kernel.check`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.base import codec
+from avow.base.records import dataclass
 
 FORMAT = "avow/certificate/2"
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import Any
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
 from avow.language.terms import History, Limit, Past, Role, Term, Variable

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from enum import IntEnum
 from fractions import Fraction
 from functools import reduce
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.conversions import NUMERIC, WHOLE, common, joined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
 from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term

@@ -8,8 +8,9 @@ begin a section even where a bracket before them was never closed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from avow.base.records import dataclass
 from avow.language.contract import ClauseKind
 from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keyword
 from avow.language.lexer import Token

@@ -7,7 +7,8 @@ A declared name is a name for a sort; sets of names become `EnumSort`, sets of c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from avow.base.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

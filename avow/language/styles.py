@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal as OneOf
 
+from avow.base.records import dataclass
 from avow.language.lexer import quote
 from avow.language.operators import OPERATORS
 from avow.language.terms import Past, Quantifier

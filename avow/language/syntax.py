@@ -7,10 +7,10 @@ kind that it forgets. Names that are only compared are plain strings; those that
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import assert_never
 
+from avow.base.records import dataclass
 from avow.language.lexer import Token
 from avow.language.terms import Quantifier
 

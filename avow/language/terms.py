@@ -10,11 +10,12 @@ and `rebuild`, itself with others in their place. A node without one of them is 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import TypeVar
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.operator_names import RESPONSES as RESPONSES
 from avow.language.operator_names import Builtin as Builtin
 from avow.language.operator_names import Past as Past

@@ -7,7 +7,6 @@ import os
 import subprocess
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from avow.base import codec
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, is_intact
 from avow.base.notes import read_note, write_note
+from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
 from avow.evidence.currency import as_of_now
@@ -64,13 +64,12 @@ class Assessment:
 
 def is_settled(state: State) -> bool:
     """Whether a later run would ask nothing again: no answer is one that it must not be content with."""
-    return not any(
-        records[-1].evidence.details.get(RETRY)
-        for a in state.assessments
-        for work in a.surveyed.catalogue.works
-        for o in work.obligations
-        if (records := ledger_of(a.workspace.ledger(a.system)).current(o.id, work.keys[o.id]))
-    )
+    for a in state.assessments:
+        with (ledger := ledger_of(a.workspace.ledger(a.system))).still():
+            found = (ledger.current(o.id, w.keys[o.id]) for w in a.surveyed.catalogue.works for o in w.obligations)
+            if any(records and records[-1].evidence.details.get(RETRY) for records in found):
+                return False
+    return True
 
 
 def render(assessment: Assessment) -> Result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import os
@@ -27,6 +28,7 @@ from avow.pipeline.answers import earlier
 from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
+from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 from avow.tuning.bounds import CASES_KEPT
 
@@ -63,6 +65,14 @@ def _is_settled(
     if last.details.get(RETRY) and last.run != run.id:
         return False
     return all(intact(path, sha) for path, sha in last.outputs.items())
+
+
+def prepare(state: State) -> None:
+    """Where works are open: have what they are forked from made now, while the run has one thread."""
+    works = (w for a in state.assessments for w in a.surveyed.catalogue.works if w.engine != LANGUAGE)
+    with contextlib.suppress(OSError):  # the stage says so
+        if any(open_obligations(state.workspace, work, state.run) for work in works):
+            state.run.forks.prepare(state.workspace.root)
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:

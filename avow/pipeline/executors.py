@@ -10,11 +10,12 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Protocol
 
 from avow.base.process import Completed
+from avow.base.records import dataclass
 from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Request, request_bytes, request_digest
 from avow.tuning.running import QUEUE_PATIENCE, WORKER_GRACE

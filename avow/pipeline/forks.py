@@ -5,15 +5,21 @@ starts one server (``python -m avow.pipeline.fork_server``) that does this once,
 is a process of its own in a session of its own: it is bounded, crashes and is killed with its descendants like a new
 Python. The server runs nothing but imports, has one thread, and ends with the process that started it.
 
+A run of the pipeline has most of that imported itself by the time it knows that there is work. It makes the server as
+a fork of its own (`Forks.prepare`), while it has one thread; whoever did not gets a new Python as server.
+
 It is of one process, folder and environment: where any of them is another, another server is started. Systems other
 than Linux, and machines on which the server does not start, use a new Python for each work.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -24,9 +30,10 @@ import time
 import weakref
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from avow.base import process
-from avow.base.module_path import absolute_only
+from avow.base.module_path import absolute_only, is_led_here
 from avow.base.process import Completed
 from avow.tuning.running import FORK_LOOK, FORK_START, FORK_STOP
 from avow.tuning.sizes import OUTPUT_KEPT
@@ -54,6 +61,12 @@ class Forks:
         self._refused: set[_Place] = set()
         """Where a server did not start: waited for once, not for each work."""
 
+    def prepare(self, cwd: Path) -> None:
+        """Let the server be a fork of this process: what both need is imported once. Without effect where a fork would
+        not be as good as a new Python: with several threads, or modules found in the current folder."""
+        if not is_led_here() and len(list(Path("/proc/self/task").glob("*"))) == 1:
+            self._at(cwd, own=True)
+
     def run(
         self, arguments: Sequence[str], *, cwd: Path, seconds: float, stopped: Callable[[], bool] | None = None
     ) -> Completed:
@@ -65,7 +78,7 @@ class Forks:
             return done
         return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
 
-    def _at(self, cwd: Path) -> _Server | None:
+    def _at(self, cwd: Path, own: bool = False) -> _Server | None:
         """The server for this folder and environment; None where there can be none."""
         if os.environ.get(PLAIN) or sys.platform != "linux" or not hasattr(os, "pidfd_open"):
             return None
@@ -75,7 +88,7 @@ class Forks:
                 self._server.close()
                 self._server = None
             if self._server is None and place not in self._refused:
-                self._server = _started(place, cwd)
+                self._server = _started(place, cwd, own)
                 if self._server is None:
                     self._refused.add(place)
                 else:
@@ -83,9 +96,9 @@ class Forks:
             return self._server
 
 
-def _started(place: _Place, cwd: Path) -> _Server | None:
+def _started(place: _Place, cwd: Path, own: bool) -> _Server | None:
     try:
-        server = _Server(place, cwd)
+        server = _Server(place, cwd, own)
     except OSError:
         return None
     if server.ready():
@@ -98,23 +111,14 @@ class _Server:
     """The near end. One message on `control` starts a fork, and hands over a socket of that fork's own: on it comes
     the exit code, and closing it kills the fork."""
 
-    def __init__(self, place: _Place, cwd: Path) -> None:
-        """Raises OSError."""
+    def __init__(self, place: _Place, cwd: Path, own: bool) -> None:
+        """`own`: a fork of this process. Raises OSError."""
         self.place = place
         self._sending = threading.Lock()
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             # Not bound to our life by a signal, as that is bound to the starting *thread*: it ends as `control` closes.
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "avow.pipeline.fork_server", str(theirs.fileno())],
-                cwd=cwd,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, **_python()},
-                start_new_session=True,
-                pass_fds=[theirs.fileno()],
-            )
+            self._process = _Own(theirs, cwd) if own else _new_python(theirs, cwd)
         process.watch(self._process.pid)
 
     @property
@@ -167,6 +171,88 @@ class _Server:
     def _wait(self) -> None:
         self._process.wait()
         process.unwatch(self._process.pid)  # not before: until then its number cannot be another's
+
+
+def _new_python(theirs: socket.socket, cwd: Path) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "avow.pipeline.fork_server", str(theirs.fileno())],
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **_python()},
+        start_new_session=True,
+        pass_fds=[theirs.fileno()],
+    )
+
+
+class _Own:
+    """A server that is a fork of this process, asked after as a `subprocess.Popen` is."""
+
+    def __init__(self, theirs: socket.socket, cwd: Path) -> None:
+        """Raises OSError."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self.pid = os.fork()
+        if self.pid == 0:
+            _serve(theirs, cwd)
+        self._handle = os.pidfd_open(self.pid)
+        self._lock = threading.Lock()
+        self._ended = False
+        atexit.register(self._leave)
+
+    def poll(self) -> int | None:
+        """0 once it has ended."""
+        with self._lock:
+            if not self._ended and self._over(0):
+                os.waitpid(self.pid, 0)
+                os.close(self._handle)
+                self._ended = True
+                atexit.unregister(self._leave)
+            return 0 if self._ended else None
+
+    def wait(self) -> int:
+        """Until it has ended."""
+        while self.poll() is None:
+            self._over(None)
+        return 0
+
+    def _over(self, seconds: float | None) -> bool:
+        try:
+            return bool(select.select([self._handle], [], [], seconds)[0])
+        except (OSError, ValueError):  # another thread saw its end
+            return True
+
+    def _leave(self) -> None:
+        """At the end of this process, as that is waited for with all that it spent."""
+        if self.poll() is None:
+            process.kill_tree(self.pid)
+            self._over(FORK_STOP)
+            self.poll()
+
+
+def _serve(control: socket.socket, cwd: Path) -> NoReturn:
+    """In the fork, from here to its end: nothing of the process that it comes from stays open."""
+    code = 1
+    try:
+        os.setsid()
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for stream in range(3):
+            os.dup2(nothing, stream)
+        for name in os.listdir("/proc/self/fd"):  # noqa: PTH208 - a folder's own descriptor is gone once it is listed
+            if int(name) > 2 and int(name) != control.fileno():
+                with contextlib.suppress(OSError):
+                    os.close(int(name))
+        os.chdir(cwd)
+        os.environ.update(_python())
+        atexit._clear()
+        process.forget_orphans()
+        gc.freeze()  # what it comes with is never looked through, here or in its forks
+        from avow.pipeline import fork_server
+
+        code = fork_server.serve(control)
+    finally:
+        os._exit(code)
 
 
 def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | None) -> int:

@@ -48,11 +48,16 @@ def still_counts(record: Evidence, root: Path, system: System, run: Run) -> bool
 
 
 def counting_now(ledger: Ledger, root: Path, system: System, run: Run) -> tuple[Entry, ...]:
-    """The entries; those that do not count any more with a key that is nobody's."""
-    return tuple(
-        entry if _established(entry.evidence, root, system, run) else not_established(entry)
-        for entry in as_of_now(ledger, root)
-    )
+    """The entries; those that do not count any more with a key that is nobody's. Looked at once in a run, for the same
+    ledger: all that a run says is of one moment."""
+    checked, state = _checked(system, run), (ledger.path, ledger.head, len(ledger.records()))
+    if checked.counting is None or checked.counting[0] != state:
+        counting = tuple(
+            entry if _established(entry.evidence, root, system, run) else not_established(entry)
+            for entry in as_of_now(ledger, root)
+        )
+        checked.counting = state, counting
+    return checked.counting[1]
 
 
 @dataclass(slots=True)
@@ -66,6 +71,8 @@ class Checked:
     solvers: Solvers = field(default_factory=lambda: Solvers(z3=Apart("z3")))
     answers: dict[tuple[str, str, str], Reestablished | None] = field(default_factory=dict)
     runs: dict[str, KernelRun] = field(default_factory=dict)
+    counting: tuple[tuple[object, ...], tuple[Entry, ...]] | None = None
+    """A ledger's place, head and length, and what of it counts."""
 
 
 def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -> KernelRun:

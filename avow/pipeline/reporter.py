@@ -21,6 +21,9 @@ _SILENT = ("certify", "verify")
 """Stages whose result is the report and the final table, not a line of their own; they are done in every run that
 does any work."""
 
+_ASK_NOTHING = {"check", "obligations", "export", "report"}
+"""Stages that give no worker anything to do."""
+
 
 class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     """doit's reporter interface; `-r avow` is not needed, DOIT_CONFIG names it."""
@@ -46,6 +49,10 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self._run_lock = _lock_run(self._state.workspace, self.outstream)
         if self._run_lock is not None and self._state.read:
             _sweep(self._state.workspace)
+        if self._state.read and not {name.partition(":")[0] for name in selected_tasks} <= _ASK_NOTHING:
+            from avow.pipeline.discharge import prepare
+
+            prepare(self._state)
 
     def execute_task(self, task: Any) -> None:
         with self._lock:

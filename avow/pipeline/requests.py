@@ -6,12 +6,13 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.base.codec import Unreadable, from_json, to_json
+from avow.base.records import dataclass
 from avow.pipeline.mutant_systems import Altered
 
 _TEXTS = ("system", "node", "method", "engine", "home", "root", "folder", "earlier")

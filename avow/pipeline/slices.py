@@ -7,11 +7,12 @@ slice: whoever receives one computes the keys from it again.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.backend_kit.linked import beside, connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.variables import Frame

@@ -8,8 +8,7 @@ attempts in flight, and a run with nothing to do does nothing.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 from doit.exceptions import TaskError
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.ledger import ledger_of
@@ -81,7 +81,9 @@ def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
 
 
 def _system(state: State, surveyed: Survey) -> Iterator[Task]:
-    name, workspace = surveyed.system.name, state.workspace
+    name, workspace, plan = surveyed.system.name, state.workspace, surveyed.system.plan
+    texts = map(workspace.relative, (plan.path, *plan.contract_files, *plan.included))
+    said, ledger = _Said(workspace, tuple(texts)), (workspace.ledger(name),)
     check = f"check:{name}"
     done = []
     yield {
@@ -95,7 +97,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             _Asked("the check is of contract and plan as they are", partial(checking.is_current, workspace, surveyed)),
             _settled(state, surveyed.work(LANGUAGE)),
         ],
-        **_said(workspace, _texts(surveyed), (workspace.artifacts / name / "check.json",)),
+        **said((), (workspace.artifacts / name / "check.json",)),
     }
     for work in surveyed.catalogue.works:
         match work.engine:
@@ -119,7 +121,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                         )
                     ],
                     "clean": [partial(exporting.clean, workspace, work)],
-                    **_said(workspace, (*_texts(surveyed), *work.files), (exporting.folder(workspace, work),)),
+                    **said(work.files, (exporting.folder(workspace, work),)),
                 }
         yield {
             "basename": basename,
@@ -128,7 +130,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
             "uptodate": [_settled(state, work)],
             "clean": [partial(print, f"{title}: evidence is appended to the ledger and never removed")],
-            **_said(workspace, (*_texts(surveyed), *work.files), (workspace.ledger(name),)),
+            **said(work.files, ledger),
         }
         done.append(f"{basename}:{title}")
     yield {
@@ -139,7 +141,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "uptodate": [
             _Asked("every obligation is listed", partial(write_obligations, workspace, surveyed, dry=True)),
         ],
-        **_said(workspace, _texts(surveyed), (workspace.artifacts / name / "obligations.json",)),
+        **said((), (workspace.artifacts / name / "obligations.json",)),
     }
     reports = workspace.report(name)
     assessment = Assessment(state, surveyed)
@@ -152,7 +154,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         # of the ledger as it stands: `doit report` runs no tool; `verify` renders once all evidence is in
         "uptodate": [False],
         "clean": [partial(_clean_reports, workspace, name)],
-        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),
+        **said(ledger, (reports,)),
     }
     yield {
         "basename": "certify",
@@ -161,7 +163,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "task_dep": [*done, f"obligations:{name}"],
         # whoever asks is told what was established in this run, not in an earlier one
         "uptodate": [False],
-        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), ()),
+        **said(ledger, ()),
     }
     yield {
         "basename": "verify",
@@ -171,7 +173,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "task_dep": [f"certify:{name}"],
         "uptodate": [False],
         "clean": [partial(_clean_reports, workspace, name)],
-        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),
+        **said(ledger, (reports,)),
     }
 
 
@@ -189,15 +191,17 @@ class _Asked:
         return self.words
 
 
-def _texts(surveyed: Survey) -> tuple[Path, ...]:
-    plan = surveyed.system.plan
-    return (plan.path, *plan.contract_files, *plan.included)
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """For `doit info`: inputs and targets. What is up to date is decided by content, not by these."""
 
+    workspace: Workspace
+    texts: Sequence[str]
+    """Of contract and plan."""
 
-def _said(workspace: Workspace, inputs: Iterable[Path], targets: Iterable[Path]) -> dict[str, Any]:
-    """For `doit info`. What is up to date is decided by content, not by these."""
-    shown = {"inputs": inputs, "targets": targets}
-    return {"meta": {name: [workspace.relative(path) for path in paths] for name, paths in shown.items()}}
+    def __call__(self, inputs: Iterable[Path], targets: Iterable[Path]) -> dict[str, Any]:
+        more, made = ([self.workspace.relative(path) for path in paths] for paths in (inputs, targets))
+        return {"meta": {"inputs": [*self.texts, *more], "targets": made}}
 
 
 def _clean_reports(workspace: Workspace, name: str, dryrun: bool) -> None:

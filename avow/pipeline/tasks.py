@@ -36,6 +36,7 @@ class Pipeline:
         self, root: Path, asked: Sequence[str], answer: IO[str] | None = None, elsewhere: Elsewhere | None = None
     ) -> None:
         leave_here()
+        sys.dont_write_bytecode = False  # as the workers': else a container's run compiles all of it every time
         gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do

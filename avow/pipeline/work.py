@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim

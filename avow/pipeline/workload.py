@@ -68,13 +68,15 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
 
 @by_identity(1)
 def _listed(workspace: Workspace, surveyed: Survey) -> str:
+    from avow.report.layout import json_text
+
     methods: dict[str, list[str]] = {}
     for work in surveyed.catalogue.works:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
     shown = functools.cache(lambda file: workspace.relative(Path(file)))
     listed = [obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
-    return json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
+    return json_text({"system": surveyed.system.name, "obligations": listed})
 
 
 def obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:

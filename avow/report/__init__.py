@@ -11,12 +11,12 @@ Both are idempotent and write each file in one step. They return what they wrote
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.assurance.answers import EARLIER
 from avow.assurance.model import Case
 from avow.base.files import digest, write
+from avow.base.records import dataclass
 from avow.evidence.envelope import seal_lines
 
 ATTESTATION = "attestation.jsonl"

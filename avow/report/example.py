@@ -6,8 +6,8 @@ What the tool says in its own notation (names in parentheses, see `Counterexampl
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample
 from avow.tuning.shown import ROWS_LEFT_OUT, RUN_ROWS
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.ros.calls import Calls, as_message, parts_of, with_parts
 from avow.ros.definitions import Message, canonical
 from avow.ros.sources import DISTRIBUTIONS, from_store, message_files

@@ -9,11 +9,12 @@ import json
 import re
 import xmlrpc.client
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from http.client import HTTPConnection, HTTPException
 from typing import Any
 from xml.parsers.expat import ExpatError
 
+from avow.base.records import dataclass
 from avow.ros.definitions import canonical
 from avow.ros.names import is_name
 from avow.tuning.running import MASTER_SECONDS

@@ -6,9 +6,10 @@ Source: http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 
 _NAME = re.compile(r"(?:/|~/?)?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*\Z", re.ASCII)
 

@@ -22,11 +22,12 @@ always bad: `not-vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from avow.base.diagnostics import Severity, Span
 from avow.base.files import digest as text_digest
+from avow.base.records import dataclass
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Severity, Span
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict, bound
 from avow.sanity.claims import Claim, Property
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, assert_never
 from typing import Literal as OneOf
 
 import z3
 
+from avow.base.records import dataclass
 from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps, watchdog
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from typing import assert_never
 
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.sequences import flatten

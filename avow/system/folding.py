@@ -8,10 +8,11 @@ before; its outputs are all that its nodes put out. So a loop that only closes o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.language.contract import Node, Port
 from avow.language.sorts import Sort
 from avow.language.terms import Role

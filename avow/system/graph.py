@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import components, cycles_in
+from avow.base.records import dataclass
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System

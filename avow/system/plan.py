@@ -7,7 +7,7 @@ Every part that can be wrong keeps its place in the file, so that a later stage 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.files import digest
+from avow.base.records import dataclass
 from avow.language.contract import Contract
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.system.plan import Located
 from avow.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 

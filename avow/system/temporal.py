@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from itertools import pairwise
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.language.contract import Contract
 from avow.language.definedness import unless_without_value, with_value
 from avow.language.terms import Term

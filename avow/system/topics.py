@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.records import dataclass
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable

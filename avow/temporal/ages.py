@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.language.sorts import BOOL, REAL
 from avow.language.terms import (

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+
+from avow.base.records import dataclass
 
 _NOISE = re.compile(r"Prover error: line \d+ column \d+: unknown parameter|Legal parameters are:|  \w+ \([\w ]+\)")
 _SAID = re.compile(

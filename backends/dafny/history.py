@@ -7,9 +7,8 @@ shows that it holds first, and Step that it keeps it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from avow.backend_kit.stepping import Stepping
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction
 from avow.language.printer import show_term
 from avow.language.terms import Variable

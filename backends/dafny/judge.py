@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.backend_kit.protocol import Limits
 from avow.base.plain import ALLOWS_MORE
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.language.contract import Node

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.backend_kit.stepping import stepping
+from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level

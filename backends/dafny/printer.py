@@ -9,12 +9,13 @@ is known there, so whatever is proved holds however they are read.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import reduce
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
 from avow.language.operators import OPERATORS, Level, Operator

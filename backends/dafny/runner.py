@@ -8,11 +8,11 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.backend_kit.protocol import Limits, Tool
 from avow.base import process
+from avow.base.records import dataclass
 from avow.base.tools import find_tool
 
 from . import modern

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import PurePosixPath
+
+from avow.base.records import dataclass
 
 HARMLESS = frozenset({"autotriggers", "fuel", "induction", "opaque", "split", "tailrecursion", "timeLimit", "trigger"})
 """Attributes that guide the prover or the compiler and take nothing for granted."""

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
+
+from avow.base.records import dataclass
 
 from .statistics import root
 from .tuning import EXPRESSION_DEPTH, EXPRESSION_LENGTH

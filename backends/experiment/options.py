@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic
+from avow.base.records import dataclass
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.bounds import constant
 from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable, subterms

@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.records import dataclass
 
 from .expression import Expression, Interval
 from .options import ID_COLUMNS

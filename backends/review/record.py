@@ -9,11 +9,11 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.persons import unreadable
+from avow.base.records import dataclass
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece, read_yaml
 

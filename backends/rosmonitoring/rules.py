@@ -8,9 +8,10 @@ from the plan; `reading` turns messages into values by them; `rml_guard` turns t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
+from avow.base.records import dataclass
 from avow.formulas.values import Value
 from avow.language.terms import Variable
 from avow.ros.definitions import Definitions, Wire

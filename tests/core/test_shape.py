@@ -17,6 +17,7 @@ STAYS = {
     "engine_code.engine_digest": "of the code that runs in this process",
     "engine_code.trusted_parts": "of the code that runs in this process",
     "blobs._classes": "of the code that runs in this process",
+    "tasks.sys.dont_write_bytecode": "what the interpreter does, whoever asks",
     "fork_server.sys.argv": "a fork takes its own arguments; it is a process of one work",
 }
 """What outlives a run in `avow.pipeline`, and why it may. A function that keeps answers is pure, and its answers are of

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

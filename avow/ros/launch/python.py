@@ -9,9 +9,10 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
 from avow.tuning.sizes import LAUNCH_ELEMENTS
 

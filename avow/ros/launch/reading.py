@@ -11,10 +11,11 @@ import os
 import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Span
+from avow.base.records import dataclass
 from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
 from avow.ros.launch.python import from_python
 from avow.ros.names import is_name
