@@ -211,8 +211,8 @@ class Backend(ABC):
     """Whether an answer may depend on the contracts of the nodes from which data reaches the node, over however many
     others, and on what the same backend is told of them. Where it is False the job has no clause of another node."""
     remembers: bool = False
-    """Whether it judges clauses that speak of other steps (`avow.temporal`), or does not read formulas at all. The
-    others are never shown such a clause: what the plan asks of them is refused by name."""
+    """Whether it judges clauses that speak of other steps (`avow.formulas.temporal`), or does not read formulas at all.
+    The others are never shown such a clause: what the plan asks of them is refused by name."""
     uses_source: bool = False
     """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. Where it is False they are not
     in the job at all."""

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from avow.formulas.temporal.cell import Unsaid
+from avow.formulas.temporal.cells import Records
 from avow.language.contract import Clause, Node
 from avow.language.terms import histories
-from avow.temporal.cell import Unsaid
-from avow.temporal.cells import Records
 
 
 def unsaid(judge: str, node: Node, clause: Clause, *, functions: bool = False) -> str | None:
-    """Why whoever judges runs of steps by the cells of `avow.temporal` cannot be asked about a guarantee, if he cannot:
-    the guarantee, or an assumption of the node, has no cells, or such as keep something for each value of a quantified
-    variable (`functions` says that he can do with those)."""
+    """Why whoever judges runs of steps by cells (`avow.formulas.temporal`) cannot be asked about a guarantee, if he
+    cannot: the guarantee, or an assumption of the node, has no cells, or such as keep something for each value of a
+    quantified variable (`functions` says that he can do with those)."""
     for each in (clause, *node.assumptions):
         reason = _reason(each, functions)
         if reason is not None:

@@ -16,6 +16,8 @@ from dataclasses import replace
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables, substitute
+from avow.formulas.temporal.cell import Cell, Unsaid
+from avow.formulas.temporal.cells import Records, written
 from avow.formulas.traversal import transform
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definedness import with_value
@@ -38,8 +40,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.temporal.cell import Cell, Unsaid
-from avow.temporal.cells import Records, written
 from avow.tuning.bounds import COUNTS_GUESSED
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)

@@ -14,8 +14,8 @@ from enum import StrEnum
 from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
+from avow.formulas.temporal.cell import CELL
 from avow.system.graph import Edge
-from avow.temporal.cell import CELL
 
 
 class Rule(StrEnum):

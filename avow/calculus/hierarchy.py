@@ -20,13 +20,13 @@ from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, free_variables, substitute
+from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Role, Term, Variable
 from avow.system.folding import Face, Folded
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
-from avow.temporal.cell import CELL
 
 
 @dataclass(slots=True)

@@ -16,12 +16,12 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame
 from avow.formulas.formula import free_variables, rename
+from avow.formulas.temporal.cell import CELL
 from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
-from avow.temporal.cell import CELL
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
 from avow.tuning.effort import QUICK_EFFORT
 from avow.tuning.shown import STEP_VARIABLES

@@ -19,6 +19,7 @@ from avow.base.remembered import by_identity
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.variables import Frame, indexed
 from avow.formulas.formula import digest, free_variables
+from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term, Variable
@@ -29,7 +30,6 @@ from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
-from avow.temporal.cell import CELL
 
 
 @dataclass(frozen=True, slots=True)

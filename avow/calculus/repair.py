@@ -19,6 +19,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, disjunction, free_variables, rename, substitute
+from avow.formulas.temporal.cell import CELL
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
 from avow.language.terms import (
@@ -41,7 +42,6 @@ from avow.solving.limits import spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
-from avow.temporal.cell import CELL
 from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
 from avow.tuning.effort import OFFER_STEP_EFFORT, OFFERS_EFFORT
 

@@ -15,6 +15,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
+from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.contract import Port
 from avow.language.sorts import (
@@ -36,7 +37,6 @@ from avow.language.sorts import (
 from avow.language.terms import Literal
 from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
-from avow.temporal.clock import pace_of
 from avow.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.tuning.shown import DOMAIN_VALUES
 

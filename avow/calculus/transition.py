@@ -22,6 +22,9 @@ from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.cell import CELL, Cell
+from avow.formulas.temporal.clock import is_arrival
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
@@ -29,9 +32,6 @@ from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
-from avow.temporal.ages import CLOCK
-from avow.temporal.cell import CELL, Cell
-from avow.temporal.clock import is_arrival
 from avow.tuning.bounds import NODE_ANSWERS
 from avow.tuning.effort import SEARCH_STEPS
 

@@ -13,6 +13,10 @@ from fractions import Fraction
 from avow.base.files import digest as sha256
 from avow.base.records import dataclass
 from avow.formulas.formula import digest, free_variables, rename, substitute
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.cell import CELL, Cell, Unsaid
+from avow.formulas.temporal.cells import Records, compile_node, remembers
+from avow.formulas.temporal.clock import GOES_ON, Timed, compile_timed, events, is_arrival, longest_limit, one_pace
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, REAL, Sort
@@ -22,10 +26,6 @@ from avow.system.formulas import Assumed, environment_assumptions, initial_condi
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
 from avow.system.temporal import parse_state
-from avow.temporal.ages import CLOCK
-from avow.temporal.cell import CELL, Cell, Unsaid
-from avow.temporal.cells import Records, compile_node, remembers
-from avow.temporal.clock import GOES_ON, Timed, compile_timed, events, is_arrival, longest_limit, one_pace
 
 OBSERVED = "requirement "
 """Begins the name of what is remembered for a requirement (``requirement R.once#…``), and that of no port."""

@@ -10,15 +10,15 @@ from dataclasses import replace
 
 from avow.calculus.existence import beginning, circles, loops, situations, start_name
 from avow.calculus.variables import Frame
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.cell import CELL
+from avow.formulas.temporal.clock import GOES_ON, is_arrival
 from avow.kernel.statements import Kind, Place, Wiring
 from avow.language.sorts import BOOL, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
 from avow.system.plan import Requirement
 from avow.system.temporal import parse_state
-from avow.temporal.ages import CLOCK
-from avow.temporal.cell import CELL
-from avow.temporal.clock import GOES_ON, is_arrival
 
 
 def wiring(frame: Frame) -> Wiring:

@@ -48,7 +48,7 @@ def _check(folder: Path, as_json: bool) -> int:
     from avow.assurance.codec import read_case
     from avow.base.workspace import find_workspace, report_folder
     from avow.evidence.ledger import Ledger
-    from avow.report.check import check, stale
+    from avow.pipeline.report_check import check, stale
 
     folder = report_folder(folder)
     place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())

@@ -33,7 +33,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from avow.base.workspace import find_workspace, report_folder, workspace
     from avow.evidence.envelope import seal_lines
     from avow.evidence.ledger import Ledger
-    from avow.report.check import check, stale
+    from avow.pipeline.report_check import check, stale
     from avow.report.exchange import render_attestation
 
     folder = report_folder(Path(name))

@@ -34,9 +34,9 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     from avow.calculus.scenario import CannotRun, world
     from avow.calculus.transition import Machine
     from avow.calculus.variables import frame
+    from avow.formulas.temporal.ages import CLOCK
     from avow.formulas.values import show
     from avow.system.load import load_path
-    from avow.temporal.ages import CLOCK
     from avow.tuning.bounds import WALKS
 
     loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.tables import compile_table
+from avow.formulas.temporal.cell import Cell
 from avow.formulas.values import FunctionValue, Value
-from avow.temporal.cell import Cell
 from avow.tuning.bounds import INSTANCES
 
 

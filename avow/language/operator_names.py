@@ -35,7 +35,7 @@ class Builtin(StrEnum):
 
 
 class Past(StrEnum):
-    """An operator that speaks of more than one step of a run. `avow.temporal` has what each means."""
+    """An operator that speaks of more than one step of a run. `avow.formulas.temporal` has what each means."""
 
     PREVIOUS = "previous"
     ROSE = "rose"

@@ -21,14 +21,13 @@ _ROOMS = (
     "language",
     "system",
     "formulas",
-    "temporal",
     "solving",
     "evaluation",
     "sanity",
     "calculus",
     "kernel",
 )
-_ROOMS_OF_BACKENDS = (*_ROOMS, "backend_kit")
+_ROOMS_OF_BACKENDS = (*_ROOMS, "backend_kit", "drive")
 """What an answer can depend on. What only renders, records or schedules cannot change one."""
 
 _PACKAGE = Path(avow.__file__).parent
@@ -48,8 +47,7 @@ def backend_digest(tool: Backend) -> str:
 TRUSTED = {
     "parser and type checker (avow/language)": ("language",),
     "dataflow graph and plan (avow/system, avow/ros)": ("system", "ros"),
-    "clauses with memory, as one step (avow/temporal)": ("temporal",),
-    "formulas put together and renamed (avow/formulas)": ("formulas",),
+    "formulas put together and renamed, clauses with memory as one step (avow/formulas)": ("formulas",),
     "wiring of a system as the kernel is told it (avow/calculus)": (
         "calculus/wiring.py",
         "calculus/variables.py",

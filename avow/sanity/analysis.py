@@ -17,6 +17,7 @@ from avow.base.diagnostics import Severity
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.formulas.finite import Ranges
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind, Contract, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
@@ -24,7 +25,6 @@ from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
-from avow.temporal.cells import remembers
 from avow.tuning.effort import CONSISTENT_EFFORT
 
 if TYPE_CHECKING:

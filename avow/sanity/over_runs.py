@@ -12,6 +12,8 @@ from typing import assert_never
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, rename, substitute
+from avow.formulas.temporal.cells import Remembering
+from avow.formulas.temporal.clock import one_step
 from avow.language.contract import ClauseKind, Node
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
@@ -20,8 +22,6 @@ from avow.sanity.viability import Viability, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.system.formulas import ports_of
-from avow.temporal.cells import Remembering
-from avow.temporal.clock import one_step
 from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
 
 _TRIGGER = "trigger"

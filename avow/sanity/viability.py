@@ -17,6 +17,7 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.temporal.cells import Remembering
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
 from avow.language.sorts import BOOL
@@ -25,7 +26,6 @@ from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import eliminable, eliminated
 from avow.solving.questions import entails, solve
 from avow.solving.second import CONTRADICTED, contradicted
-from avow.temporal.cells import Remembering
 from avow.tuning.bounds import GAME_ANSWERS, GAME_MEMORIES, VIABILITY_ROUNDS
 
 _Memory = tuple[Value, ...]

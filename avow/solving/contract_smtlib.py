@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.formulas.temporal.cells import compile_node
 from avow.language.contract import Contract
 from avow.language.printer import show_term
 from avow.solving.smtlib import export
 from avow.solving.translation import Unsupported
-from avow.temporal.cells import compile_node
 
 
 def to_smtlib(contract: Contract) -> str:

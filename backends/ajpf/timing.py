@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.temporal.responses import responding
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quantifier, Role, Term, histories
-from avow.temporal.responses import responding
 
 
 @dataclass(frozen=True, slots=True)

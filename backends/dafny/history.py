@@ -10,9 +10,9 @@ from __future__ import annotations
 from avow.backend_kit.stepping import Stepping
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction
+from avow.formulas.temporal.cell import CELL
 from avow.language.printer import show_term
 from avow.language.terms import Variable
-from avow.temporal.cell import CELL
 
 from .printer import Predicate, Vocabulary, call, print_clause, sort_text
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 from avow.backend_kit.stepping import stepping
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.cell import CELL
+from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
-from avow.temporal.cell import CELL
-from avow.temporal.cells import remembers
 
 from .history import ESTABLISHED, History, history
 from .names import RESERVED, Names, file_stem, identifier

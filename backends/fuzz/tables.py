@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, assert_never
 
+from avow.backend_kit.programs.samples import around, numbers_of
 from avow.language.contract import Port
 from avow.language.sorts import (
     BoolSort,
@@ -26,7 +27,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.stepping.samples import around, numbers_of
 
 from .guide import Guide
 from .reading import Reading, texts

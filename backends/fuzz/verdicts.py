@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, assert_never
 
 from avow.backend_kit.linked import Recorded, settled
+from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
@@ -30,7 +31,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.stepping.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
 
 from .drawn import Step
 from .reading import Reading

@@ -14,12 +14,12 @@ from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, steppi
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.cells import longest_limits, remembers
 from avow.formulas.values import Data, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
 from avow.language.sorts import DataSort, NaturalSort, SequenceSort, Sort, TupleSort
-from avow.temporal.cells import longest_limits, remembers
 
 from .checker import Checked
 from .names import Names, vocabulary

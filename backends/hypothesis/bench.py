@@ -25,13 +25,13 @@ from hypothesis.internal.conjecture import providers
 
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
+from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.observed import to_json
 from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import RealSort, Sort
 from avow.language.terms import Term
-from avow.temporal.cells import Records
 from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire

@@ -17,20 +17,20 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.given import told
+from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, Silent, driver
+from avow.backend_kit.programs.cpython import Told
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
+from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import show
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import Observed
 from avow.ros.sources import message_files
-from avow.stepping.callbacks import SECOND, Driver, Event, Run, Silent, driver
-from avow.stepping.cpython import Told
 from avow.system.plan import Driving
-from avow.temporal.cells import longest_limits
 
 from .export import cases, numbers
 from .judging import failure_bound

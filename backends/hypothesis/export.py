@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from avow.backend_kit.protocol import Job
+from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
-from avow.temporal.cells import remembers
 
 from . import wire
 from .machine import EXACT

@@ -10,12 +10,12 @@ from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.temporal.cell import CELL
+from avow.formulas.temporal.cells import Records
+from avow.formulas.temporal.responses import due
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable, histories
-from avow.temporal.cell import CELL
-from avow.temporal.cells import Records
-from avow.temporal.responses import due
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .generate import Inputs

@@ -16,11 +16,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import Data, Element, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
-from avow.temporal.cells import longest_limits
 
 from . import wire
 from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, told, valuation

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from avow.backend_kit.programs.samples import around
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.values import Value
@@ -22,7 +23,6 @@ from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import export
 from avow.solving.translation import Unsupported
-from avow.stepping.samples import around
 
 from .invariants import Sequences, candidates
 from .program import Step

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.programs.cpython import Subject
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
-from avow.stepping.cpython import Subject
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Numbers, Source

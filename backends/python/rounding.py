@@ -13,10 +13,10 @@ import sys
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
+from avow.backend_kit.programs.samples import around
 from avow.formulas.formula import conjunction
 from avow.language.sorts import REAL
 from avow.language.terms import Arithmetic, Compare, Conditional, Iff, Implies, Literal, Negative, Term, Variable
-from avow.stepping.samples import around
 
 LARGEST = Fraction(sys.float_info.max)
 """The largest finite double."""

@@ -12,6 +12,9 @@ from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.linked import Recorded, recorded, settled
+from avow.backend_kit.programs.cpython import Told, ask, case_of
+from avow.backend_kit.programs.judging import Formula, NoValue, Seen, meets, returned, seen
+from avow.backend_kit.programs.samples import Drawing, beside, leaves, numbers_of, pool, shifted, written
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.process import ToolMissing
@@ -29,9 +32,6 @@ from avow.language.terms import Variable
 from avow.solving.limits import from_seconds, until
 from avow.solving.questions import z3_version
 from avow.solving.settling import Settler
-from avow.stepping.cpython import Told, ask, case_of
-from avow.stepping.judging import Formula, NoValue, Seen, meets, returned, seen
-from avow.stepping.samples import Drawing, beside, leaves, numbers_of, pool, shifted, written
 from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found

@@ -12,7 +12,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from avow.stepping.callbacks import Driver, Event, Run
+    from avow.backend_kit.programs.callbacks import Driver, Event, Run
 
 
 @click.command()
@@ -50,9 +50,9 @@ def command(
     Code 1 where the class raises, or publishes otherwise than the recording; 2 where it asks for something of ROS that
     is not driven, or where what it publishes hangs on a clock or on chance.
     """
+    from avow.backend_kit.programs.callbacks import driver, unusable
     from avow.base.files import write
     from avow.base.workspace import system_folder
-    from avow.stepping.callbacks import driver, unusable
     from avow.system.load import load_system
 
     if replay and trace is None:
@@ -98,7 +98,7 @@ def command(
 
 def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:
     """The trace's messages on topics that the class hears or says, in the order of the trace. Raises Rejected."""
-    from avow.stepping.callbacks import SECOND, Event, unusable
+    from avow.backend_kit.programs.callbacks import SECOND, Event, unusable
 
     from .numbers import exact
     from .traces import read_trace
@@ -122,7 +122,7 @@ def _whole(topic: str) -> str:
 
 def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
     """Events as lines of a trace."""
-    from avow.stepping.callbacks import SECOND
+    from avow.backend_kit.programs.callbacks import SECOND
 
     for event in events:
         whole, part = divmod(event.at, SECOND)

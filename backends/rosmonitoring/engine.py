@@ -14,11 +14,11 @@ from fractions import Fraction
 from typing import Any
 
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.ros.bags import publisher
-from avow.temporal.cells import remembers
 
 from .answering import accused, ask, judge_answer, saw
 from .coverage import Tally

@@ -1,4 +1,4 @@
-"""What a clause that speaks of other steps remembers while it is monitored: the cells of `avow.temporal`, no more.
+"""What a clause that speaks of other steps remembers while it is monitored: the cells of `avow.formulas.temporal`.
 
 A step is a judgement of the clause. Where one went by unseen (a message was lost, could not be read, or an answer never
 was whole), all that is remembered is unknown from then on, until the steps that follow say it anew: what depends on it
@@ -17,15 +17,15 @@ from typing import Any, NoReturn
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.cell import CELL, Cell, Unsaid
+from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
+from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.terms import Literal, Quantified, Role, Term, Variable, histories, timed
-from avow.temporal.ages import CLOCK
-from avow.temporal.cell import CELL, Cell, Unsaid
-from avow.temporal.clock import Timed, is_arrival, longest_limit
-from avow.temporal.responses import due, fulfilled, in_the_past, pending
 
 from .coverage import Tally
 from .options import Setup

@@ -10,10 +10,10 @@ from itertools import product
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.evaluation.tables import unnamed
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import ELAPSED, Side
 from avow.formulas.traversal import subterms
 from avow.formulas.values import FunctionValue, Value
 from avow.language.terms import Apply, Role, Term, Variable
-from avow.temporal.ages import ELAPSED, Side
 from avow.tuning.bounds import POINTS_OF_ARGUMENTS
 
 from .pace import Leeway

@@ -16,6 +16,7 @@ from helpers import keys_of
 import avow.backends
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.backend_kit.registry import backend, installed
+from avow.pipeline.engine_code import _ROOMS, _ROOMS_OF_BACKENDS
 
 ROOT = Path(__file__).parents[2]
 
@@ -79,6 +80,19 @@ def test_every_file_that_the_map_names_is_there() -> None:
     for room, doors in rows:
         for door in re.findall(r"`([\w/]+\.py)`", doors):
             assert (ROOT / "avow" / room / door).is_file() or (ROOT / door).is_file(), (room, door)
+
+
+UNASKED = {"tuning", "evidence", "backends"}
+"""Rooms that engines import and whose code changes no answer: numbers that only show or time (the others are listed one
+by one), what answers are written down as, and a backend's own folder, which is in its own keys."""
+
+
+@pytest.mark.parametrize(("kept", "own"), [(_ROOMS, ()), (_ROOMS_OF_BACKENDS, (ROOT / "backends",))])
+def test_whatever_code_an_answer_hangs_on_is_in_its_key(kept: tuple[str, ...], own: tuple[Path, ...]) -> None:
+    places = [*(ROOT / "avow" / room for room in kept), *own]
+    files = [p for place in places for p in (place.rglob("*.py") if place.is_dir() else [place])]
+    found = {room for p in files for room in re.findall(r"^ *from avow\.(\w+)", p.read_text("utf-8"), re.MULTILINE)}
+    assert found <= {*kept, *UNASKED}
 
 
 PUBLIC = {

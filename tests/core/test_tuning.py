@@ -25,7 +25,7 @@ ROOMS = {
 NOT_TUNED = {
     ("avow/drive/rospy.py", "SECOND"),  # in nanoseconds
     ("avow/drive/rclpy.py", "SECOND"),
-    ("avow/stepping/callbacks.py", "SECOND"),
+    ("avow/backend_kit/programs/callbacks.py", "SECOND"),
     ("avow/base/process.py", "_PR_SET_PDEATHSIG"),  # Linux names its calls by numbers
     ("avow/base/process.py", "_PR_SET_DUMPABLE"),
     ("avow/base/process.py", "_PR_SET_CHILD_SUBREAPER"),

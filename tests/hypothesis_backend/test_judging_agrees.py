@@ -19,12 +19,12 @@ from rosmonitoring.test_agreement import MAPPING, NATURALS, RCL, REALS, formula,
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.judging import judged
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import BOOL, REAL, DataSort, EnumSort, FunctionSort
 from avow.language.terms import Variable
 from avow.solving.questions import replay
 from avow.system.plan import System
-from avow.temporal.cells import Records
 
 __all__ = ["make_system"]
 

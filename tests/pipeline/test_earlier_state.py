@@ -14,7 +14,7 @@ from helpers import some
 from avow.evidence.envelope import Opened, unseal
 from avow.evidence.ledger import Ledger
 from avow.evidence.signing import new_key_pair
-from avow.report.check import check
+from avow.pipeline.report_check import check
 
 AVOW = str(Path(sys.executable).with_name("avow"))
 MARK = "As of an earlier state"

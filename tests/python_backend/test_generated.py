@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from avow.backend_kit.programs.samples import Drawing, pool
 from avow.backends.python.machine import run
 from avow.backends.python.program import Step
 from avow.backends.python.symbolic import Run
@@ -27,7 +28,6 @@ from avow.language.contract import Node
 from avow.language.load import load_contract
 from avow.language.sorts import EnumSort
 from avow.language.terms import And, Arithmetic, Compare, Iff, Implies, Term, Variable
-from avow.stepping.samples import Drawing, pool
 
 CONTRACT = """context { MODE : { idle, busy, done }; }
 node made {

@@ -11,12 +11,12 @@ from fractions import Fraction
 
 import pytest
 
+from avow.backend_kit.programs.samples import around
 from avow.backends.python.rounding import LARGEST, OVERFLOW, gaps, no_overflow, number, rounded
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.formula import conjunction
 from avow.language.sorts import REAL
 from avow.language.terms import Role, Variable
-from avow.stepping.samples import around
 
 X, R, A, B = (Variable(Role.BOUND, name, REAL) for name in "xrab")
 THRESHOLDS = (0.0, 0.1, 0.3, -0.3, 0.5, 1.0, 1.5, 3.0, 5e-324, sys.float_info.max, sys.float_info.min)

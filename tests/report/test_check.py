@@ -16,8 +16,8 @@ from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since, not_established
 from avow.evidence.ledger import Entry, Ledger
+from avow.pipeline.report_check import _ledger, check, stale
 from avow.report import render_all
-from avow.report.check import _ledger, check, stale
 
 
 @pytest.fixture(scope="module")

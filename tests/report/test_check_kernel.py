@@ -15,7 +15,7 @@ from avow.assurance.certification import KernelRun, Reestablished
 from avow.calculus.certificate_json import to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.obligations import reestablished
-from avow.report import check as module
+from avow.pipeline import report_check as module
 
 
 @pytest.mark.slow

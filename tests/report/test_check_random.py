@@ -12,9 +12,9 @@ import pytest
 from assurance.sample import case, rover_parts
 
 from avow.evidence.ledger import Ledger
-from avow.report import check as module
+from avow.pipeline import report_check as module
+from avow.pipeline.report_check import check
 from avow.report import formats, render_all
-from avow.report.check import check
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from assurance.sample import case, guarantee, rover_case, system
 from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case, SourceView
 from avow.base.files import digest
-from avow.report import check, source
+from avow.pipeline import report_check as check
+from avow.report import source
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page
 from report.hostile import hostile_case

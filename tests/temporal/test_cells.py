@@ -10,6 +10,10 @@ import pytest
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import digest
+from avow.formulas.temporal import cells as compiler
+from avow.formulas.temporal import responses
+from avow.formulas.temporal.cell import Unsaid
+from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
@@ -32,10 +36,6 @@ from avow.language.terms import (
     Variable,
     histories,
 )
-from avow.temporal import cells as compiler
-from avow.temporal import responses
-from avow.temporal.cell import Unsaid
-from avow.temporal.cells import Records
 from temporal.positions import Step, broken, value
 
 A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)

@@ -10,6 +10,10 @@ import pytest
 
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
+from avow.formulas.temporal import ages, clock
+from avow.formulas.temporal.ages import CLOCK, ELAPSED, Lasting, Side
+from avow.formulas.temporal.cell import Unsaid
+from avow.formulas.temporal.clock import Timed
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL, REAL
@@ -30,10 +34,6 @@ from avow.language.terms import (
     Variable,
     timed,
 )
-from avow.temporal import ages, clock
-from avow.temporal.ages import CLOCK, ELAPSED, Lasting, Side
-from avow.temporal.cell import Unsaid
-from avow.temporal.clock import Timed
 from temporal.timed_words import Meaning, Word
 
 A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)

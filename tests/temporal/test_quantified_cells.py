@@ -10,12 +10,12 @@ import pytest
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evaluation.running import Keeper
+from avow.formulas.temporal.cells import Records
 from avow.formulas.values import FunctionValue, Sequence, Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL, FunctionSort, SequenceSort
 from avow.language.terms import Apply, Compare, In, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.temporal.cells import Records
 from avow.tuning.bounds import INSTANCES
 from temporal import positions, test_cells
 from temporal.positions import Step

@@ -22,13 +22,13 @@ from avow.cli.simulate import command as simulate
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import substitute
+from avow.formulas.temporal.cells import CELL, Records
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
 from avow.language.terms import Implies, Literal, Term
 from avow.system.load import load_system
-from avow.temporal.cells import CELL, Records
 from temporal.test_cells import N, formula, response
 
 Step = Mapping[str, Value]

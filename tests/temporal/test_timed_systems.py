@@ -19,6 +19,9 @@ from avow.cli.simulate import command as simulate
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import substitute
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.cell import Unsaid
+from avow.formulas.temporal.clock import Timed, one_step
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
@@ -26,9 +29,6 @@ from avow.language.sorts import REAL
 from avow.language.terms import Implies, Literal, Past, Term, histories, timed
 from avow.sanity.viability import viable
 from avow.system.load import load_system
-from avow.temporal.ages import CLOCK
-from avow.temporal.cell import Unsaid
-from avow.temporal.clock import Timed, one_step
 from temporal.test_clock import X, formula
 
 STATES = 300

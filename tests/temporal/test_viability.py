@@ -11,6 +11,7 @@ from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import substitute
+from avow.formulas.temporal.cells import Records, compile_node, remembers
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.load import check_text
 from avow.language.sorts import NATURAL
@@ -18,7 +19,6 @@ from avow.language.terms import RESPONSES, History, Implies, Literal, Not, Term,
 from avow.sanity.analysis import analyse
 from avow.sanity.viability import viable
 from avow.system.formulas import ports_of
-from avow.temporal.cells import Records, compile_node, remembers
 from temporal.positions import Step, broken, value
 from temporal.test_cells import N, formula
 from temporal.test_systems import clause

@@ -21,6 +21,8 @@ from typing import Any
 from avow_crosshair_harness import Unsaid, written
 
 from avow.backend_kit.given import told
+from avow.backend_kit.programs.cpython import Subject, ask, case_of
+from avow.backend_kit.programs.judging import Formula, meets, seen
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.codes import declare, register
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -28,8 +30,6 @@ from avow.base.process import run
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict, bound
 from avow.isolation.level import Isolation, Unavailable, available, sealed
 from avow.isolation.observed import Observed, recorded
-from avow.stepping.cpython import Subject, ask, case_of
-from avow.stepping.judging import Formula, meets, seen
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Numbers

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation
+from avow.formulas.temporal.cell import CELL
 from avow.language.sorts import BOOL, REAL
 from avow.language.terms import (
     FALSE,
@@ -23,7 +24,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.temporal.cell import CELL
 
 CLOCK = Variable(Role.INPUT, f"dt{CELL}", REAL)
 """The time since the step before, in seconds; it says nothing at the first step of a run."""

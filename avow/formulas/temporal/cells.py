@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
+from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, equal, some_value
+from avow.formulas.temporal.responses import in_the_past
 from avow.language.contract import Clause, Node
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, Sort
@@ -31,8 +33,6 @@ from avow.language.terms import (
     Variable,
     histories,
 )
-from avow.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, equal, some_value
-from avow.temporal.responses import in_the_past
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def remembers(node: Node) -> bool:
 
 def compile_node(node: Node) -> Remembering:
     """The node's clauses as formulas of one step. What has none is left as it is, and told of; so is what has limits in
-    seconds (of these, too: `avow.temporal.clock`)."""
+    seconds (of these, too: `avow.formulas.temporal.clock`)."""
     return compiled(node, Records())
 
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.programs.cpython import Subject, Told, ask
+from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.process import ToolMissing
 from avow.isolation.observed import Seen
@@ -20,8 +22,6 @@ from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
-from avow.stepping.cpython import Subject, Told, ask
-from avow.stepping.samples import Pool, leaves, numbers_of, pool, written
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Source, System

@@ -16,6 +16,22 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
+from avow.formulas.temporal.ages import (
+    CLOCK,
+    ELAPSED,
+    NO_TIME,
+    NONE,
+    Instant,
+    Kind,
+    Lasting,
+    Record,
+    Side,
+    Trend,
+    sided,
+)
+from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at_the_parameters, some_value
+from avow.formulas.temporal.cells import Records, Remembering, compiled
+from avow.formulas.temporal.responses import in_the_past
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.sorts import BOOL, REAL
 from avow.language.terms import (
@@ -44,22 +60,6 @@ from avow.language.terms import (
     histories,
     timed,
 )
-from avow.temporal.ages import (
-    CLOCK,
-    ELAPSED,
-    NO_TIME,
-    NONE,
-    Instant,
-    Kind,
-    Lasting,
-    Record,
-    Side,
-    Trend,
-    sided,
-)
-from avow.temporal.cell import CELL, Cell, Unsaid, at_the_parameters, some_value
-from avow.temporal.cells import Records, Remembering, compiled
-from avow.temporal.responses import in_the_past
 from avow.tuning.bounds import CLOCKED_SIZE, LIMITS_NESTED
 
 _EVER = (Past.ONCE, Past.HISTORICALLY, Past.SINCE)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from avow.formulas.formula import conjunction, disjunction, negation
+from avow.formulas.temporal.cell import Unsaid
 from avow.language.sorts import BOOL
 from avow.language.terms import (
     FALSE,
@@ -20,7 +21,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.temporal.cell import Unsaid
 
 
 def in_the_past(formula: Term) -> Term:
