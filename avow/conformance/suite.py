@@ -19,6 +19,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import find_tool
 from avow.base.verdict import Outcome, Verdict
 from avow.conformance.seeded import Seeded, settle, verdicts
+from avow.evidence.status import Status
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.sorts import BOOL
 from avow.language.terms import TRUE, And, History, Not, Past
@@ -56,6 +57,10 @@ class Conformance:
     files_name_the_node: ClassVar[bool] = False
     """The seeded files contain names that are made of the node's: it keeps its name then."""
 
+    asks_inputs: ClassVar[bool] = True
+    """What is verified is asked for inputs of the contract's, on which its assumptions can be judged; measurements of
+    whole runs, and a model with an environment of its own, are not."""
+
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
         if "case" in metafunc.fixturenames:
             metafunc.parametrize("case", self.seeded, ids=[case.name for case in self.seeded])
@@ -79,14 +84,17 @@ class Conformance:
         assert self.backend.name.replace("_", "").replace("-", "").isalnum()
 
     def test_the_schema_is_one(self, case: Seeded) -> None:
-        """`options_schema` is JSON schema, leaves the pipeline's own options alone, and takes the seeded options."""
+        """`options_schema` is JSON schema, leaves the pipeline's own options alone, takes the seeded options, and
+        refuses one that nobody declared: a slip in its name would go unnoticed."""
         jsonschema.Draft202012Validator.check_schema(self.backend.options_schema)
         common = COMMON_OPTIONS & set(self.backend.options_schema.get("properties", {}))
         assert not common, f"these are options of every method: {sorted(common)}"
         own = case.options
         if isinstance(own, Mapping):
             own = {key: value for key, value in own.items() if key not in COMMON_OPTIONS}
-        jsonschema.validate(own, self.backend.options_schema, jsonschema.Draft202012Validator)
+        schema = jsonschema.Draft202012Validator(self.backend.options_schema)
+        schema.validate(own)
+        assert not isinstance(own, Mapping) or not schema.is_valid({**own, "undeclared": 1}), "additionalProperties"
 
     def test_the_codes_are_declared(self) -> None:
         for name, code in self.backend.codes.items():
@@ -138,8 +146,9 @@ class Conformance:
         assert "Traceback" not in outcome.summary
         if outcome.verdict is Verdict.REFUTED:
             assert outcome.counterexample is not None, "a refutation needs a counterexample"
-        if outcome.verdict is Verdict.PROVED:
-            assert self.backend.strength is Verdict.PROVED, "proved is for methods that prove"
+        if outcome.verdict.supports:
+            most = self.backend.strength
+            assert Status(outcome.verdict).rank <= Status(most).rank, f"strength says {most} at best"
         if outcome.verdict in (Verdict.CHECKED, Verdict.TESTED, Verdict.MONITORED):
             assert outcome.bound, "an answer within bounds names them"
 
@@ -196,15 +205,28 @@ class Conformance:
                 node = replace(node, assumptions=(*node.assumptions, odd))
             else:
                 continue
-            nodes = tuple(node if other.name == node.name else other for other in job.contract.nodes)
-            system = replace(job.system, contract=replace(job.contract, nodes=nodes))
-            other = method_job(system, node, job.method, self.backend)
-            report = settle(self.backend, other, tmp_path / where, _ENOUGH)
+            report = settle(self.backend, self.asked_of(job, node), tmp_path / where, _ENOUGH)
             for outcome in report.outcomes:
                 assert not outcome.verdict.supports, f"{outcome.obligation} is {outcome.verdict}"
                 if not self.backend.remembers:
                     assert outcome.verdict is Verdict.UNKNOWN
                     assert "once" in outcome.summary
+
+    def test_only_what_is_assumed(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """A counterexample meets what the node assumes: where nothing can, nothing is refuted."""
+        if Verdict.REFUTED not in case.verdicts.values() or not self.asks_inputs:
+            return
+        nothing = Clause(ClauseKind.ASSUMPTION, "nothing", len(job.node.assumptions) + 1, Not(TRUE))
+        node = replace(job.node, assumptions=(*job.node.assumptions, nothing))
+        report = settle(self.backend, self.asked_of(job, node), tmp_path / "made", _ENOUGH)
+        refuted = [o.summary for o in report.outcomes if o.verdict is Verdict.REFUTED]
+        assert not refuted, "the assumptions exclude every input"
+
+    def asked_of(self, job: Job, node: Node) -> Job:
+        """The job, with the node in place of the one of its name."""
+        nodes = tuple(node if other.name == node.name else other for other in job.contract.nodes)
+        system = replace(job.system, contract=replace(job.contract, nodes=nodes))
+        return method_job(system, node, job.method, self.backend)
 
     # -- hostile input -------------------------------------------------------------------------------------------------
 

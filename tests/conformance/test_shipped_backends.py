@@ -229,6 +229,7 @@ class TestRosMonitoring(Conformance):
 
 class TestExperiment(Conformance):
     backend = EXPERIMENT
+    asks_inputs = False
     seeded = (
         Seeded(
             "right",
@@ -293,6 +294,7 @@ LIFT_OPTIONS = yaml.safe_load((LIFT / "plan.yaml").read_text())["nodes"]["cabin"
 @pytest.mark.slow
 class TestAjpf(Conformance):
     backend = AJPF
+    asks_inputs = False
     files_name_the_node = True
     seeded = tuple(
         Seeded(
