@@ -13,7 +13,7 @@ from avow.ros.bags import publisher
 
 from .pairing import EARLY, Asked, Choices, Pairing, Said, ticks, time_of
 from .tuning import COMBINATIONS, REMEMBERED
-from .watched import Fault, Violation, Watched
+from .watched import Answer, Fault, Violation, Watched
 
 if TYPE_CHECKING:
     from .engine import Monitor
@@ -43,11 +43,10 @@ def saw(monitor: Monitor, pairing: Pairing, name: str, event: Mapping[str, Any],
     pairing.saw(name, ticks(now), float(now), key, value, monitor.at[name][0])
 
 
-def accused(monitor: Monitor, watched: Watched, event: Mapping[str, Any]) -> bool:
+def accused(monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
     """Whether such a clause is broken."""
     if monitor.pairing is None or not judges_answers_alone(monitor, watched):
         return False
-    values = {**monitor.values, **watched.memory} if watched.held else monitor.values
     known = all(name in values and name not in monitor.supposed for name in watched.names)
     if known and watched.truth_of(values, monitor.solver) is False:
         return True
@@ -55,18 +54,20 @@ def accused(monitor: Monitor, watched: Watched, event: Mapping[str, Any]) -> boo
     return False
 
 
-def ask(monitor: Monitor, watched: Watched, event: Mapping[str, Any]) -> None:
+def ask(
+    monitor: Monitor, watched: Watched, values: Mapping[str, Value], answer: Answer | None, event: Mapping[str, Any]
+) -> None:
     """An answer, which will be judged once it is known what it may have answered."""
     assert monitor.pairing is not None
     pairing, now = monitor.pairing, time_of(event)
-    values = {**monitor.values, **watched.memory} if watched.held else monitor.values
     if any(n not in values or n in monitor.supposed for n in watched.names if n not in monitor.paired):
         watched.tally.early += 1
         pairing.count(watched, ticks(now))
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
     inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
-    key, heard = pairing.key(event, pairing.answers.output), monitor.heard_of(watched.outputs)
+    key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
+    heard = monitor.heard_of(watched.outputs) if answer is None else answer.heard
     known, places = tuple(values[n] for n in own), tuple({place for place, _ in heard.values()})
     at, time = ticks(now), float(now)
     pairing.ask(Asked(watched, event, monitor.events, own, known, inputs, at, time, key, heard, places))

@@ -9,7 +9,7 @@ environment's door, not the node's.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -17,7 +17,6 @@ from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
-from avow.language.printer import show_term
 from avow.ros.bags import publisher
 
 from .answering import accused, ask, judge_answer, saw
@@ -26,10 +25,11 @@ from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
 from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
+from .parts import came, finish, judge_part, scatter
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Fault, Heard, Violation, Watched, open_verdict, shown, time_text, verdict_of
+from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text, verdict_of
 from .wires import MappingError
 
 
@@ -57,7 +57,7 @@ class Monitor:
     _previous: list[tuple[str, str]] = field(default_factory=list)
     clauses: dict[str, list[Watched]] = field(default_factory=dict)
     """Those that are judged when a variable is published."""
-    _assumptions: list[Watched] = field(default_factory=list)
+    assumptions: list[Watched] = field(default_factory=list)
     timing: Timing = field(init=False)
     pairing: Pairing | None = None
     """Answers and the inputs that they are held against; None: the latest."""
@@ -72,7 +72,7 @@ class Monitor:
     _latest: Fraction | None = None
     supposed: set[str] = field(default_factory=set)
     """What has an initial value of the plan, and no message yet."""
-    _questions: int = OPEN_QUESTIONS
+    questions: int = OPEN_QUESTIONS
     _constant: list[Watched] = field(default_factory=list)
     """Clauses that no message changes: judged once, at the first event."""
     _remembering: list[Watched] = field(default_factory=list)
@@ -139,6 +139,11 @@ class Monitor:
         self.relevant += 1
         if self.timing.hear(event, same_topic(topic), names):
             self._miss(set(names))
+            by = "arrival" if self.pairing is None else self.pairing.answers.by
+            if self.pairing is not None:
+                self.pairing.lost = self.pairing.lost or by == "order"
+            if by in ("arrival", "order"):
+                scatter(w for name in names for w in self.clauses.get(name, ()))
         answers = self.setup.answers
         if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
             now, before = time_of(event), self._latest
@@ -147,8 +152,7 @@ class Monitor:
         if pairing is not None and pairing.waiting:
             self.settle(ticks(time_of(event)), found)
         self.at.update(dict.fromkeys(names, (place or self.events, publisher(event))))
-        updated: list[str] = []
-        unreadable: dict[int, Watched] = {}
+        updated: dict[str, bool] = {}
         for name, read in readers:
             self._seen.add(name)
             old = self.values.get(name)
@@ -160,35 +164,39 @@ class Monitor:
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
-                    if pairing is not None and name in self.paired:
-                        saw(self, pairing, name, event, None)
-                unreadable |= {id(watched): watched for watched in self.clauses.get(name, ())}
+                if pairing is not None and name in self.paired:
+                    saw(self, pairing, name, event, None)
+                updated[name] = False
                 continue
             self.supposed.discard(name)
-            updated.append(name)
+            updated[name] = True
             if pairing is not None and name in self.paired:
                 saw(self, pairing, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
-        hear(self._remembering, updated)
+        hear(self._remembering, (name for name, readable in updated.items() if readable))
         while self._constant:
             self._judge(self._constant.pop(), event, found)
-        for watched in unreadable.values():
-            watched.tally.published += 1
-            watched.tally.unreadable += 1
-        for watched in self._due(updated, event, found):
-            if watched.paired or accused(self, watched, event):
-                ask(self, watched, event)
+        for watched, answer in self._due(updated, event, found):
+            values = self.known(watched, answer)
+            if watched.paired or accused(self, watched, values, event):
+                ask(self, watched, values, answer, event)
             else:
                 self._aged(watched, event)
-                self._judge(watched, event, found)
+                self._judge(watched, event, found, answer)
             for name, source in watched.held:
                 watched.memory.pop(name, None)
-                if source in self.values:
-                    watched.memory[name] = self.values[source]
+                if source in values:
+                    watched.memory[name] = values[source]
         self.settle_previous()
         return found
+
+    def known(self, watched: Watched, answer: Answer | None) -> Mapping[str, Value]:
+        """The values by which an answer is judged: the latest, but for those of the step before, and those of its own
+        parts."""
+        values = {**self.values, **watched.memory} if watched.held else self.values
+        return values if answer is None else {**values, **answer.values}
 
     def _aged(self, watched: Watched, event: Mapping[str, Any]) -> None:
         names = [name for name in watched.inputs if name in self.timing.heard]
@@ -199,7 +207,7 @@ class Monitor:
         unknown = [name for name, _ in readers if self.setup.whose(name, event) is None]
         for watched in {id(w): w for name in unknown for w in self.clauses.get(name, ())}.values():
             watched.tally.unnamed(str(event["topic"]))
-            self._lose(watched)
+            self.lose(watched)
         return [(name, read) for name, read in readers if self.setup.whose(name, event)]
 
     def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
@@ -209,7 +217,7 @@ class Monitor:
         for watched, deadline in overdue(self._timed, event):
             if self._so_far is not None:
                 self._so_far.note(watched)
-            self._not_met(watched, {**event, "time": deadline}, found, "; no step came in time")
+            self._not_met(watched, self.values, {**event, "time": deadline}, found, "; no step came in time")
         return found
 
     @property
@@ -276,12 +284,7 @@ class Monitor:
             self.settle(None, found)
             self.backwards = self.backwards or self.pairing.uneven()
         for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
-            if watched.fresh:
-                parts = list(watched.fresh.values())
-                watched.fresh.clear()
-                values = {n: v for part, _ in parts for n, v in part.items()}
-                heard = {n: at for _, of in parts for n, at in of.items()}
-                self._judge_part(watched, (values, heard), {}, found)
+            self.backwards = finish(self, watched, found) or self.backwards
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
@@ -298,73 +301,44 @@ class Monitor:
         judge_answer(self, asked, choices, found)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
-        return verdict_of(watched, self._assumptions, values, self.solver)
+        return verdict_of(watched, self.assumptions, values, self.solver)
 
-    def _due(self, updated: Iterable[str], event: Mapping[str, Any], found: list[Violation]) -> list[Watched]:
-        """The clauses to be judged now that these variables have new values. A part of an answer that is published
-        anew before the answer is whole is judged by itself."""
-        touched: dict[int, tuple[Watched, list[str]]] = {}
-        for name in updated:
+    def _due(
+        self, readable: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]
+    ) -> list[tuple[Watched, Answer | None]]:
+        """The clauses to be judged now that these variables have new values (where they could be read), and of which
+        answer. A part of an answer that is published anew before the answer is whole is judged by itself."""
+        touched: dict[int, tuple[Watched, dict[str, bool]]] = {}
+        for name in readable:
             for watched in self.clauses.get(name, ()):
-                touched.setdefault(id(watched), (watched, []))[1].append(name)
-        due: list[Watched] = []
+                touched.setdefault(id(watched), (watched, {}))[1][name] = readable[name]
+        due: list[tuple[Watched, Answer | None]] = []
         for watched, names in touched.values():
-            if not watched.outputs:
-                watched.tally.published += 1
-                due.append(watched)
+            if watched.outputs:
+                due += [(watched, answer) for answer in came(self, watched, names, event, found)]
                 continue
-            watched.tally.published += not watched.fresh
-            for name in names:
-                if name in watched.fresh:
-                    watched.tally.published += 1
-                    self._judge_part(watched, watched.fresh[name], event, found)
-                part = self._part(watched, name) if len(watched.outputs) > 1 else {}
-                watched.fresh[name] = part, self.heard_of((name,))
-            if watched.outputs <= watched.fresh.keys():
-                watched.fresh.clear()
-                due.append(watched)
+            watched.tally.published += 1
+            if all(names.values()):
+                due.append((watched, None))
+            else:
+                watched.tally.unreadable += 1
         if self._so_far is not None:  # whether a guarantee was promised depends on what they find
-            due.sort(key=lambda watched: watched.clause.kind is not ClauseKind.ASSUMPTION)
+            due.sort(key=lambda one: one[0].clause.kind is not ClauseKind.ASSUMPTION)
         return due
 
-    def _part(self, watched: Watched, name: str) -> dict[str, Value]:
-        """One output, and all that is known but the other outputs of the answer."""
-        values = {**self.values, **watched.memory}
-        held = {n for n, _ in watched.held}
-        paired = self.paired if self.pairing is not None else frozenset()
-        spoken = (*watched.names, *(n for assumed in self._assumptions for n in assumed.names))
-        return {
-            n: values[n]
-            for n in spoken
-            if n in values
-            and (n == name or n not in watched.outputs)
-            and (n not in held or n in watched.memory)
-            and n not in paired
-            and n not in self.supposed
-        }
-
-    def _judge_part(
-        self, watched: Watched, part: tuple[dict[str, Value], Heard], event: Mapping[str, Any], found: list[Violation]
+    def judge_part(
+        self, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
-        """Judge what is known of an answer that never was whole: it is decided where the rest does not matter."""
-        tally, (values, heard) = watched.tally, part
-        self._lose(watched)
-        if self._so_far is not None or (truth := self._open(watched, values)) is None:
-            tally.partial += 1
-            return
-        tally.judged += 1
-        if not truth:
-            tally.broken += 1
-            said = watched.clause.sentence or watched.clause.text or show_term(watched.clause.formula, "unicode")
-            said += ", whatever the rest of the answer was"
-            wrong = self.violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
-            found.append(replace(wrong, heard=heard))
+        judge_part(self, watched, parts, event, found)
 
-    def _open(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
-        if not self.solver or not self._questions or watched.clause.kind is ClauseKind.ASSUMPTION:
-            return None
-        self._questions -= 1
-        return open_verdict(watched, self._assumptions, values, self.solver)
+    def spoken(self, watched: Watched) -> tuple[str, ...]:
+        """What a clause and the assumptions speak of."""
+        return (*watched.names, *(n for assumed in self.assumptions for n in assumed.names))
+
+    @property
+    def remembers(self) -> bool:
+        """Whether clauses of the node speak of other steps."""
+        return self._so_far is not None
 
     def _forget(self, name: str) -> None:
         self._versions[name] += 1
@@ -384,17 +358,20 @@ class Monitor:
         if not triggers:
             self._constant.append(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
-            self._assumptions.append(watched)
+            self.assumptions.append(watched)
 
-    def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
-        values, versions, tally = self.values, self._versions, watched.tally
+    def _judge(
+        self, watched: Watched, event: Mapping[str, Any], found: list[Violation], answer: Answer | None = None
+    ) -> None:
+        versions, tally = self._versions, watched.tally
+        values = self.known(watched, answer) if answer is not None else self.values
         if watched.held:
             held = {n for n, _ in watched.held}
             values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
         if any(name not in values for name in watched.names):
             tally.early += 1
             if watched.steps is not None and (watched.steps.answers or watched.steps.stepped):
-                self._lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
+                self.lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
             return
         supposed = any(name in self.supposed for name in watched.names)
         lost = watched.steps is not None and watched.steps.lost
@@ -402,8 +379,8 @@ class Monitor:
         if watched.steps is not None:
             watched.steps.comes(time_of(event))
             watched.truth = watched.steps.step(watched, values, self.solver, self.events, supposed)
-        elif key != watched.key or watched.held:
-            watched.key = key
+        elif key != watched.key or watched.held or answer is not None:
+            watched.key = key if answer is None else None
             watched.truth = watched.truth_of(values, self.solver)
             if not supposed:
                 watched.note_trigger(values)
@@ -418,12 +395,15 @@ class Monitor:
         if watched.truth:
             tally.judged += 1
             return
-        self._not_met(watched, event, found)
+        self._not_met(watched, values, event, found)
 
-    def _not_met(self, watched: Watched, event: Mapping[str, Any], found: list[Violation], late: str = "") -> None:
-        values, tally = self.values, watched.tally
+    def _not_met(
+        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation],
+        late: str = "",
+    ) -> None:  # fmt: skip
+        tally = watched.tally
         tally.judged += 1
-        blame = blamed(watched, self._assumptions, self.values, self.solver, self._so_far, self.events)
+        blame = blamed(watched, self.assumptions, values, self.solver, self._so_far, self.events)
         if blame is None:
             tally.undecided += 1
             tally.reason = tally.reason or UNSURE
@@ -436,11 +416,11 @@ class Monitor:
 
     def _miss(self, names: Set[str]) -> None:
         """Messages of these variables were lost, or could not be read."""
-        for watched in (*self._assumptions, *self._remembering):
+        for watched in (*self.assumptions, *self._remembering):
             if not names.isdisjoint(watched.names):
-                self._lose(watched)
+                self.lose(watched)
 
-    def _lose(self, watched: Watched) -> None:
+    def lose(self, watched: Watched) -> None:
         """A step of a clause went by unseen."""
         if watched.steps is not None:
             watched.steps.forget()
@@ -462,5 +442,5 @@ class Monitor:
     def failing(self) -> bool:
         """Whether an assumption does not hold of the values that are known now."""
         self.catch_up()
-        known = (a for a in self._assumptions if a.steps is None and self.values.keys() >= set(a.names))
+        known = (a for a in self.assumptions if a.steps is None and self.values.keys() >= set(a.names))
         return any(assumed.truth_of(self.values, self.solver) is False for assumed in known)

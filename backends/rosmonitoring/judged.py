@@ -15,7 +15,7 @@ from avow.language.terms import And, Compare, Term
 from .coverage import Tally
 from .engine import Monitor
 from .pairing import TICKS, Asked, Choices, time_of
-from .watched import Fault, Heard, Violation, Watched
+from .watched import Answer, Fault, Part, Violation, Watched
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +51,20 @@ class Telling(Monitor):
         self._now = time_of(event)
         return Monitor.step(self, event, place)
 
-    def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
+    def _judge(
+        self, watched: Watched, event: Mapping[str, Any], found: list[Violation], answer: Answer | None = None
+    ) -> None:
         held = {n for n, _ in watched.held}
-        values = {**{n: v for n, v in self.values.items() if n not in held}, **watched.memory}
+        values = {**{n: v for n, v in self.known(watched, answer).items() if n not in held}, **watched.memory}
         before = replace(watched.tally)
-        Monitor._judge(self, watched, event, found)
+        Monitor._judge(self, watched, event, found, answer)
         self._tell(watched, before, self.events, self._now, self._margin(watched, values))
 
-    def _judge_part(
-        self, watched: Watched, part: tuple[dict[str, Value], Heard], event: Mapping[str, Any], found: list[Violation]
+    def judge_part(
+        self, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
         before = replace(watched.tally)
-        Monitor._judge_part(self, watched, part, event, found)
+        Monitor.judge_part(self, watched, parts, event, found)
         self._tell(watched, before, self.events, self._now, None)
 
     def verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:

@@ -157,6 +157,8 @@ class Pairing:
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
     """Why it is no evidence: one came."""
+    lost: bool = False
+    """By order: a message was lost, as its topic's numbers say."""
     _latency: Ticks = field(init=False)
     _jitter: Ticks = field(init=False)
 
@@ -212,7 +214,7 @@ class Pairing:
         """An answer has come."""
         counted = self.count(asked.watched, asked.time)
         counted.inputs = asked.inputs
-        if self.answers.by == "order":
+        if self.answers.by == "order" and asked.key is None:  # of one whose parts came apart, it says which it is
             asked.key = counted.count
         self.waiting.append(asked)
 
@@ -323,6 +325,8 @@ class Pairing:
     def _same_key(self, name: str, asked: Asked) -> list[Said] | str:
         if asked.key is None:
             return "the answer has no key"
+        if self.lost:
+            return "a message was lost: which answer was to which is not told by their order"
         known = self.seen.get(name)
         alike = known.by_key.get(asked.key) if known is not None else None
         if not alike:

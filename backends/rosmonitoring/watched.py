@@ -39,6 +39,25 @@ Heard = Mapping[str, tuple[int, str]]
 
 
 @dataclass(frozen=True, slots=True)
+class Part:
+    """One output of an answer."""
+
+    values: Mapping[str, Value] | None
+    """It, and what was known when it came but for the other outputs; None: it could not be read."""
+    heard: Heard
+    time: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An answer whose parts came apart: its outputs' values, and their messages."""
+
+    key: object
+    values: Mapping[str, Value]
+    heard: Heard
+
+
+@dataclass(frozen=True, slots=True)
 class Violation:
     """One judgement against the trace. `index` counts events from 1; `time` is the event's own, as text."""
 
@@ -73,8 +92,12 @@ class Watched:
     tally: Tally
     outputs: frozenset[str] = frozenset()
     """Those that must all be published anew before it is judged: they are the parts of one answer."""
-    fresh: dict[str, tuple[dict[str, Value], Heard]] = field(default_factory=dict)
-    """Those that have been, since it was last judged: the part, and what it was published for; and its message."""
+    fresh: dict[object, dict[str, Part]] = field(default_factory=dict)
+    """The parts of answers that are not whole yet, by what the parts of one answer have in common (`parts`)."""
+    counted: dict[str, int] = field(default_factory=dict)
+    """By order: how many messages each output has had."""
+    scattered: bool = False
+    """A message of one of several outputs was lost: which parts are of one answer is not told any more."""
     held: tuple[tuple[str, str], ...] = ()
     """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
     of the outputs comes first in this one."""
