@@ -15,12 +15,11 @@ import math
 from bisect import insort
 from collections import OrderedDict, deque
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from fractions import Fraction
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from avow.base.records import dataclass
 from avow.formulas.values import Value, show
 
 from .numbers import Decimal, NotANumber, exact
