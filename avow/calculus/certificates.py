@@ -156,6 +156,7 @@ class Certificates:
         how = How.POSSIBLE if claim.kind in (Kind.POSSIBLE, Kind.START) else How.SHOWN
         for i in self._places[certificate.scope].get((how, claim.node, claim.digest), ()):
             try:
+                # of an assumption, what its questions name is told as claims of their own
                 return kernel.establish(i, alone=claim.kind is Kind.ASSUMPTION)
             except Refused:
                 continue

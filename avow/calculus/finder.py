@@ -258,7 +258,7 @@ class Finder:
 
     def kept(self, item: Item, base: tuple[_Base, ...], step: _Uses) -> _Proof | None:
         """The proof, if the kernel finds its questions valid; with a witness where one is needed."""
-        begun = [self.begun(b, at) for at, b in enumerate(base)]
+        begun = [self.begun(b) for b in base]
         base = tuple(b for b in begun if b is not None)
         if len(base) < len(begun):
             return None
@@ -281,7 +281,7 @@ class Finder:
                 return None
         return _Proof(base, step, tuple(found))
 
-    def begun(self, base: _Base, at: int) -> _Base | None:
+    def begun(self, base: _Base) -> _Base | None:
         """A first step whose initial conditions the kernel takes: where it must, with what is assumed of all that is
         constant in the environment. None where it does not even so."""
         uses, initials = base
@@ -293,7 +293,7 @@ class Finder:
             kernel = Kernel(self.known, Certificate(self.scope, stand_ins), self.solvers)
             question = Question(tuple(Use(k, back) for k, (_, back) in enumerate(wider)), initials)
             try:
-                tuple(kernel.begins(question.uses, question.initials, at))
+                tuple(kernel.begins(question.uses, question.initials))
             except Refused:
                 continue
             return wider, initials

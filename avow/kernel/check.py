@@ -50,7 +50,7 @@ class Established:
 
 
 class Answered(NamedTuple):
-    """A question (its digest) with the answer that is wanted."""
+    """A question (its digest), answered as wanted by `solvers` of them; `together`: nodes whose steps it makes one."""
 
     digest: str
     solvers: int
@@ -72,7 +72,7 @@ class Kernel:
     solvers: Solvers
 
     def establish(self, goal: int, *, alone: bool = False) -> Established:
-        """The claim of an entry, on all that it rests on; `alone`: on what its own questions name. Raises Refused."""
+        """The claim of an entry, on all that it rests on (`alone`: on what its questions name). Raises Refused."""
         entries, (answers, refused) = self.certificate.entries, self.checked
         if goal in refused or goal not in answers:
             raise refused.get(goal, Refused("there is no such entry"))
@@ -109,9 +109,8 @@ class Kernel:
                 answers[i] = tuple(self._entry(i, entry))
             except (Refused, Untranslatable) as why:
                 refused[i] = why if isinstance(why, Refused) else Refused(f"no text: {why}")
-        stack = list(refused)
-        while stack:
-            for user in users.get(i := stack.pop(), ()):
+        for i in (stack := list(refused)):  # which grows meanwhile
+            for user in users.get(i, ()):
                 if user not in refused:
                     refused[user] = refused[i]
                     stack.append(user)
@@ -138,13 +137,13 @@ class Kernel:
                     if any(not 0 <= u.back <= step or (u.back == 0 and u.entry >= i) for u in question.uses):
                         raise Refused("circular: an entry uses, at its own step, what comes no earlier than itself")
                     yield self.answered(entry, question, step)
-                    yield from self.begins(question.uses, question.initials, step)
+                    yield from self.begins(question.uses, question.initials)
             case How.POSSIBLE:
                 body = (text := Text()).formula(claim.term, claim.symbols())
                 yield self._asked(text.script([body]), Said.SAT, f"{claim.called}: no values are shown to be so")
-                if claim.kind is Kind.START:  # one example is not enough where the environment has a say
+                if claim.kind is Kind.START:  # an example is not enough where the environment has a say: for all of it
                     firsts = [s.digest for s in self.known.every if s.kind is Kind.INITIAL and s.node in claim.nodes]
-                    yield from self.begins([use for question in entry.base for use in question.uses], firsts, 1)
+                    yield from self.begins([use for question in entry.base for use in question.uses], firsts)
 
     def _claim(self, entry: Entry) -> Statement:
         """The claim of an entry as it is now. Raises Refused."""
@@ -179,16 +178,16 @@ class Kernel:
         if question.witness is None:
             return premises, text.formula(claim.term, claim.symbols())
         at, which = question.witness
-        source, back = used[at] if at < len(used) else (claim, 0)
-        parts: Sequence[object] = source.term.items if isinstance(source.term, And) else (source.term,)
-        match claim.term, parts[which] if at < len(used) and which < len(parts) else None:
-            case Quantified(Quantifier.EXISTS, wanted, body), Quantified(Quantifier.EXISTS, given, such):
-                names = [symbol(f"witness {k}") for k in range(len(given))]
-                for name, variable in zip(names, given, strict=True):
-                    text.declare(name, variable.sort)  # and with that, that it is of its sort
-                if [v.sort for v in wanted] == [v.sort for v in given]:
-                    premises.append(text.formula(such, source.symbols(back), dict(zip(given, names, strict=True))))
-                    return premises, text.formula(body, claim.symbols(), dict(zip(wanted, names, strict=True)))
+        for source, back in used[at : at + 1]:  # that premise, if it is there
+            parts: Sequence[object] = source.term.items if isinstance(source.term, And) else (source.term,)
+            match claim.term, parts[which] if which < len(parts) else None:
+                case Quantified(Quantifier.EXISTS, wanted, body), Quantified(Quantifier.EXISTS, given, such):
+                    names = [symbol(f"witness {k}") for k in range(len(given))]
+                    for name, variable in zip(names, given, strict=True):
+                        text.declare(name, variable.sort)  # and with that, that it is of its sort
+                    if [v.sort for v in wanted] == [v.sort for v in given]:
+                        premises.append(text.formula(such, source.symbols(back), dict(zip(given, names, strict=True))))
+                        return premises, text.formula(body, claim.symbols(), dict(zip(wanted, names, strict=True)))
         raise Refused("a witness of another type, or where nothing is said to exist")
 
     def _used(self, uses: Sequence[Use]) -> list[tuple[Statement, int]]:
@@ -199,7 +198,7 @@ class Kernel:
             raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
         return found
 
-    def begins(self, uses: Sequence[Use], marks: Sequence[str], step: int) -> Iterator[Answered]:
+    def begins(self, uses: Sequence[Use], marks: Sequence[str]) -> Iterator[Answered]:
         """`Begins`: initials say nothing of the environment: whatever constants the environment entries used allow,
         there is a first value of each output, its conditions taken together (`Apart`). Raises Refused."""
         initials = [each for each in self.known.every if each.kind is Kind.INITIAL]
@@ -209,13 +208,13 @@ class Kernel:
             while more := [s for s in initials if s not in found and any(s.sources & f.sources for f in found)]:
                 found += map(self._initial, (each.digest for each in more))
             called = " and ".join(each.called for each in found)
-            first = {place.symbol(step): place.sort for each in found for place in each.sources}
+            first = {place.symbol(): place.sort for each in found for place in each.sources}
             constant = any(place.node is None for each in found for place in each.places.values())
             names = {name: f"begin{k}" for k, name in enumerate(sorted(first))} if constant else {}
             text, conditions = Text(), []
             for each in found:
-                bound = {v: names[p.symbol(step)] for v, p in each.places.items() if p.symbol(step) in names}
-                conditions.append(text.formula(each.term, each.symbols(step), bound))
+                bound = {v: names[p.symbol()] for v, p in each.places.items() if p.symbol() in names}
+                conditions.append(text.formula(each.term, each.symbols(), bound))
             if not constant:
                 yield self._asked(text.script(conditions), Said.SAT, f"no first value of {called} is found")
                 continue

@@ -37,8 +37,8 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A value: of an output of a node (`name` is ``node.port``), or of the environment (`node` is None, and of one name
-    there is one value; a rigid one never changes; empty: remembered of the environment); `back` steps ago."""
+    """A value `back` steps ago. `node`: whose output it is (`name` is ``node.port``); None: the environment's (of one
+    name there is one value; a rigid one never changes); empty: no node's, what is remembered of the environment."""
 
     name: str
     node: str | None
