@@ -41,7 +41,7 @@ TOLD_APART = {("verdicts", "h1"), ("verdicts", "k12"), ("societies", next(iter(R
 
 
 def _when(case):
-    return () if case == min(TOLD_APART) else pytest.mark.slow if case in TOLD_APART else pytest.mark.nightly
+    return pytest.mark.slow if case in TOLD_APART else pytest.mark.nightly
 
 
 def checkers(programs, draws, properties, semantics=Semantics.MCAPL, most=20_000):

@@ -60,7 +60,7 @@ def test_a_domain_that_cuts_runs_off_is_not_exhaustive(
     assert found is Verdict.CHECKED or "the scenario's values cut runs off at the step with in.p = 3" in told
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", some(range(24), 8, slow=16))
 def test_counters_against_enumeration(tmp_path: Path, seed: int) -> None:
     chance = random.Random(seed)
     moves = {p: chance.sample(range(7), chance.choice([1, 1, 2])) for p in range(7)}

@@ -256,7 +256,7 @@ def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, suppo
         pytest.param(
             "n = 0\ndef f(x):\n    global n\n    n += 1\n    return 1 / n\n", Verdict.TESTED, marks=pytest.mark.slow
         ),
-        ("def f(x):\n    return {object() for _ in 'ab'} and 1\n", Verdict.TESTED),
+        pytest.param("def f(x):\n    return {object() for _ in 'ab'} and 1\n", Verdict.TESTED, marks=pytest.mark.slow),
     ],
 )
 def test_what_comes_of_chance_is_not_green(tmp_path: Path, text: str, verdict: Verdict) -> None:

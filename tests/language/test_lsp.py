@@ -138,6 +138,7 @@ def test_documents_that_are_no_files(editor: Editor, uri: str) -> None:
     assert editor.at("definition", uri, 2, units(line[: line.index("Colour")]))[0]["uri"] == uri
 
 
+@pytest.mark.slow
 def test_whatever_is_sent(editor: Editor) -> None:
     uri = "untitled:any"
     for text in ("", "\ud83d", "node \ud800 {", "\0", "x" * 5_000_000, "(" * 50_000, "node n {\r inputs()\r\n}"):

@@ -49,11 +49,18 @@ def ran(done: subprocess.CompletedProcess[str]) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace from `avow init`, verified once. Tests that change it work on a copy."""
-    folder = tmp_path_factory.mktemp("made") / "robot"
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace from `avow init`. Tests that change it work on a copy."""
+    folder = tmp_path_factory.mktemp("begun") / "robot"
     done = run(folder.parent, "avow", "init", "robot")
     assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(begun: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """It, verified once."""
+    folder = Path(shutil.copytree(begun, tmp_path_factory.mktemp("made") / "robot"))
     done = verify(folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
@@ -249,8 +256,9 @@ def test_every_bad_input_is_located_in_one_run(made: Path, tmp_path: Path) -> No
     [bad if k == 4 else pytest.param(*bad, marks=pytest.mark.nightly) for k, bad in enumerate(BAD)],
 )
 def test_bad_input_is_located_and_ends_with_2(
-    robot: Path, name: str, old: str, new: str, where: str, what: str
+    begun: Path, tmp_path: Path, name: str, old: str, new: str, where: str, what: str
 ) -> None:
+    robot = Path(shutil.copytree(begun, tmp_path / "robot"))
     edit(robot, old, new, name)
     done = verify(robot)
     text = done.stdout + done.stderr

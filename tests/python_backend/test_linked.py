@@ -134,6 +134,7 @@ def with_recording(folder: Path, values: Sequence[float], model: str = MODEL) ->
     (folder / "run.jsonl").write_text("\n".join(lines), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_recorded_steps_are_put_through_both(tmp_path: Path) -> None:
     """The model differs at one number, which no rule draws: that it was recorded refutes the link."""
     odd = 0.736328125
@@ -173,6 +174,7 @@ def test_a_recording_that_cannot_be_read_is_no_agreement(tmp_path: Path) -> None
     assert "cannot be read" in link.summary
 
 
+@pytest.mark.slow
 def test_a_model_that_is_not_run_is_refused_by_name(tmp_path: Path) -> None:
     """Alone it leaves the link unknown; beside one that is run it is told."""
     written(tmp_path / "s", methods=("python", "dafny"))

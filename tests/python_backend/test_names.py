@@ -7,6 +7,7 @@ import ast
 from pathlib import Path
 
 import pytest
+from helpers import some
 from source_nodes import Example
 
 from avow.backends.python.whole_file import binders
@@ -113,7 +114,9 @@ def test_what_a_name_means_is_what_python_takes_it_for(name: str, tmp_path: Path
     assert not found.verdict.supports, found.summary
 
 
-@pytest.mark.parametrize("decoy", ["enum.py", "enum.pyc", "enum.cpython-311-x86_64-linux-gnu.so", "enum"])
+@pytest.mark.parametrize(
+    "decoy", some(["enum.py", "enum.pyc", "enum.cpython-311-x86_64-linux-gnu.so", "enum"], 2, slow=2)
+)
 def test_what_stands_beside_a_file_may_be_what_it_imports(decoy: str, tmp_path: Path) -> None:
     place = tmp_path / decoy
     place.write_bytes(b"") if "." in decoy else place.mkdir()
