@@ -31,7 +31,14 @@ from .whole_file import Parts, Refusal
 if TYPE_CHECKING:
     from .translate import Scope
 
-_OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_OPERATORS: dict[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.FloorDiv: "//",
+    ast.Mod: "%",
+}
 _COMPARED: dict[type[ast.cmpop], str] = {
     ast.Lt: "<",
     ast.LtE: "<=",
@@ -212,6 +219,8 @@ class Expressions:
         if operator is None:
             raise Refusal(line, f"the operator {type(op).__name__} is not in the subset")
         one, other = self.number(left), self.number(right)
+        if operator in ("//", "%") and {one.kind, other.kind} != {Kind.INT}:
+            raise Refusal(line, f"{operator} of a float is not in the subset")
         if one.kind is not other.kind:
             one, other = _floating(one, line), _floating(other, line)
         kind = Kind.FLOAT if operator == "/" else one.kind

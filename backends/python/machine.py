@@ -132,6 +132,10 @@ def _value(expression: Expr, values: MutableMapping[str, Any]) -> Any:
                     return one - other
                 case "*":
                     return one * other
+                case "//":
+                    return one // other
+                case "%":
+                    return one % other
                 case _:  # a quotient
                     return Fraction(one) / other if _EXACT in values else one / other
         case Compare(operator=operator, left=left, right=right):

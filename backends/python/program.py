@@ -58,7 +58,7 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """``+ - * /`` of two ints or two floats; ``/`` gives a float."""
+    """``+ - * /`` of two ints or two floats, ``// %`` of two ints; ``/`` gives a float."""
 
     operator: str
     left: Expr

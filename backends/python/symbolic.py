@@ -424,6 +424,8 @@ class Run:
         one = self.named("left", self.value(expression.left, state))
         other = self.named("right", self.value(expression.right, state))
         operator, line = expression.operator, expression.line
+        if operator in ("//", "%"):
+            return self.floored(operator, one, other, state, line)
         if operator == "/":
             self.check(state, Comparison("!=", other, zero(other)), "the divisor is not zero", line)
             doubles = (one, other) if one.sort == REAL else ()
@@ -439,6 +441,21 @@ class Run:
         whole = one.sort != REAL
         exact = Arithmetic(operator, one, other, INTEGER if whole else REAL)
         return exact if whole else self.rounded(exact, (one, other), operator == "*", state, line)
+
+    def floored(self, operator: str, one: Term, other: Term, state: State, line: int) -> Term:
+        """``//`` and ``%`` of ints: the quotient is rounded down, the remainder has the divisor's sign
+        (https://docs.python.org/3/reference/expressions.html#binary-arithmetic-operations)."""
+        self.check(state, Comparison("!=", other, ZERO), "the divisor is not zero", line)
+        quotient, rest = self.fresh("floored", INTEGER), self.fresh("remainder", INTEGER)
+        whole = Arithmetic("+", Arithmetic("*", quotient, other, INTEGER), rest, INTEGER)
+        above = conjunction((Comparison("<=", ZERO, rest), Comparison("<", rest, other)))
+        below = conjunction((Comparison("<", other, rest), Comparison("<=", rest, ZERO)))
+        self.facts += [
+            Implies(Comparison("!=", other, ZERO), Comparison("==", one, whole)),
+            Implies(Comparison("<", ZERO, other), above),
+            Implies(Comparison("<", other, ZERO), below),
+        ]
+        return quotient if operator == "//" else rest
 
     def rounded(self, exact: Term, doubles: Sequence[Term], products: bool, state: State, line: int) -> Term:
         """The double next to an exact result, and the condition that there is one."""

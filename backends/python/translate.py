@@ -275,6 +275,8 @@ class Translator(Expressions):
         match statement:
             case ast.Pass() | ast.Expr(value=ast.Constant()):
                 return [], True
+            case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=values)):
+                return self.together(targets, values, line), True
             case ast.Assign(targets=[target], value=value):
                 return [self.binding(target, value, line)], True
             case ast.AnnAssign(target=target, value=ast.expr() as value):
@@ -296,13 +298,35 @@ class Translator(Expressions):
                 raise Refusal(line, "assert is not checked where Python runs with -O")
         raise Refusal(line, f"{_word(statement)} is not in the subset")
 
-    def binding(self, target: ast.expr, value: ast.expr, line: int) -> Statement:
+    def together(self, targets: Sequence[ast.expr], values: Sequence[ast.expr], line: int) -> list[Statement]:
+        """``a, b = b, a``: every value is found before anything is bound, from left to right."""
+        if len(targets) != len(values):
+            raise Refusal(line, "names and values that are not as many")
+        found: list[Statement] = []
+        for value in values:
+            given = self.expression(value)
+            self.made += 1
+            found.append(Assign(f"#value{self.made}", given, line))
+        for target, first in zip(targets, list(found), strict=True):
+            assert isinstance(first, Assign)
+            found.append(self.bind(target, Name(first.name, first.value.kind), line))
+        return found
+
+    def bind(self, target: ast.expr, value: Expr, line: int) -> Statement:
         match target:
             case ast.Name(id=name):
-                constant = self.constant(value)
-                if isinstance(constant, Mapping):
+                return self.assign(name, value, line)
+            case ast.Attribute(value=ast.Name(id=receiver), attr=attribute) if receiver == self.scope.receiver:
+                if not self.making:
+                    self.changed.setdefault(attribute, line)
+                return self.set_attribute(attribute, value, line)
+        raise Refusal(line, "only a name, or an attribute of the object itself, is assigned to")
+
+    def binding(self, target: ast.expr, value: ast.expr, line: int) -> Statement:
+        match target:
+            case ast.Name():
+                if isinstance(self.constant(value), Mapping):
                     raise Refusal(line, "a mapping is kept under another name")
-                return self.assign(name, self.expression(value), line)
             case ast.Attribute(value=ast.Name(id=receiver), attr=attribute) if receiver == self.scope.receiver:
                 constant = self.constant(value) if self.making else None
                 if isinstance(constant, Mapping):
@@ -310,10 +334,9 @@ class Translator(Expressions):
                         raise Refusal(line, f"self.{attribute} is a mapping, and bound under a condition or twice")
                     self.mappings[attribute] = constant
                     return If(Const(True, Kind.BOOL), (), (), line)
-                if not self.making:
-                    self.changed.setdefault(attribute, line)
-                return self.set_attribute(attribute, self.expression(value), line)
-        raise Refusal(line, "only a name, or an attribute of the object itself, is assigned to")
+            case _:  # `bind` refuses it
+                pass
+        return self.bind(target, self.expression(value), line)
 
     def assign(self, name: str, value: Expr, line: int) -> Statement:
         full = f"{name}{self.scope.suffix}"

@@ -70,13 +70,15 @@ class Author:
                 return f"({self.int(depth + 1)} / {self.int(depth + 1)})"
 
     def int(self, depth: int = 0) -> str:
-        match self.chance.randrange(5 if depth < 3 else 2):
+        match self.chance.randrange(6 if depth < 3 else 2):
             case 0:
                 return str(self.chance.randrange(-2, 5))
             case 1:
                 return self.chance.choice(self.ints)
             case 2 | 3:
                 return f"({self.int(depth + 1)} {self.chance.choice('+-*')} {self.int(depth + 1)})"
+            case 4:
+                return f"({self.int(depth + 1)} {self.chance.choice(['//', '%'])} {self.int(depth + 1)})"
             case _:
                 return f"max({self.int(depth + 1)}, {self.int(depth + 1)})"
 
@@ -103,7 +105,7 @@ class Author:
     def block(self, indent: int, depth: int) -> Iterator[str]:
         pad = " " * indent
         for _ in range(self.chance.randrange(1, 4)):
-            match self.chance.randrange(6 if depth < 2 else 4):
+            match self.chance.randrange(7 if depth < 2 else 5):
                 case 0:
                     yield f"{pad}x = {self.float()}"
                 case 1:
@@ -113,6 +115,8 @@ class Author:
                 case 3:
                     yield f"{pad}t = {self.truth()}"
                 case 4:
+                    yield f"{pad}x, self.held, self.count = self.held, {self.float()}, {self.int()}"
+                case 5:
                     yield f"{pad}if {self.truth()}:"
                     yield from self.block(indent + 4, depth + 1)
                     if self.chance.random() < 0.5:
@@ -190,6 +194,14 @@ def facts_hold(step: Step, node: Node, case: dict[str, Any], reply: dict[str, An
                     values[name.qualified] = Fraction(float(Fraction(number(exact, values))))
                 except OverflowError:
                     return  # infinite: what follows is about no number
+            case Implies(
+                right=Compare(
+                    left=whole,
+                    right=Arithmetic(left=Arithmetic(left=Variable() as name, right=divisor), right=Variable() as rest),
+                )
+            ) if name.name.startswith("floored") and name.qualified not in values:
+                by, of = int(number(divisor, values)), int(number(whole, values))
+                values |= {name.qualified: of // by if by else 0, rest.qualified: of % by if by else 0}
             case Implies(right=Compare(left=Arithmetic(left=Variable() as name, right=divisor), right=whole)) if (
                 name.name.startswith("quotient") and name.qualified not in values
             ):
