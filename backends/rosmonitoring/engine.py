@@ -368,8 +368,13 @@ class Monitor:
         if watched.held:
             held = {n for n, _ in watched.held}
             values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
-        if any(name not in values for name in watched.names):
-            tally.early += 1
+        if any(name not in values for name in watched.names) and (
+            watched.steps is None or watched.steps.early(watched.names, values)
+        ):
+            if watched.steps is not None and watched.steps.unsaid:
+                tally.published -= 1  # what it responds to, which has no value yet, did not come about
+            else:
+                tally.early += 1
             if watched.steps is not None and (watched.steps.answers or watched.steps.stepped):
                 self.lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
             return

@@ -16,16 +16,16 @@ from typing import Any, NoReturn
 
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.evaluation.running import Keeper
-from avow.formulas.formula import free_variables
+from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
 from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
-from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending
+from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending, responding
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
-from avow.language.terms import Literal, Quantified, Role, Term, Variable, histories, timed
+from avow.language.terms import History, Implies, Literal, Past, Quantified, Role, Term, Variable, histories, timed
 
 from .coverage import Tally
 from .options import Setup
@@ -74,8 +74,14 @@ class Memory:
         """Its steps are all messages of what it speaks of: a node that dies would never see what it has to answer."""
         self.answers = False
         """Its steps are answers of the node."""
+        self.unsaid = frozenset[str]()
+        """The outputs of a response to inputs: as long as one of them was never heard, it has not come."""
+        self.mute = False
+        """One was never heard: that it did not come may be for want of a record of its topic."""
         self.stepped = 0
         """The event of its latest step."""
+        self.broke = False
+        """It was broken there, which is told, and need not be told of the silence that begins with it."""
         self.judged: Mapping[str, Value] = {}
         """The valuation of that step."""
         self.silence = silence
@@ -103,9 +109,17 @@ class Memory:
     def _around(self, values: Mapping[str, Value]) -> Mapping[str, Value]:
         """With the time since the step before, and what has arrived since."""
         arrived = {name: port in self._arrived for name, port in self._arrivals.items()}
+        if self.unsaid:
+            missing: dict[str, Any] = {name: _Unknown() for name in self.unsaid if name not in values}
+            arrived[ANSWERED.qualified] = not missing
+            values, self.mute = {**values, **missing}, bool(missing)
         if self.silence is None:
             return {**values, **arrived} if arrived else values
         return {**values, **arrived, CLOCK.qualified: self.silence.elapsed}
+
+    def early(self, names: Iterable[str], values: Mapping[str, Value]) -> bool:
+        """Whether something that it speaks of has no value yet; of a response that never came, that is none."""
+        return any(name not in values and name not in self.unsaid for name in names)
 
     def hears(self, names: Iterable[str]) -> None:
         """Messages of these variables have come."""
@@ -128,7 +142,7 @@ class Memory:
         if deadline is None or now <= deadline + self._leeway.grace:
             return None
         silence.told = True
-        return deadline
+        return None if self.mute or (self.broke and deadline == silence.latest) else deadline
 
     @property
     def deadline(self) -> Fraction | None:
@@ -196,6 +210,9 @@ class Memory:
             self.silence.elapsed, self.silence.spared = self.silence.spared, None
             if truth and watched.clause.kind is ClauseKind.GUARANTEE:
                 truth, watched.tally.reason = None, watched.tally.reason or self._leeway.late
+        self.broke = truth is False
+        if truth is False and self.mute:
+            truth, watched.tally.reason = None, watched.tally.reason or MUTE
         if supposed:
             self.stepped = event
             self.forget()
@@ -210,6 +227,7 @@ class Memory:
         self._keeper.memory = {}
 
 
+MUTE = "a response is due of which no message was ever heard: its topic may not have been recorded"
 UNSURE = "it is not known whether the assumptions have held so far"
 
 
@@ -275,11 +293,13 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     names = set[str]()
     if histories(formula):
         in_time = timed(formula) is not None
+        never = _unsaid(formula) if in_time else frozenset[str]()
+        asked = _once_said(formula) if never else formula
         records = Timed(longest=longest_limit((formula,)))
         silence: Silence | None = None
         try:
             if in_time:
-                positions = records.positions(formula)
+                positions = records.positions(asked)
                 holds, breaks = records.instants(positions)
                 formula = positions.now
                 compiled = {side: compile_term(held) for side, held in holds.items()}
@@ -289,9 +309,9 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
                 silence = Silence(compiled, moved, every, setup.leeway)
             else:
                 formula = records.clause(formula)
-            trigger = fulfilled(clause.formula) or trigger_of(in_the_past(clause.formula))
+            trigger = fulfilled(asked) or trigger_of(in_the_past(asked))
             trigger = None if trigger is None else records.past(trigger, in_time=in_time)
-            waiting = pending(clause.formula)
+            waiting = pending(asked)
             waiting = None if waiting is None else records.past(waiting, in_time=in_time)
         except Unsaid as unsaid:
             raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
@@ -303,7 +323,10 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         names |= free_names(waiting) if waiting is not None else set()
         names |= free_names(trigger) if trigger is not None else set()
         names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}
-        names = names - {CLOCK.qualified, *(v.qualified for v in arrivals)} | set(map(port_of, arrivals))
+        names = names - {CLOCK.qualified, ANSWERED.qualified, *(v.qualified for v in arrivals)} | set(
+            map(port_of, arrivals)
+        )
+        steps.unsaid = never
         steps.alone = bool(arrivals) and names == set(map(port_of, arrivals))
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
@@ -419,6 +442,29 @@ def _answers_inputs(formula: Term) -> bool:
     found = due(formula)
     spoken = {v.role for t in found.triggers for v in free_variables(t)} if found is not None else set()
     return Role.INPUT in spoken and Role.OUTPUT not in spoken
+
+
+ANSWERED = Variable(Role.INPUT, f"answered{CELL}", BOOL)
+"""Whether all that a response speaks of has been heard."""
+
+
+def _unsaid(formula: Term) -> frozenset[str]:
+    """The outputs of a response to inputs, which may never have been heard; none of one under a quantifier: there no
+    part of a formula may be unknown."""
+    found = responding(formula)
+    within = found is not None and found[2].operator is Past.WITHIN  # the others are due at once
+    if found is None or not within or _quantified(formula) or not _answers_inputs(formula):
+        return frozenset()
+    spoken = {v for part in found[2].arguments for v in free_variables(part)}
+    return frozenset(v.qualified for v in spoken if v.role is Role.OUTPUT)
+
+
+def _once_said(formula: Term) -> Term:
+    """A response that has to have been heard: a claim without a value is not met."""
+    if isinstance(formula, Implies):
+        return Implies(formula.left, _once_said(formula.right), formula.span)
+    assert isinstance(formula, History)
+    return replace(formula, arguments=tuple(conjunction((ANSWERED, part)) for part in formula.arguments))
 
 
 def port_of(arrival: Variable) -> str:

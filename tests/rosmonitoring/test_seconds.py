@@ -111,6 +111,22 @@ def test_what_came_a_little_late_is_neither_held_nor_broken(make_system: Make) -
     assert told(make_system, alive, *late) == [(Fault.GUARANTEE, "g", "0.13")]  # an assumption gets the benefit
 
 
+def test_a_response_to_inputs_is_judged_from_their_first_message_on(make_system: Make) -> None:
+    """Before the node has said anything, its response has not come: that nothing is due is known, that it is late is
+    not, since its topic may not have been recorded."""
+    before = [at(k / 10, a=False) for k in range(9)]
+    answered = [at(0.95, b=False), at(1, a=True), at(1.2, b=True), OTHER]
+    assert tallied(make_system, WITHIN, *before, *answered) == {"g": (12, 0, 0)}
+    assert tallied(make_system, WITHIN, at(0, b=False), *before, *answered) == {"g": (12, 0, 0)}
+    assert tallied(make_system, WITHIN, *before, at(1, a=True), at(1.2, b=True), OTHER) == {"g": (11, 0, 0)}
+    dead = [*before, at(1, a=True), at(3, a=True)]
+    assert told(make_system, WITHIN, *dead, OTHER) == []
+    assert tallied(make_system, WITHIN, *dead, OTHER) == {"g": (10, 0, 1)}
+    assert told(make_system, WITHIN, at(0, b=False), *dead, OTHER)[0] == (Fault.GUARANTEE, "g", "2")
+    late = [*before, at(1, a=True), at(1.5, b=False), at(3, a=True)]
+    assert told(make_system, WITHIN, *late, OTHER)[0] == (Fault.GUARANTEE, "g", "2")
+
+
 def test_a_run_begins_anew_for_all_clauses_at_once(make_system: Make) -> None:
     """Else an assumption that was broken since the times went back would be forgotten at a guarantee's first step."""
     both = "assume alive ( once[1 s](arrived(in.a)) )\nguarantee g ( held[2 s](in.a) -> out.b )"
