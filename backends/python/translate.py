@@ -33,7 +33,6 @@ from .machine import Failed, run_block
 from .program import (
     Assign,
     Binary,
-    Compare,
     Const,
     Expr,
     Extreme,
@@ -53,7 +52,7 @@ from .program import (
     assigned,
 )
 from .tuning import INLINED_DEPTH
-from .whole_file import Parts, Refusal, binders
+from .whole_file import Parts, Refusal, bound_names, plain_arguments
 
 
 def kind_of(sort: Sort) -> Kind | None:
@@ -132,10 +131,10 @@ class Translator(Expressions):
         init = self.parts.methods.get("__init__")
         if init is None:
             return {}
-        arguments = _plain_arguments(init)
+        arguments = plain_arguments(init)
         if len(arguments) > 2:
             raise Refusal(init.lineno, "__init__ takes one mapping of parameters, or nothing")
-        scope = Scope("@init", _bound_names(init), arguments[0])
+        scope = Scope("@init", bound_names(init), arguments[0])
         for name in arguments[1:]:
             scope.aliases[name] = self.params
         self.scope = scope
@@ -160,7 +159,7 @@ class Translator(Expressions):
         if step is None:
             raise Refusal(self.parts.node.lineno, f"the class {self.parts.node.name} has no method step")
         given = {p.name: p for p in self.node.inputs if p.name not in self.memory}
-        names = _plain_arguments(step)[1:]
+        names = plain_arguments(step)[1:]
         for name in names:
             if name not in given:
                 raise Refusal(step.lineno, f"step wants {name}, which is no input of {self.node.name}")
@@ -189,10 +188,10 @@ class Translator(Expressions):
 
     def _method(self, name: str, given: Mapping[str, Expr]) -> tuple[Statement, ...]:
         method = self.parts.methods[name]
-        arguments = _plain_arguments(method)
+        arguments = plain_arguments(method)
         if not arguments:
             raise Refusal(method.lineno, f"{name} has no argument for its object")
-        scope = Scope("", _bound_names(method), arguments[0])
+        scope = Scope("", bound_names(method), arguments[0])
         if arguments[0] in scope.own:
             raise Refusal(method.lineno, f"{arguments[0]} is bound anew in {name}")
         self.scope = scope
@@ -217,14 +216,14 @@ class Translator(Expressions):
         name = definition.name
         if name in self.calls or len(self.calls) > INLINED_DEPTH:
             raise Refusal(line, f"{name} calls itself, or calls go deeper than {INLINED_DEPTH}")
-        names = _plain_arguments(definition)
+        names = plain_arguments(definition)
         if method and not names:
             raise Refusal(line, f"{name} has no argument for its object")
         receiver, names = (names[0], names[1:]) if method else ("", names)
         if len(names) != len(arguments) or any(isinstance(a, ast.Starred) for a in arguments):
             raise Refusal(line, f"{name} is called with other arguments than it takes")
         self.made += 1
-        scope = Scope(f"@{self.made}", _bound_names(definition), receiver)
+        scope = Scope(f"@{self.made}", bound_names(definition), receiver)
         if receiver in scope.own:
             raise Refusal(definition.lineno, f"{receiver} is bound anew in {name}")
         first: list[Statement] = []
@@ -470,23 +469,6 @@ def _invariant(lines: Sequence[str], at: int) -> str:
     return text.removeprefix("invariant:").strip() if text.startswith("invariant:") else ""
 
 
-def _plain_arguments(function: ast.FunctionDef) -> list[str]:
-    a = function.args
-    if a.posonlyargs or a.kwonlyargs or a.vararg or a.kwarg or a.defaults:
-        raise Refusal(function.lineno, f"{function.name} has arguments other than plain ones without default")
-    return [argument.arg for argument in a.args]
-
-
-def _bound_names(function: ast.FunctionDef) -> frozenset[str]:
-    """The names that its body binds: local everywhere in it. Arguments that it leaves alone are not among them."""
-    for part in ast.walk(function):
-        if isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
-            raise Refusal(part.lineno, "a function, class or name bound within an expression or function")
-        if isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
-            raise Refusal(getattr(part, "lineno", function.lineno), "an import or comprehension within a function")
-    return frozenset(name for name, _ in binders(*function.body))
-
-
 def _loaded(target: ast.Name | ast.Attribute) -> ast.expr:
     match target:
         case ast.Name(id=name):
@@ -501,4 +483,4 @@ def _word(statement: ast.stmt) -> str:
     )
 
 
-__all__ = ["Compare", "Scope", "Translator", "kind_of"]
+__all__ = ["Scope", "Translator", "kind_of"]

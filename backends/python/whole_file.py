@@ -370,3 +370,21 @@ def reachable(parts: Parts, start: str) -> set[str]:
         found.add(name)
         stack += [n.attr for n in ast.walk(parts.methods[name]) if isinstance(n, ast.Attribute)]
     return found
+
+
+def plain_arguments(function: ast.FunctionDef) -> list[str]:
+    """The names of its arguments. Raises Refusal where there are others than plain ones."""
+    a = function.args
+    if a.posonlyargs or a.kwonlyargs or a.vararg or a.kwarg or a.defaults:
+        raise Refusal(function.lineno, f"{function.name} has arguments other than plain ones without default")
+    return [argument.arg for argument in a.args]
+
+
+def bound_names(function: ast.FunctionDef) -> frozenset[str]:
+    """The names that its body binds: local everywhere in it. Arguments that it leaves alone are not among them."""
+    for part in ast.walk(function):
+        if isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
+            raise Refusal(part.lineno, "a function, class or name bound within an expression or function")
+        if isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
+            raise Refusal(getattr(part, "lineno", function.lineno), "an import or comprehension within a function")
+    return frozenset(name for name, _ in binders(*function.body))
