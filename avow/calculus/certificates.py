@@ -17,6 +17,7 @@ from avow.calculus.derivation import Case, Phase, Settled
 from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Finder, Hint
 from avow.calculus.hierarchy import innermost
+from avow.calculus.invariants import INVARIANT, Written, with_lemmas
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
@@ -46,12 +47,22 @@ class Certificates:
     _places: dict[str, dict[tuple[How, str, str], list[int]]] = field(default_factory=dict)
     """Scope → the entries for a claim."""
     _named: dict[tuple[Kind, str], Statement] = field(default_factory=dict)
+    _extended: dict[tuple[Written, ...], Statements] = field(default_factory=dict)
 
     @property
     def known(self) -> Statements:
         if self._known is None:
             self._known = statements(wiring(self.composition.frame))
         return self._known
+
+    def known_with(self, lemmas: tuple[Written, ...]) -> Statements:
+        """The claims of the system, and those of some lemmas that can be read."""
+        if not lemmas:
+            return self.known
+        if lemmas not in self._extended:
+            frame = self.composition.frame
+            self._extended[lemmas] = statements(with_lemmas(wiring(frame), frame.system.contract, lemmas))
+        return self._extended[lemmas]
 
     @property
     def late(self) -> bool:
@@ -74,7 +85,9 @@ class Certificates:
             found = self.established(self.made[goal.name], claim)
         return found
 
-    def requirement(self, name: str, hint: Hint, bounds: Bounds) -> Established | None:
+    def requirement(
+        self, name: str, hint: Hint, bounds: Bounds, lemmas: tuple[Written, ...] = ()
+    ) -> Established | None:
         """A requirement, of the whole system."""
         claim = self.claim(Kind.REQUIREMENT, name)
         if claim is None:
@@ -87,7 +100,9 @@ class Certificates:
         whole = self.composition.whole
         if whole.name not in self._finders:
             self._finders[whole.name] = self._finder(whole, bounds)
-        finder = replace(self._finders[whole.name], scope=scope, goals=(claim,))
+        of_whole = self._finders[whole.name]
+        lemmas = tuple(dict.fromkeys((*of_whole.lemmas, *lemmas)))
+        finder = replace(of_whole, known=self.known_with(lemmas), lemmas=lemmas, scope=scope, goals=(claim,))
         finder.hints = {**finder.hints, name: hint}
         self.made[scope] = pruned(finder.find(), claim)
         return self.established(self.made[scope], claim)
@@ -149,7 +164,8 @@ class Certificates:
             return None
         kernel = self._kernels.get(certificate.scope)
         if kernel is None or kernel.certificate is not certificate:
-            kernel = self._kernels[certificate.scope] = Kernel(self.known, certificate, self.solvers)
+            known = self.known_with(certificate.lemmas)
+            kernel = self._kernels[certificate.scope] = Kernel(known, certificate, self.solvers)
             places = self._places[certificate.scope] = {}
             for i, entry in enumerate(certificate.entries):
                 places.setdefault((entry.how, entry.node, entry.digest), []).append(i)
@@ -182,6 +198,7 @@ class Certificates:
         everything = selected == frozenset(graph.nodes)
         hints: dict[str, Hint] = {}
         hopeless: set[str] = set()
+        lemmas: dict[Written, None] = {}
         for part in goal.inner_first():
             for condition, answer in composition.settled(part, bounds).settled.items():
                 name = innermost(str(condition.about))
@@ -189,8 +206,9 @@ class Certificates:
                     hopeless.add(name)
                 elif (hint := _hint(answer)) is not None:
                     hints[name] = hint
+                lemmas |= dict.fromkeys(case.invariant for case in answer.cases if case.invariant)
         return Finder(
-            self.known,
+            self.known_with(tuple(lemmas)),
             goal.name,
             order,
             partial(_behind, into),
@@ -198,6 +216,7 @@ class Certificates:
             frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
             hints,
             frozenset(hopeless - hints.keys()),
+            lemmas=tuple(lemmas),
             solvers=self.solvers,
         )
 
@@ -254,7 +273,9 @@ def pruned(certificate: Certificate, goal: Statement) -> Certificate:
         conds = tuple(ranks[c] for c in entry.conds)
         return Entry(entry.how, entry.node, entry.digest, conds, tuple(map(renumbered, entry.base)), step)
 
-    return Certificate(certificate.scope, tuple(moved(certificate.entries[i]) for i in sorted(kept)))
+    return Certificate(
+        certificate.scope, tuple(moved(certificate.entries[i]) for i in sorted(kept)), certificate.lemmas
+    )
 
 
 def _hint(settled: Settled) -> Hint | None:
@@ -279,7 +300,7 @@ def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
             continue
         name = label.removesuffix(" one step before")
         back = int(name != label)
-        found.append((name if name.startswith(("environment ", "memory ")) else innermost(name), back))
+        found.append((name if name.startswith(("environment ", "memory ", INVARIANT)) else innermost(name), back))
     return tuple(dict.fromkeys(found))
 
 

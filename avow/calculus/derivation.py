@@ -175,6 +175,8 @@ class Case:
     engine: str = ""
     depth: int = 1
     """Of how many steps an induction is."""
+    invariant: tuple[str, ...] = ()
+    """One that nobody wrote down, by which it is kept (`avow.calculus.invariants`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,12 +17,13 @@ from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
-from avow.calculus.induction import Deeper, deeper, steps
+from avow.calculus.induction import Deeper, steps
+from avow.calculus.invariants import INVARIANT, further
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.tuning.effort import DEEPER_EFFORT, NARROW_EFFORT
+from avow.tuning.effort import NARROW_EFFORT
 
 Hypotheses = dict[str, Term]
 
@@ -223,10 +224,16 @@ class _Solver:
                 frame.initials(self.selected) | frame.blank(),
                 frame.clause(condition.consumer, condition.clause),
             )
-            patience = min(DEEPER_EFFORT, self.bounds.effort)
-            found = deeper(asked, patience, self.bounds.seed, str(condition.about))
+            found = further(frame, asked, self.bounds.effort, self.bounds.seed, str(condition.about))
         if found.proved is not None:
-            case = Case(Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine, depth=found.steps)
+            case = Case(
+                Phase.LATER,
+                Verdict.PROVED,
+                found.proved,
+                engine=found.engine,
+                depth=found.steps,
+                invariant=found.by,
+            )
         elif found.run is not None:
             case = replace(later, counterexample=found.run)
         else:
@@ -361,7 +368,7 @@ def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:
     for case in cases:
         for label in case.needed:
             owner = label.split(".")[0]
-            if label.startswith(("environment ", "initial ", "memory ")):
+            if label.startswith(("environment ", "initial ", "memory ", INVARIANT)):
                 continue
             if owner == condition.consumer and not label.endswith(" one step before"):
                 continue  # its own, and still assumed in the conclusion

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from avow.base.records import dataclass
+from avow.calculus.invariants import label
 from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused
@@ -92,6 +93,8 @@ class Finder:
     """What the engine could not prove."""
     goals: tuple[Statement, ...] = ()
     """Requirements, to be shown after everything else."""
+    lemmas: tuple[tuple[str, ...], ...] = ()
+    """Invariants that nobody wrote down, of which there are claims as well: to be shown before the goals."""
     solvers: Solvers = field(default_factory=Solvers)
     _proofs: dict[Item, _Proof] = field(default_factory=dict)
     _now: dict[str, Item] = field(default_factory=dict)
@@ -119,6 +122,7 @@ class Finder:
         found: list[Item] = []
         own = set(self.nodes)
         found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Kind.ENVIRONMENT]
+        found += [Item(How.SHOWN, s) for s in self.invariants()]
         for s in self.known.every:
             if s.kind is Kind.DEFINITION and (s.node in own or self.remembered(s)):
                 found.append(Item(How.DEFINED, s))
@@ -133,6 +137,11 @@ class Finder:
             elif s.kind is Kind.GUARANTEE:
                 found.append(Item(How.GUARANTEE, s))
         return found
+
+    def invariants(self) -> list[Statement]:
+        """The claims of the lemmas."""
+        wanted = set(map(label, self.lemmas))
+        return [s for s in self.known.every if s.kind is Kind.REQUIREMENT and s.name in wanted]
 
     def remembered(self, definition: Statement) -> bool:
         """Whether it is what is remembered for one of the goals."""
@@ -167,7 +176,9 @@ class Finder:
                     add(item for item in mine if item.how is How.GUARANTEE)
                     waiting.remove(name)
                     progress = True
-        add(item for goal in self.goals if self.shown(item := Item(How.SHOWN, goal), done))
+        for goal in (*self.invariants(), *self.goals):
+            if self.shown(item := Item(How.SHOWN, goal), done):
+                add([item])
         return done
 
     # -- one claim -----------------------------------------------------------------------------------------------------
@@ -321,7 +332,8 @@ class Finder:
 
     def certificate(self, order: Sequence[Item]) -> Certificate:
         ranks = {item: k for k, item in enumerate(order)}
-        return Certificate(self.scope, tuple(self.entry(item, self._proofs.get(item), ranks) for item in order))
+        entries = tuple(self.entry(item, self._proofs.get(item), ranks) for item in order)
+        return Certificate(self.scope, entries, self.lemmas)
 
     def entry(self, item: Item, proof: _Proof | None, ranks: Mapping[Item, int]) -> Entry:
         claim = item.claim

@@ -22,11 +22,12 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
-from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
+from avow.tuning.bounds import DEEPEST_INDUCTION
 from avow.tuning.effort import QUICK_EFFORT
 from avow.tuning.shown import STEP_VARIABLES
 
-_BEFORE = "@before"
+BEFORE = "@before"
+"""Ends the name of a value of the step before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,8 @@ class Deeper:
     steps: int = 0
     """Of the proof, how many steps before; of the run, its length."""
     engine: str = ""
+    by: tuple[str, ...] = ()
+    """An invariant that nobody wrote down, by which it is proved (`avow.calculus.invariants`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,7 @@ class Steps:
         if by == 0:
             return term
         changing = free_variables(term) - self.constant
-        return rename(term, {v: Variable(v.role, v.name + _BEFORE * by, v.sort) for v in changing})
+        return rename(term, {v: Variable(v.role, v.name + BEFORE * by, v.sort) for v in changing})
 
     def run(self, length: int) -> dict[str, Term]:
         """What is known of a run of so many steps from the initial values on."""
@@ -88,8 +91,8 @@ def steps(
     return Steps(ever, last, initial, claim, frozenset(constant))
 
 
-def deeper(asked: Steps, effort: int, seed: int = 0, claim_name: str = "the claim") -> Deeper:
-    """Unroll, and induct over more steps, in turn, with so much effort. The claim must have been
+def deeper(asked: Steps, effort: int, seed: int, claim_name: str, lengths: range) -> Deeper:
+    """Unroll to these lengths, and induct over more steps, in turn, with so much effort. The claim must have been
     proved at the first step."""
     end = until(effort)
     sure = 1  # so many steps from the beginning the claim is proved
@@ -98,7 +101,7 @@ def deeper(asked: Steps, effort: int, seed: int = 0, claim_name: str = "the clai
         left = effort_left(end)
         return implied(hypotheses, asked.claim, effort=min(QUICK_EFFORT, left), seed=seed) if left > 50 else None
 
-    for length in range(2, LONGEST_UNROLLING + 1):
+    for length in lengths:
         answer = ask(asked.run(length))
         if answer is None:
             return Deeper()
@@ -137,8 +140,8 @@ def _run(values: Mapping[Variable, Value], length: int, claim: str) -> Counterex
             if CELL in variable.name:
                 continue  # what is remembered follows from the steps before, which are shown
             base, times = variable.name, 0
-            while base.endswith(_BEFORE):
-                base, times = base.removesuffix(_BEFORE), times + 1
+            while base.endswith(BEFORE):
+                base, times = base.removesuffix(BEFORE), times + 1
             name = f"in.{base}" if variable.role is Role.INPUT else base
             fixed = isinstance(variable.sort, FunctionSort) and times == 0
             if times == earlier or (fixed and variable.role is Role.INPUT):

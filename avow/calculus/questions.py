@@ -14,6 +14,7 @@ from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideConditi
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
 from avow.calculus.existence import start_name
+from avow.calculus.invariants import INVARIANT, show
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.formulas.formula import negation
@@ -120,6 +121,8 @@ def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ..
             for c in settled.cases
         ],
     }
+    if by := [show(case.invariant) for case in settled.cases if case.invariant]:
+        details["invariants"] = by
     bad = next((case for case in settled.cases if case.verdict is not Verdict.PROVED), None)
     if settled.circle:
         shown = " → ".join((*settled.circle, settled.circle[0]))
@@ -157,7 +160,9 @@ def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
 def _why(settled: Settled) -> str:
     if settled.vacuous:
         return f"holds only because these contradict one another: {', '.join(settled.needed)}"
-    needed = ", ".join(settled.needed)
+    needed = ", ".join(label for label in settled.needed if not label.startswith(INVARIANT))
+    found = [show(case.invariant) for case in settled.cases if case.invariant]
+    needed += f"; by an invariant that was found: {' and '.join(found)}" if found else ""
     if settled.trivial and not settled.needed:
         return "holds by the types alone: no guarantee carries it"
     if settled.trivial:

@@ -19,7 +19,8 @@ from avow.calculus.derivation import Case, Phase, about_memory
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
-from avow.calculus.induction import deeper, steps
+from avow.calculus.induction import steps
+from avow.calculus.invariants import INVARIANT, Written, further, show
 from avow.calculus.model_checking import judge, refuting_run
 from avow.calculus.questions import Answer, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
@@ -30,7 +31,7 @@ from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
-from avow.tuning.effort import DEEPER_EFFORT, QUICK_EFFORT
+from avow.tuning.effort import QUICK_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,10 +145,11 @@ class FormulaQuestion:
         if later.verdict is not Verdict.REFUTED:
             return self.not_proved(later)
         asked = steps(frame, now, now, initial, goal)
-        more = deeper(asked, min(DEEPER_EFFORT, bounds.effort), bounds.seed, self.name)
+        more = further(frame, asked, bounds.effort, bounds.seed, self.name)
         if more.proved is not None:
-            further = Entailment(Verdict.PROVED, needed=more.proved, engine=more.engine)
-            return self.proved(composition, (first, further), Phase.LATER, bounds, more.steps)
+            kept = Entailment(Verdict.PROVED, needed=more.proved, engine=more.engine)
+            by = (more.by,) if more.by else ()
+            return self.proved(composition, (first, kept), Phase.LATER, bounds, more.steps, by)
         if more.run is not None:
             told = f"a run of {more.steps} steps makes {self.name} false"
             details: dict[str, object] = {"genuine": True, "run": more.steps}
@@ -179,26 +181,31 @@ class FormulaQuestion:
         phase: Phase,
         bounds: Bounds,
         before: int = 1,
+        by: tuple[Written, ...] = (),
     ) -> Answer:
-        """`before`: so many steps before were needed to prove the next."""
+        """`before`: so many steps before were needed to prove the next; `by`: invariants that nobody wrote down."""
         needed = tuple(dict.fromkeys(label for answer in answers for label in answer.needed))
         beyond = [n for n in _guarantees(composition.frame, needed) if n not in self.support and self.support]
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
         if before > 1:
             how = f"at the first {before} steps, and from each {before} steps to the next"
-        named = [label for label in needed if not about_memory(label)]
+        named = [label for label in needed if not about_memory(label) and not label.startswith(INVARIANT)]
         summary = f"follows {how} from {', '.join(named) or 'the types alone'}"
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
+        details: dict[str, object] = {"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {})
+        if by:
+            details["invariants"] = [*map(show, by)]
+            summary += f"; by an invariant that was found: {' and '.join(map(show, by))}"
         answer = Answer(
             Verdict.PROVED,
             summary,
-            details={"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {}),
+            details=details,
             vacuous=any(answer.vacuous for answer in answers),
         )
         cases = [Case(phase, one.verdict, one.needed) for one in answers]
         hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
-        found = composition.certificates.requirement(self.name, hint, bounds)
+        found = composition.certificates.requirement(self.name, hint, bounds, by)
         return certified(answer, found, late=composition.certificates.late)
 
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:

@@ -26,6 +26,7 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     from avow.base.workspace import system_folder
     from avow.calculus.certificate_json import from_json
     from avow.calculus.certificates import scope_of
+    from avow.calculus.invariants import with_lemmas
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
     from avow.kernel.certificate import How
@@ -36,7 +37,8 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
 
     claims = (How.SHOWN, How.POSSIBLE)
     system = load_path(path if path.is_dir() else system_folder(str(path)))
-    known = statements(wiring(frame(system)))
+    wired = wiring(frame(system))
+    known = statements(wired)
     names = {(s.node, s.digest): s.name for s in known.every}
     try:
         kept = json.loads(certificates.read_text())
@@ -60,13 +62,17 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
 
     with Both() as solvers:
         for scope, certificate in found.items():
-            shown = [entry for entry in certificate.entries if entry.how in claims and not entry.node]
+            every = known
+            if certificate.lemmas:
+                every = statements(with_lemmas(wired, system.contract, certificate.lemmas))
+            lemmas = {s.digest for s in every.every} - {s.digest for s in known.every}
+            shown = [e for e in certificate.entries if e.how in claims and not e.node and e.digest not in lemmas]
             unlike = certificate.scope != scope or any(scope not in scopes.get(e.digest, ()) for e in shown)
             if unlike or (certificate.entries and not shown and " " in scope):
                 refuse(scope, "", "its label is not that of the claims in it")
-            kernel = Kernel(known, certificate, solvers)
+            kernel = Kernel(every, certificate, solvers)
             for i, entry in enumerate(certificate.entries):
-                if entry.how not in claims:
+                if entry.how not in claims or entry.digest in lemmas:
                     continue
                 called = ".".join(part for part in (entry.node, names.get((entry.node, entry.digest), "?")) if part)
                 try:

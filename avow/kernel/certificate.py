@@ -1,7 +1,7 @@
-"""Certificates as data (`avow.calculus.certificate_json` reads and writes them).
+"""Certificates as data (`avow.calculus.certificate_json` reads and writes them). An entry's place is its rank.
 
-An entry's place is its rank. There is no formula and no hypothesis in it: claims are named by digest and looked up in
-the system as it is now, hypotheses are computed (`avow.kernel.check`).
+Claims are named by digest and looked up in the system as it is now, with the certificate's lemmas: claims that nobody
+asked for, any formula, to be shown like others. Hypotheses are computed (`avow.kernel.check`).
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """`scope`: the derivation that it was made for; a name for people."""
+    """`scope`: the derivation that it was made for, for people. `lemmas`: as `avow.calculus.invariants` writes them."""
 
     scope: str
     entries: tuple[Entry, ...]
+    lemmas: tuple[tuple[str, ...], ...] = field(default=(), metadata=codec.LATER)

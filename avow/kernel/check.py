@@ -72,20 +72,20 @@ class Kernel:
     solvers: Solvers
 
     def establish(self, goal: int, *, alone: bool = False) -> Established:
-        """The claim of an entry, on all that it rests on (`alone`: on what its questions name). Raises Refused."""
+        """The claim of an entry, on all that it rests on; `alone`: on its own questions and lemmas. Raises Refused."""
         entries, (answers, refused) = self.certificate.entries, self.checked
         if goal in refused or goal not in answers:
             raise refused.get(goal, Refused("there is no such entry"))
-        part, stack = {goal}, [goal]
-        while stack:
-            new = set(entries[stack.pop()].named()) - part
+        part, own = {goal}, [goal]
+        for i in own:  # which grows
+            new = set(entries[i].named()) - part
             part |= new
-            stack += () if alone else new
+            own += [j for j in new if not alone or self._claim(entries[j]).kind is Kind.REQUIREMENT]
         given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
         needed = {Needed(e.how, e.node, e.digest, tuple(sorted(entries[c].digest for c in e.conds))) for e in given}
         if self._claim(entries[goal]).kind is Kind.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
             raise Refused("a requirement rests on what only a derived contract may assume")
-        answered = [answer for i in ((goal,) if alone else part) for answer in answers[i]]
+        answered = [answer for i in own for answer in answers[i]]
         needed |= {Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for a in answered if (n := a.together)}
         told = [FORMAT, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
         return Established(

@@ -93,12 +93,12 @@ def remedy(
     return Remedy(found, weakest)
 
 
-_ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
+ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
 
 
 def eliminable(term: Term) -> bool:
     """Whether all the term's free variables have sorts that `remedy` can do something with."""
-    return all(isinstance(v.sort, _ELIMINABLE) for v in free_variables(term))
+    return all(isinstance(v.sort, ELIMINABLE) for v in free_variables(term))
 
 
 def eliminated(formula: Term) -> Term | None:
@@ -125,7 +125,7 @@ def _eliminate(formula: Term) -> Term | None:
     if charge(translator) > ELIMINATION_STEPS:  # it counts its steps, but keeps no limit
         return None
     free = {v.qualified: v for v in free_variables(formula)}
-    reader = _TermReader(translator, free)
+    reader = TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]
     return push_negations(disjunction(options))
 
@@ -154,7 +154,7 @@ def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, effort: 
     return disjunction(kept)
 
 
-class _TermReader:
+class TermReader:
     """Z3 expressions, back to terms. Raises Unsupported for what has no counterpart."""
 
     def __init__(self, translator: Translator, free: Mapping[str, Variable]) -> None:

@@ -37,6 +37,9 @@ PREMISES_TRIED = 6
 LONGEST_UNROLLING = 24
 """Steps unrolled from the initial values, at most: the time for deeper questions is mostly up before."""
 
+LONGEST_RUN = 200
+"""The same, where Spacer says that some run breaks the claim: it is worth to look for it."""
+
 STATES_CHECKED = 50_000
 """Kinds of steps looked at over one scenario, so that memory stays bounded; beyond it, a search is not exhaustive."""
 

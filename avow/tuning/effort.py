@@ -77,6 +77,10 @@ NARROW_EFFORT = 4_000
 """For the same question with fewer hypotheses, which is easier or hopeless: the last attempt, with all of them, has
 the whole limit."""
 
+INVARIANT_EFFORT = 1_500
+"""For Spacer, in each of its two ways, to find an invariant: most are found within 100, and where it goes on for ever,
+more does not help."""
+
 DEEPER_EFFORT = 4_000
 """For more steps, where one step of induction fails: beyond two or three steps, questions grow faster than what
 they prove."""

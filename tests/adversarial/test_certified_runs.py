@@ -38,7 +38,7 @@ def judged(folder: Path, seed: int, *, rich: bool = False) -> int:
     refuted = {f"R{k}" for k in range(2) if found[f"R{k}"].verdict is Verdict.REFUTED}
     shown = set[tuple[str, bool]]()
     for certificate in certificates.made.values():
-        kernel = Kernel(certificates.known, certificate, certificates.solvers)
+        kernel = Kernel(certificates.known_with(certificate.lemmas), certificate, certificates.solvers)
         for k, entry in enumerate(certificate.entries):
             same = certificates.known.by_digest.get(entry.digest, ())
             claims = [s for s in same if s.node == entry.node and s.kind in (Kind.ASSUMPTION, Kind.REQUIREMENT)]

@@ -149,3 +149,13 @@ STOPPER = """node stopper {
 def test_a_requirement_in_seconds(tmp_path: Path, formula: str, verdict: Verdict) -> None:
     found = required(tmp_path, LIDAR + STOPPER, formula)
     assert found.verdict is verdict, found.summary
+
+
+@pytest.mark.slow
+def test_two_deadlines_belong_together(tmp_path: Path) -> None:
+    """After two seconds of silence it stops within one, so three seconds from its beginning; by an invariant about two
+    ages."""
+    found = required(tmp_path, LIDAR + STOPPER, "lidar.silent -> within[3 s](stopper.stopped or not lidar.silent)")
+    assert found.verdict is Verdict.PROVED, found.summary
+    assert found.details["invariants"]
+    assert "certificate" in found.details

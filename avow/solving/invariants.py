@@ -1,0 +1,108 @@
+"""An invariant of a transition system, looked for by Z3's Spacer (Komuravelli, Gurfinkel and Chaki, 2016).
+
+What is found is a guess like any other: who uses it has to ask whether it holds first, is kept by every step, and
+implies what it was looked for. So whatever cannot be said to Spacer is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from avow.base.records import dataclass
+from avow.formulas.formula import free_variables
+from avow.formulas.negation_normal_form import push_negations
+from avow.language.sorts import BOOL, DataSort, TupleSort
+from avow.language.terms import TRUE, Apply, History, Index, Length, Quantified, Term, Variable, subterms
+from avow.solving.checking import put
+from avow.solving.quantifier_elimination import ELIMINABLE, TermReader
+from avow.solving.translation import Expr, Translator, Unsupported
+from avow.solving.z3_module import z3
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """`invariant`: over the variables after a step; None where none was found. `broken`: because there is a run at the
+    end of which the claim is false, as far as Spacer was told."""
+
+    invariant: Term | None = None
+    broken: bool = False
+
+
+def invariant(
+    begins: Sequence[Term],
+    goes_on: Sequence[Term],
+    last: Sequence[Term],
+    state: Mapping[Variable, Variable],
+    effort: int,
+) -> Found:
+    """What holds after every step, and excludes the `last` one. `state`: variables as a step finds them → as it leaves
+    them. `begins` and `goes_on` are what is known of a first step and of a later one, `last` of one that breaks the
+    claim. The answer is the same wherever it is asked: Spacer's steps bound it."""
+    kept = {
+        v: after
+        for v, after in sorted(state.items(), key=lambda item: item[1].qualified)
+        if isinstance(v.sort, ELIMINABLE)
+    }
+    if not kept or not all(map(_sayable, last)):
+        return Found()
+    # with global guidance over its lemmas it finds what it never ends on without, and the other way round
+    for guided in (True, False):
+        try:
+            found = _asked(begins, goes_on, last, kept, guided, effort)
+        except (Unsupported, z3.Z3Exception, RecursionError):
+            return Found()
+        if found is not None:
+            return found
+    return Found()
+
+
+def _asked(
+    begins: Sequence[Term],
+    goes_on: Sequence[Term],
+    last: Sequence[Term],
+    state: Mapping[Variable, Variable],
+    guided: bool,
+    effort: int,
+) -> Found | None:
+    translator = Translator()
+    solver = z3.SolverFor("HORN", ctx=translator.context)
+    solver.set("fp.spacer.global", guided)
+    sorts = [translator.sort(v.sort) for v in state]
+    holds = z3.Function("invariant", *sorts, translator.sort(BOOL))
+    before = holds(*map(translator.variable, state))
+    after = holds(*map(translator.variable, state.values()))
+    nothing = z3.BoolVal(False, ctx=translator.context)
+
+    def rule(premises: Iterable[Term], more: Sequence[Expr], conclusion: Expr) -> None:
+        said = [term for term in premises if _sayable(term)]
+        spoken = {*state, *state.values()}.union(*map(free_variables, said))
+        parts = [*map(translator.term, said), *translator.background(spoken), *more]
+        constants = [translator.variable(v) for v in sorted(spoken, key=lambda v: (v.qualified, repr(v.sort)))]
+        body = z3.And(*parts) if parts else z3.BoolVal(True, ctx=translator.context)
+        solver.add(z3.ForAll(constants, z3.Implies(body, conclusion)))
+
+    rule(begins, [], after)
+    rule(goes_on, [before], after)
+    rule(last, [before], nothing)
+    said = put(translator, solver, effort, None)
+    if said.status == "unsat":
+        return Found(broken=True)
+    if said.status != "sat":
+        return None
+    meaning = solver.model()[holds]
+    if meaning is None or meaning.num_entries() > 0:
+        return None
+    body = z3.substitute_vars(meaning.else_value(), *map(translator.variable, state.values()))
+    found = TermReader(translator, {v.qualified: v for v in state.values()}).formula(body)
+    found = push_negations(found)
+    return Found(found) if found != TRUE else None
+
+
+def _sayable(term: Term) -> bool:
+    """Whether it has no quantifier, and no function or sequence in it."""
+    unsaid = (Quantified, Apply, Index, Length, History)
+    return all(map(_sayable_sort, free_variables(term))) and not any(isinstance(t, unsaid) for t in subterms(term))
+
+
+def _sayable_sort(variable: Variable) -> bool:
+    return isinstance(variable.sort, (*ELIMINABLE, DataSort, TupleSort))
