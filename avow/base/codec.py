@@ -31,7 +31,11 @@ class Unreadable(Exception):  # noqa: N818 - it says what the text is
 
 def canonical(value: object) -> str:
     """The one JSON text of a plain value: ASCII, sorted keys, no spaces."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return _CANONICAL.encode(value)
+
+
+_CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+"""Made once: `json.dumps` makes one for each call that asks for anything but its defaults."""
 
 
 def plain(value: object) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from avow.base.remembered import by_identity
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
@@ -133,6 +134,12 @@ class Composition:
             whole = next(complete, self.goals[-1])
             self._whole = whole, frozenset(condition.about for condition in whole.conditions)
         return self._whole
+
+
+@by_identity(2)
+def composed(system: System) -> Composition:
+    """As `compose`, once for a system: for those who read it and settle nothing."""
+    return compose(system)
 
 
 def compose(system: System) -> Composition:

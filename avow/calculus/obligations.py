@@ -17,7 +17,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Outcome
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
-from avow.calculus.composition import Composition, argument, asked, compose
+from avow.calculus.composition import Composition, argument, asked, compose, composed
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
 from avow.calculus.existence import circles, joined, loops, start_name
@@ -57,13 +57,13 @@ class Task:
 
 def composition_obligations(system: System) -> tuple[Obligation, ...]:
     """Every composition obligation of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
-    return tuple(task.obligation for task in _tasks(compose(system)))
+    return tuple(task.obligation for task in _tasks(composed(system)))
 
 
 def requirement_obligations(system: System) -> tuple[Obligation, ...]:
     """An obligation for each requirement that has a formula or a temporal property; one in prose has none: it is
     linked, and the assurance case shows it as linked. Raises Rejected for a formula that is wrong."""
-    return tuple(task.obligation for task in _requirements(compose(system)))
+    return tuple(task.obligation for task in _requirements(composed(system)))
 
 
 def all_obligations(composition: Composition) -> tuple[Obligation, ...]:

@@ -29,6 +29,9 @@ class Garbled(ValueError):  # noqa: N818 - it says what they are
     """Bytes that are not those of any value."""
 
 
+_ROW = json.JSONEncoder(sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+
+
 def encode(value: object, root: Path) -> bytes:
     """Raises TypeError for what is no data of Avow's. `root` is the system's folder."""
     table: dict[str, int] = {}
@@ -44,7 +47,7 @@ def encode(value: object, root: Path) -> bytes:
             stack.append((current, True))
             stack.extend((child, False) for child in _children(current))
             continue
-        text = json.dumps(_entry(current, known, root), sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+        text = _ROW.encode(_entry(current, known, root))
         known[id(current)] = table.setdefault(text, len(table))
         kept.append(current)
     head = json.dumps(_reference(value, known))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from avow.assurance.model import Derivation, SideCondition
-from avow.calculus.composition import compose
+from avow.calculus.composition import composed
 from avow.calculus.notation import Written, write_goal
 from avow.calculus.obligations import composition_obligations
 from avow.calculus.resting import discharged_by
@@ -15,12 +15,12 @@ from avow.system.plan import System
 
 def derivation_views(system: System) -> tuple[Derivation, ...]:
     """One for each goal of the plan, the whole system's last; with the rule instances that they are made of."""
-    return tuple(_view(system, write_goal(goal)) for goal in compose(system).goals)
+    return tuple(_view(system, write_goal(goal)) for goal in composed(system).goals)
 
 
 def discharging(system: System) -> dict[str, tuple[str, ...]]:
     """Of each node the obligations (without the system) that settle its assumptions."""
-    composition = compose(system)
+    composition = composed(system)
     found = discharged_by(composition, composition_obligations(system))
     return {node: tuple(hypothesis.name for hypothesis in behind) for node, behind in found.items()}
 

@@ -314,9 +314,9 @@ class Catalogue:
 def catalogue(system: System, offered: Offered = None) -> Catalogue:
     """`offered`: as `method_work` has it. Raises Rejected for an unknown backend, and where the plan's formulas are
     wrong."""
-    from avow.calculus.composition import compose
+    from avow.calculus.composition import composed
 
-    composition = compose(system)
+    composition = composed(system)
     texts = texts_digest(system)
     works = (
         language_work(system),
