@@ -120,7 +120,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                             "the files are what the slice gives", partial(exporting.is_current, workspace, work, key)
                         )
                     ],
-                    "clean": [partial(exporting.clean, workspace, work)],
+                    "clean": [_Cleaned("what was generated", partial(exporting.clean, workspace, work))],
                     **said(work.files, (exporting.folder(workspace, work),)),
                 }
         yield {
@@ -129,7 +129,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             "actions": [_discharge(state, work)],
             "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
             "uptodate": [_settled(state, work)],
-            "clean": [partial(print, f"{title}: evidence is appended to the ledger and never removed")],
+            "clean": [_Cleaned("nothing", partial(_clean_nothing, title))],
             **said(work.files, ledger),
         }
         done.append(f"{basename}:{title}")
@@ -152,8 +152,8 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "actions": [partial(_act, partial(report, assessment))],
         "task_dep": [check],
         # of the ledger as it stands: `doit report` runs no tool; `verify` renders once all evidence is in
-        "uptodate": [False],
-        "clean": [partial(_clean_reports, workspace, name)],
+        "uptodate": [_NEVER],
+        "clean": [_Cleaned("its reports", partial(_clean_reports, workspace, name))],
         **said(ledger, (reports,)),
     }
     yield {
@@ -162,7 +162,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "actions": [partial(_act, partial(certify, assessment))],
         "task_dep": [*done, f"obligations:{name}"],
         # whoever asks is told what was established in this run, not in an earlier one
-        "uptodate": [False],
+        "uptodate": [_NEVER],
         **said(ledger, ()),
     }
     yield {
@@ -171,8 +171,8 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "doc": surveyed.system.plan.title,
         "actions": [partial(gate, assessment)],
         "task_dep": [f"certify:{name}"],
-        "uptodate": [False],
-        "clean": [partial(_clean_reports, workspace, name)],
+        "uptodate": [_NEVER],
+        "clean": [_Cleaned("its reports", partial(_clean_reports, workspace, name))],
         **said(ledger, (reports,)),
     }
 
@@ -189,6 +189,27 @@ class _Asked:
 
     def __repr__(self) -> str:
         return self.words
+
+
+_NEVER = _Asked("it is done in every run that finds something to do", lambda: False)
+
+
+@dataclass(frozen=True, slots=True)
+class _Cleaned:
+    """What `doit clean` does, with words for its line."""
+
+    words: str
+    act: Callable[[bool], None]
+
+    def __call__(self, dryrun: bool) -> None:
+        self.act(dryrun)
+
+    def __repr__(self) -> str:
+        return f" {self.words}"  # doit leaves out the first character
+
+
+def _clean_nothing(title: str, dryrun: bool) -> None:
+    print(f"{title}: evidence is appended to the ledger and never removed")
 
 
 @dataclass(frozen=True, slots=True)

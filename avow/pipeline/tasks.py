@@ -40,12 +40,11 @@ class Pipeline:
         gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
-        if asked[:1] == ["forget"]:
-            print(
-                "doit keeps no memory here that could be forgotten: the ledger says what is settled.", file=sys.stderr
-            )
+        if asked and asked[0] in _OF_MEMORY:
+            print(f"doit keeps no memory here for `{asked[0]}`: the ledger says what is settled.", file=sys.stderr)
             print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
             raise SystemExit(2)
+        self._shown = asked[1:] if asked[:1] == ["info"] else ()
         self._state = State(Workspace(root), new_run(elsewhere), answer=answer)
         self._wanted = wanted(asked)
 
@@ -84,7 +83,18 @@ class Pipeline:
         if any(name.partition(":")[0] not in ("report", "check") for name in self._wanted) or not self._wanted:
             trust_plugins()
 
-        yield from stages(state)
+        known = set()
+        for task in stages(state):
+            known |= {task["basename"], f"{task['basename']}:{task['name']}"}
+            yield task
+        for name in self._shown:
+            if not name.startswith("-") and name not in known:
+                print(f"error: there is no task {name}; `doit list --all` shows them", file=sys.stderr)
+                raise SystemExit(2)
+
+
+_OF_MEMORY = ("forget", "ignore", "reset-dep", "dumpdb")
+"""doit's verbs that are about its own memory of what was done."""
 
 
 def _runs(asked: Sequence[str]) -> bool:

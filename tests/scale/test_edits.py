@@ -17,7 +17,7 @@ from .made import programs
 
 ROOT = Path(__file__).parents[2]
 
-pytestmark = pytest.mark.nightly
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +70,8 @@ def test_info_shows_inputs_and_targets(place: Path) -> None:
     assert "up-to-date" in told
     assert "contracts/made/models/n0.imp" in told
     assert "artifacts/ledger/made.jsonl" in told
+    assert "in every run" in doit(place, "info", "verify:made", code=1)
+    assert "no task nothing" in doit(place, "info", "nothing", code=2)
 
 
 def test_clean_removes_what_is_made_again_and_no_evidence(place: Path) -> None:
@@ -88,5 +90,6 @@ def test_clean_removes_what_is_made_again_and_no_evidence(place: Path) -> None:
     assert (place / "reports" / "made" / "index.html").is_file()
 
 
-def test_forget_says_why_not(place: Path) -> None:
-    assert "avow verify --fresh" in doit(place, "forget", code=2)
+@pytest.mark.parametrize("verb", ["forget", "ignore"])
+def test_what_is_about_doits_memory_says_why_not(place: Path, verb: str) -> None:
+    assert "avow verify --fresh" in doit(place, verb, code=2)
