@@ -7,6 +7,8 @@ Times and dates are texts in ISO 8601; paths are relative to the workspace; ever
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
@@ -160,7 +162,7 @@ class Suggestion:
     cost: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True)  # without slots: it keeps what counts, which every format asks for
 class ObligationView:
     """One obligation with all that is known of it."""
 
@@ -191,7 +193,7 @@ class ObligationView:
         """Whether it is a claim whose failing is worth knowing, but makes nothing unsound."""
         return is_advice(self.obligation)
 
-    @property
+    @functools.cached_property
     def counting(self) -> tuple[EvidenceView, ...]:
         return tuple(view for view in self.evidence if view.counts)
 

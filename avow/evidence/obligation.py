@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from dataclasses import field
 from enum import StrEnum
 
 from avow.base.diagnostics import Span
-from avow.base.records import dataclass
 
 
 class Kind(StrEnum):
@@ -32,7 +33,7 @@ SYSTEM_LEVEL = "system"
 """Stands in an id where an obligation belongs to no single node."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True)  # without slots: it keeps its name, which is asked for very often
 class Obligation:
     """One claim. Pure data.
 
@@ -55,12 +56,10 @@ class Obligation:
     advisory: bool = False
     """Worth knowing, but nothing is unsound if the claim is false: no gate asks for it."""
 
-    @property
+    @functools.cached_property
     def id(self) -> str:
         """``system/node/kind/name``: for people, stable under edits of the formula."""
-        return (
-            f"{self.system}/{self.node}/{self.kind._value_}/{self.name}"  # asked very often: an enum's format is slow
-        )
+        return f"{self.system}/{self.node}/{self.kind}/{self.name}"
 
     @property
     def local_id(self) -> str:
