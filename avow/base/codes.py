@@ -296,6 +296,12 @@ _SORTS = (
         "guarantee(mod(in.count, in.count) == 0)",
     ),
     Code(
+        "RCL312",
+        "no such field",
+        "Only records have fields, `[x : REAL, y : REAL]`, and those that their type names.",
+        "guarantee(in.level.x > 1)",
+    ),
+    Code(
         "RCL320",
         "length of time without a unit",
         "A limit says whether it counts steps or seconds: `[5 steps]`, `[200 ms]`; a REAL that is not written down is "

@@ -292,7 +292,7 @@ def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
         case FunctionSort():
             return FunctionSort(tuple(_mapped(p, mapping) for p in sort.parameters), _mapped(sort.result, mapping))
         case TupleSort():
-            return TupleSort(tuple(_mapped(item, mapping) for item in sort.items))
+            return TupleSort(tuple(_mapped(item, mapping) for item in sort.items), sort.labels)
         case SequenceSort():
             return SequenceSort(_mapped(sort.item, mapping))
         case _:  # a sort without parts

@@ -39,6 +39,7 @@ from avow.language.terms import (
     Implies,
     In,
     Index,
+    Item,
     Length,
     Literal,
     Negative,
@@ -185,6 +186,9 @@ class Compiler:
                 return self._apply(term)
             case Index():
                 return self._index(term)
+            case Item(record=record, position=position):
+                inner = self.code(record)
+                return lambda env: inner(env)[position]
             case Length(sequence=sequence):
                 inner = self.code(sequence)
                 return lambda env: len(inner(env).items)

@@ -47,6 +47,7 @@ from avow.language.terms import (
     Implies,
     In,
     Index,
+    Item,
     Length,
     Literal,
     Negative,
@@ -229,7 +230,7 @@ def sort_digest(sort: Sort) -> str:
         case FunctionSort(parameters=parameters, result=result):
             return _hash("function", *map(sort_digest, parameters), sort_digest(result))
         case TupleSort(items=items):
-            return _hash("tuple", *map(sort_digest, items))
+            return _hash("tuple", *map(sort_digest, items), *(f"label {name}" for name in sort.labels))
         case SequenceSort(item=item):
             return _hash("sequence", sort_digest(item))
         case SetSort(item=item):
@@ -400,6 +401,8 @@ def _head(term: Term) -> tuple[str, ...]:
             return ("compare", operator)
         case Quantified(quantifier=quantifier, variables=variables):
             return (quantifier, *(sort_digest(v.sort) for v in variables))
+        case Item(position=position):
+            return ("item", str(position))
         case SequenceTerm(sort=sort) | SequenceRange(sort=sort) | SetTerm(sort=sort) | TupleTerm(sort=sort):
             return (type(term).__name__, sort_digest(sort))
         case Operation(operator=operator, sort=sort):

@@ -151,15 +151,15 @@ class Text:
                 return self.name(term, bound)
             case t.Apply(function=t.Variable() as function, arguments=arguments):
                 return application(self.name(function, bound), [self.say(a, bound) for a in arguments])
-            case t.Construct(constructor=name, arguments=arguments, sort=sort):
-                return form(field(self.sort(sort), name), arguments)
-            case t.TupleTerm(items=items, sort=sort):
-                return form(field(self.sort(sort), "of"), items)
+            case t.Construct(sort=sort) | t.TupleTerm(sort=sort):
+                constructor = term.constructor if isinstance(term, t.Construct) else "of"
+                return form(field(self.sort(sort), constructor), term.children)
+            case t.Item(record=record, position=position):
+                return form(field(field(self.sort(record.sort), "of"), position), (record,))
             case t.And(items=()) | t.Or(items=()):
                 return "true" if isinstance(term, t.And) else "false"
             case t.Compare(operator="==" | "!=" as operator, left=left, right=right):
-                equal = self.same(left, right, bound)
-                return equal if operator == "==" else f"(not {equal})"
+                return ("{}" if operator == "==" else "(not {})").format(self.same(left, right, bound))
             case t.Compare(operator=head) | t.Arithmetic(operator=head):
                 return form(head, term.children)
             case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD | t.Builtin.DIV as head, arguments=arguments):

@@ -6,7 +6,6 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Span
 from avow.language.check_base import Base, count
-from avow.language.contract import Port
 from avow.language.environment import did_you_mean
 from avow.language.foreign import FIELDS, FOREIGN_NAMES
 from avow.language.lexer import KEYWORDS, unquote
@@ -25,6 +24,7 @@ from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, Te
 from avow.language.terms import (
     Construct,
     EnumValue,
+    Item,
     Literal,
     Role,
     Term,
@@ -151,6 +151,25 @@ class Names(Base):
             hint = f"`{name}` is an element of a type: write `{name}` alone"
         self.error("RCL203", f"{scope.named} has no {words[role]} `{name}`", tree, hint=hint)
 
+    def field(self, record: Term | None, name: str, tree: Syntax) -> Term | None:
+        """``p.x`` of a record."""
+        if record is None:
+            return None
+        sort = record.sort
+        if isinstance(sort, TupleSort) and name in sort.labels:
+            position = sort.labels.index(name)
+            return Item(record, position, sort.items[position], self.span(tree)).rebuild((record,))
+        labels = sort.labels if isinstance(sort, TupleSort) else ()
+        hint = did_you_mean(name, labels) or f"its fields are {', '.join(labels)}" if labels else FIELDS
+        shown = self.text(tree).removesuffix(f".{name}")
+        if name in ("length", "size", "len", "count"):
+            hint = f"write `length({shown})`"
+        elif isinstance(sort, TupleSort) and not labels:
+            way = f"`exists(a, b in REAL | {shown} == (a, b) and …)`"
+            hint = f"take a tuple apart by its items, {way}, or make it a record"
+        self.error("RCL312", f"a value of type {show_sort(sort)} has no field `{name}`", tree, hint=hint)
+        return None
+
     def elsewhere(self, before: str, name: str, tree: Syntax) -> None:
         """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""
         scope = self.scope
@@ -159,26 +178,21 @@ class Names(Base):
         message = f"`{before}.{name}` has no meaning inside a node"
         if word is not None:
             hint = f"write `{word}.{name}`"
-        elif scope.taken(before) is not None:
-            message = f"RCL has no fields, and no `{before}.{name}`"
-            hint = FIELDS
-            if name in scope.environment.elements or name in scope.environment.constants:
-                hint = f"write `{name}` alone"
-            elif name in ("length", "size", "len", "count"):
-                hint = f"write `length({before})`"
-            elif before in scope.bound or any(isinstance(p.sort, TupleSort) for p in self.ports_named(before)):
-                hint = f"take a tuple apart by its items: `exists(a, b in REAL | {before} == (a, b) and …)`"
+        elif scope.environment.sort(before) is not None:
+            declared = name in scope.environment.elements or name in scope.environment.constants
+            message, hint = f"`{before}` is a type and has no fields", f"write `{name}` alone" if declared else FIELDS
         else:
             hint = f"write {' or '.join(f'`{o}`' for o in own) or f'`in.{name}` or `out.{name}`'}"
             hint += ": a contract speaks of its own inputs and outputs only"
         self.error("RCL205", message, tree, hint=hint)
 
-    def ports_named(self, name: str) -> list[Port]:
-        return [self.scope.ports(r)[name] for r in (Role.INPUT, Role.OUTPUT) if name in self.scope.ports(r)]
-
     def node_port(self, tree: NodePort) -> Term | None:
         node_name, role_text, name = tree.node, tree.role, tree.name
         scope = self.scope
+        bare = Name(tree.start, tree.start + len(node_name), 1, node_name)
+        known = scope.taken(node_name) is not None and scope.environment.sort(node_name) is None
+        if role_text is None and node_name not in scope.nodes and known:
+            return self.field(self.term(bare), name, tree)
         if not scope.nodes:
             self.elsewhere(node_name, name, tree)
             return None

@@ -34,6 +34,7 @@ from avow.language.syntax import (
     Calculation,
     Comparison,
     Connective,
+    FieldOf,
     IfThenElse,
     Lasting,
     Limited,
@@ -81,6 +82,8 @@ class Checker(Definitions):
                 return self.port(Role(role), name, tree)
             case Name():
                 return self.name(tree, expected)
+            case FieldOf(body=body, name=name):
+                return self.field(self.term(body), name.text, tree)
             case Parentheses(body=body):
                 return self.term(body, expected)
             case Comparison():

@@ -29,7 +29,7 @@ def alike(left: Sort, right: Sort) -> bool:
         return True
     match left, right:
         case TupleSort(items=a), TupleSort(items=b):
-            return len(a) == len(b) and all(map(alike, a, b))
+            return left.labels == right.labels and len(a) == len(b) and all(map(alike, a, b))
         case SequenceSort(item=a_), SequenceSort(item=b_):
             return alike(a_, b_)
     return False
@@ -41,7 +41,7 @@ def fits(sort: Sort, wanted: Sort) -> bool:
         return True
     match sort, wanted:
         case TupleSort(items=a), TupleSort(items=b):
-            return len(a) == len(b) and all(map(fits, a, b))
+            return sort.labels == wanted.labels and len(a) == len(b) and all(map(fits, a, b))
         case SequenceSort(item=a_), SequenceSort(item=b_):
             return fits(a_, b_)
     return False
@@ -63,11 +63,11 @@ def convert(term: Term, wanted: Sort) -> Term | None:
     if wanted == REAL and isinstance(term.sort, WHOLE):
         return widen(term)
     match term, wanted:
-        case TupleTerm(items=items), TupleSort(items=sorts) if len(items) == len(sorts):
+        case TupleTerm(items=items), TupleSort(items=sorts) if _as_record(term.sort, wanted):
             made = [convert(i, s) for i, s in zip(items, sorts, strict=True)]
             if all(m is not None for m in made):
                 kept = tuple(m for m in made if m is not None)
-                return replace(term, items=kept, sort=TupleSort(tuple(m.sort for m in kept)))
+                return replace(term, items=kept, sort=TupleSort(tuple(m.sort for m in kept), wanted.labels))
         case Conditional(then=then, otherwise=otherwise), _:
             one, other = convert(then, wanted), convert(otherwise, wanted)
             if one is not None and other is not None:
@@ -80,6 +80,13 @@ def convert(term: Term, wanted: Sort) -> Term | None:
     return None
 
 
+def _as_record(sort: Sort, wanted: Sort) -> bool:
+    """Whether a tuple that is written down may stand for one of that sort: a record's items stand in their order."""
+    if not isinstance(sort, TupleSort) or not isinstance(wanted, TupleSort):
+        return False
+    return len(sort.items) == len(wanted.items) and sort.labels in ((), wanted.labels)
+
+
 def widest(left: Sort, right: Sort) -> Sort | None:
     """The sort in which both have a place, if there is one."""
     if left == right:
@@ -87,9 +94,13 @@ def widest(left: Sort, right: Sort) -> Sort | None:
     if isinstance(left, NUMERIC) and isinstance(right, NUMERIC):
         return REAL if REAL in (left, right) else INTEGER
     match left, right:
-        case TupleSort(items=a), TupleSort(items=b) if len(a) == len(b):
+        case TupleSort(items=a), TupleSort(items=b) if _as_record(left, right) or _as_record(right, left):
             items = [widest(x, y) for x, y in zip(a, b, strict=True)]
-            return None if None in items else TupleSort(tuple(i for i in items if i is not None))
+            return (
+                None
+                if None in items
+                else TupleSort(tuple(i for i in items if i is not None), left.labels or right.labels)
+            )
         case SequenceSort(item=a_), SequenceSort(item=b_):
             item = widest(a_, b_)
             return None if item is None else SequenceSort(item)
@@ -122,7 +133,7 @@ def _join(left: Sort, right: Sort) -> Sort:
         return left
     match left, right:
         case TupleSort(items=a), TupleSort(items=b):
-            return TupleSort(tuple(map(_join, a, b)))
+            return TupleSort(tuple(map(_join, a, b)), left.labels)
         case SequenceSort(item=a_), SequenceSort(item=b_):
             return SequenceSort(_join(a_, b_))
     return INTEGER

@@ -41,8 +41,11 @@ from avow.language.syntax import (
     FunctionType,
     Name,
     NamedType,
+    NodePort,
+    PortDeclaration,
     PortName,
     ProductType,
+    RecordType,
     SequenceType,
     SetDisplay,
     SetType,
@@ -202,9 +205,10 @@ class Declarations:
             for part in walk(tree.body) if tree is not None else ():
                 if isinstance(part, PortName):
                     return True
-                if isinstance(part, Name) and part.text in self.definitions and part.text not in seen:
-                    seen.add(part.text)
-                    waiting.append(part.text)
+                text = part.text if isinstance(part, Name) else part.node if isinstance(part, NodePort) else ""
+                if text in self.definitions and text not in seen:
+                    seen.add(text)
+                    waiting.append(text)
         return False
 
     # --- constants ---------------------------------------------------------------------------------------------------
@@ -284,6 +288,8 @@ class Declarations:
                 return self.type_of(only, reports, name)
             case TupleType(items=items):
                 return _tuple_sort([self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(items)])
+            case RecordType(fields=fields):
+                return self.record(fields, reports, name)
             case SequenceType(item=of):
                 item = self.type_of(of, reports, f"{name}_item")
                 return None if item is None else SequenceSort(item)
@@ -293,6 +299,26 @@ class Declarations:
                 return self.function(tree, reports, name)
             case _:
                 assert_never(tree)
+
+    def record(self, fields: Sequence[PortDeclaration], reports: Reports, name: str) -> Sort | None:
+        sound, seen = True, dict[str, Span]()
+        for part in fields:
+            label = part.name
+            if label.text in seen:
+                notes: tuple[tuple[str, Span | None], ...] = (("the first is here", seen[label.text]),)
+                reports.error("RCL214", f"two fields `{label.text}`", label.start, label.end, notes=notes)
+                sound = False
+            seen[label.text] = reports.source.span(label.start, label.end)
+        items = [self.type_of(part.type, reports, f"{name}_{part.name.text}") for part in fields]
+        for part, item in zip(fields, items, strict=True):
+            if isinstance(item, FunctionSort):
+                message = "a field is a value, not a function"
+                reports.error("RCL310", message, part.type.start, part.type.end, hint="make it an input of its own")
+                sound = False
+        kept = tuple(i for i in items if i is not None)
+        declared = self.declared.get(name)
+        own = name if declared is not None and declared.state == "open" else ""
+        return TupleSort(kept, tuple(seen), own) if sound and len(kept) == len(items) else None
 
     def named(self, tree: NamedType, reports: Reports) -> Sort | None:
         name = tree.text
@@ -434,6 +460,8 @@ def _names(tree: Syntax) -> set[str]:
     for part in walk(tree):
         if isinstance(part, Name | NamedType):
             found.add(part.text)
+        elif isinstance(part, NodePort):
+            found.add(part.node)
         elif isinstance(part, Element):
             found.add(part.name.text)
         elif isinstance(part, Binder):

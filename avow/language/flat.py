@@ -17,6 +17,7 @@ from avow.language.syntax import (
     ConstantDeclaration,
     Define,
     Element,
+    FieldOf,
     FunctionType,
     IfThenElse,
     Lasting,
@@ -37,6 +38,7 @@ from avow.language.syntax import (
     Quantification,
     Quantity,
     RangeDisplay,
+    RecordType,
     RosType,
     SequenceDisplay,
     SequenceType,
@@ -80,6 +82,10 @@ def flat(tree: Syntax) -> str:
             return f"{role}.{name}"
         case NodePort(node=node, role=said, name=name):
             return f"{node}.{name}" if said is None else f"{node}.{said}.{name}"
+        case FieldOf(body=body, name=token):
+            return f"{flat(body)}.{token.text}"
+        case RecordType(fields=parts):
+            return f"[{_listed(parts)}]"
         case Parentheses(body=body):
             return f"({flat(body)})"
         case TupleDisplay(items=parts) | TupleType(items=parts):

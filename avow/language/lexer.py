@@ -93,6 +93,7 @@ _PATTERN = re.compile(
     r"|(?P<junk>.)",
     re.DOTALL,
 )
+_RECORD = re.compile(r"\s*[A-Za-z_][A-Za-z0-9_']*\s*(?:,\s*[A-Za-z_][A-Za-z0-9_']*\s*)*:(?!=)")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
@@ -241,6 +242,10 @@ class _Other:
                 self.found.append(Token(kind, sign, start, end))
             elif kind:
                 self.stand_in((kind, sign), start, end)
+            return
+        if piece == "[" and _RECORD.match(text, end):
+            self.square.append(("RSQUARE", "]"))
+            self.found.append(Token("LSQUARE", "[", start, end))
             return
         hint, opening, closing = "write sets as `{a, b}` and sequences as `<a, b>`", "", ("", "")
         before = self.found[-1] if self.found and piece == "[" else Token("", "", -1, -1)

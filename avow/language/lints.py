@@ -22,7 +22,7 @@ from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.spelling import similar
-from avow.language.syntax import Define, Name, Syntax, walk
+from avow.language.syntax import Define, Name, NodePort, Syntax, walk
 from avow.language.terms import (
     TRUE,
     And,
@@ -181,7 +181,9 @@ def _defined_in_vain(files: Sequence[LintedFile]) -> Iterator[Diagnostic]:
 
 
 def _spoken(tree: Syntax) -> set[str]:
-    return {part.text for part in walk(tree) if isinstance(part, Name)}
+    parts = list(walk(tree))
+    heads = {part.node for part in parts if isinstance(part, NodePort)}  # `p.x` of a record
+    return heads | {part.text for part in parts if isinstance(part, Name)}
 
 
 # --- about a node ----------------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from avow.language.source import Reports
 from avow.language.syntax import Declaration, Define, PortList, TermSyntax, TopicList
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
+_NESTED = {**_OPEN, "LSQUARE": "RSQUARE"}
 _CLOSE = frozenset(_OPEN.values())
 _TOP = frozenset(("CONTEXT", "NODE"))
 _SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "DEFINE", "ASSUME", "GUARANTEE"))
@@ -221,9 +222,9 @@ class _OutlineReader:
                     self.at -= 1  # the name before belongs to the next declaration
                     break
                 relation = True
-            if kind in _OPEN:
-                stack.append(_OPEN[kind])
-            elif kind in _CLOSE and stack:
+            if kind in _NESTED:
+                stack.append(_NESTED[kind])
+            elif kind in _NESTED.values() and stack:
                 stack.pop()
             self.at += 1
         if self.at == first:  # a keyword where a declaration should begin

@@ -26,6 +26,7 @@ from avow.language.syntax import (
     Declaration,
     Define,
     Element,
+    FieldOf,
     FunctionType,
     IfThenElse,
     Lasting,
@@ -46,6 +47,7 @@ from avow.language.syntax import (
     Quantification,
     Quantity,
     RangeDisplay,
+    RecordType,
     RosType,
     SequenceDisplay,
     SequenceType,
@@ -302,6 +304,10 @@ class _Build:
     def sequence_type(self, c: list[Any]) -> SequenceType:
         return SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
 
+    def record_type(self, c: list[Any]) -> RecordType:
+        fields = tuple(port for group in c[1:-1:2] for port in group)
+        return RecordType(c[0].start, c[-1].end, _deepest(fields), fields)
+
     def plain_element(self, c: list[Any]) -> Element:
         return Element(c[0].start, c[0].end, 1, c[0], ())
 
@@ -364,6 +370,9 @@ class _Build:
     def node_port(self, c: list[Any]) -> NodePort:
         role = c[2].text if len(c) == 5 else None
         return NodePort(c[0].start, c[-1].end, 1, c[0].text, role, c[-1].text)
+
+    def field(self, c: list[Any]) -> FieldOf:
+        return FieldOf(c[0].start, c[2].end, c[0].depth + 1, c[0], c[2])
 
     def parenthesised(self, c: list[Any]) -> Parentheses:
         inner = c[1].body if type(c[1]) is Parentheses else c[1]

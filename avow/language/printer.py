@@ -5,6 +5,7 @@ Printing in the style ``rcl`` and reading that again gives the equal term (tests
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import assert_never
 
@@ -41,6 +42,7 @@ from avow.language.terms import (
     Implies,
     In,
     Index,
+    Item,
     Length,
     Limit,
     Literal,
@@ -80,6 +82,11 @@ def show_sort(sort: Sort, style: StyleName = "rcl") -> str:
         case FunctionSort(parameters=parameters, result=result):
             left = chosen.times.join(_in_product(p, style) for p in parameters)
             return f"{left}{chosen.arrow}{_in_product(result, style)}"
+        case TupleSort(name=name) if name:
+            return chosen.name(name)
+        case TupleSort(items=items, labels=labels) if labels:
+            pairs = zip(labels, items, strict=True)
+            return f"[{', '.join(f'{chosen.name(label)} : {show_sort(i, style)}' for label, i in pairs)}]"
         case TupleSort(items=items):
             return f"({', '.join(show_sort(i, style) for i in items)})"
         case SequenceSort(item=item):
@@ -102,6 +109,8 @@ def show_type(sort: Sort, style: StyleName = "rcl") -> str:
             return chosen.braces(", ".join(shown))
         case OpaqueSort():
             return chosen.unspecified
+        case TupleSort(name=name) if name:
+            return show_sort(replace(sort, name=""), style)
         case _:  # written out anyway
             return show_sort(sort, style)
 
@@ -149,6 +158,9 @@ class _Printer:
                 return self.call(self.show(function, ATOM), arguments, parameters), ATOM
             case Index(sequence=sequence, index=index):
                 return self.call(self.show(sequence, ATOM), (index,), ()), ATOM
+            case Item(record=record, position=position):
+                labels = record.sort.labels if isinstance(record.sort, TupleSort) else ()
+                return f"{self.show(record, ATOM)}.{self.style.name(labels[position])}", ATOM
             case Length(sequence=sequence):
                 return f"{self.style.name('length')}({self.show(sequence, _LOOSEST)})", ATOM
             case Arithmetic():

@@ -7,6 +7,7 @@ A declared name is a name for a sort; sets of names become `EnumSort`, sets of c
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import field
 
 from avow.base.records import dataclass
 
@@ -80,9 +81,12 @@ class FunctionSort:
 
 @dataclass(frozen=True, slots=True)
 class TupleSort:
-    """``(REAL, REAL)``."""
+    """``(REAL, REAL)``, or with names for its items a record, ``[x : REAL, y : REAL]``."""
 
     items: tuple[Sort, ...]
+    labels: tuple[str, ...] = ()
+    name: str = field(default="", compare=False)
+    """Under which it is declared: for people."""
 
 
 @dataclass(frozen=True, slots=True)

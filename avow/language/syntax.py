@@ -129,6 +129,14 @@ class NodePort(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
+class FieldOf(_Placed):
+    """``p.x`` of a record; of one that has a bare name, `NodePort`."""
+
+    body: TermSyntax
+    name: Token
+
+
+@dataclass(frozen=True, slots=True)
 class Parentheses(_Placed):
     """``(a)``; of ``((a))`` one is left, as deep as both."""
 
@@ -239,6 +247,7 @@ TermSyntax = (
     | Truth
     | PortName
     | NodePort
+    | FieldOf
     | Parentheses
     | TupleDisplay
     | SetDisplay
@@ -308,7 +317,17 @@ class SequenceType(_Placed):
     item: TypeSyntax
 
 
-TypeSyntax = FunctionType | ProductType | NamedType | BuiltinType | UnspecifiedType | SetType | TupleType | SequenceType
+@dataclass(frozen=True, slots=True)
+class RecordType(_Placed):
+    """``[x : REAL, y : REAL]``."""
+
+    fields: tuple[PortDeclaration, ...]
+
+
+TypeSyntax = (
+    FunctionType | ProductType | NamedType | BuiltinType | UnspecifiedType | SetType
+    | TupleType | RecordType | SequenceType
+)  # fmt: skip
 
 
 # --- declarations ----------------------------------------------------------------------------------------------------
@@ -398,7 +417,7 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return ()
         case Connective() | TupleDisplay() | SetDisplay() | SequenceDisplay() | TupleType() | PortList() | TopicList():
             return tree.items
-        case Negation() | Minus() | Parentheses():
+        case Negation() | Minus() | FieldOf() | Parentheses():
             return (tree.body,)
         case Comparison() | Calculation():
             return tree.operands
@@ -426,6 +445,8 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return tree.factors
         case SetType():
             return tree.elements
+        case RecordType():
+            return tree.fields
         case Element():
             return tree.parameters
         case SequenceType():

@@ -10,7 +10,7 @@ and `rebuild`, itself with others in their place. A node without one of them is 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import TypeVar
 
@@ -161,6 +161,24 @@ class Length:
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         return Length(parts[0], self.sort, self.span)
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """``p.x``: an item of a record, by its position."""
+
+    record: Term
+    position: int
+    sort: Sort
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.record,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        whole = parts[0]
+        return whole.items[self.position] if isinstance(whole, TupleTerm) else replace(self, record=whole)
 
 
 @dataclass(frozen=True, slots=True)
@@ -437,32 +455,10 @@ class History:
 
 
 Term = (
-    Literal
-    | EnumValue
-    | Variable
-    | Construct
-    | Apply
-    | Index
-    | Length
-    | Widen
-    | Arithmetic
-    | Negative
-    | TupleTerm
-    | SequenceTerm
-    | SequenceRange
-    | SetTerm
-    | Compare
-    | In
-    | Not
-    | And
-    | Or
-    | Implies
-    | Iff
-    | Quantified
-    | Operation
-    | Conditional
-    | History
-)
+    Literal | EnumValue | Variable | Construct | Apply | Index | Length | Item | Widen | Arithmetic | Negative
+    | TupleTerm | SequenceTerm | SequenceRange | SetTerm | Compare | In | Not | And | Or | Implies | Iff | Quantified
+    | Operation | Conditional | History
+)  # fmt: skip
 
 TRUE = Literal(True, BOOL)
 FALSE = Literal(False, BOOL)

@@ -152,6 +152,11 @@ def _written(sort: Sort, names: Mapping[str, Sort], declared: str | None = None)
         case FunctionSort(parameters=parameters, result=result):
             left = " x ".join(_factor(p, names) for p in parameters)
             return f"{left} --> {_factor(result, names)}"
+        case TupleSort(name=name) if name in names and name != declared:
+            return name
+        case TupleSort(items=items, labels=labels) if labels:
+            pairs = zip(labels, items, strict=True)
+            return f"[{', '.join(f'{label} : {_written(item, names)}' for label, item in pairs)}]"
         case TupleSort(items=items):
             return f"({', '.join(_written(i, names) for i in items)})"
         case SequenceSort(item=item):

@@ -254,8 +254,8 @@ class _Reader:
                 case PortName(role=role, name=name):
                     ports = self.nodes.get(self.node, Ports())
                     yield from self.at(ports.meaning(self.node, name, role), part.end - len(name), part.end)
-                case NodePort():
-                    pass  # a contract speaks of its own ports only
+                case NodePort(node=name):  # a field of a record; a contract speaks of its own ports only
+                    yield from self.at(scope.get(name) or self.meaning(name), part.start, part.start + len(name))
                 case Quantification(binders=binders, body=body):
                     inner = dict(scope)
                     for binder in binders:

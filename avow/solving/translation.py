@@ -38,6 +38,7 @@ from avow.language.terms import (
     Implies,
     In,
     Index,
+    Item,
     Length,
     Literal,
     Negative,
@@ -138,6 +139,9 @@ class Translator(Sorts):
                 arguments = yield self._terms(items, bound, meanings)
                 fitted = [self._fit(a, s) for a, s in zip(arguments, tuple_sort.items, strict=True)]
                 return self.sort(tuple_sort).constructor(0)(*fitted)
+            case Item(record=record, position=position):
+                value = yield self._term(record, bound, meanings)
+                return self.sort(record.sort).accessor(0, position)(value)
             case Widen(term=inner):
                 value = yield self._term(inner, bound, meanings)
                 return self._real(value)

@@ -48,7 +48,7 @@ class Unsupported(Exception):  # noqa: N818 - it names what happened
 
 def _whole(sort: Sort) -> Sort:
     """The sort with INTEGER for NATURAL inside tuples and sequences: RCL compares ``(1, n)`` with ``(1, i)``, so that
-    both must be of one Z3 sort. Which of its values are naturals, `member` says."""
+    both must be of one Z3 sort. Which of its values are naturals, `member` says. A record is the tuple of its items."""
     match sort:
         case NaturalSort():
             return INTEGER

@@ -49,6 +49,7 @@ from avow.language.terms import (
     Implies,
     In,
     Index,
+    Item,
     Length,
     Literal,
     Negative,
@@ -217,6 +218,9 @@ class _Printer:
             case Index(sequence=sequence, index=index):
                 inner = yield self.list((sequence, index), scope)
                 return f"Types.Nth({inner})", True
+            case Item(record=record, position=position):
+                inner = yield self.operand(record, scope)
+                return f"{inner}.{position}", True
             case Length(sequence=sequence):
                 inner, _ = yield self.term(sequence, scope)
                 return f"|{inner}|", True

@@ -78,6 +78,9 @@ def received(data: Any, sort: Sort, what: str) -> Value:
                 return made
         case TupleSort(items=items), {"t": parts} if len(parts) == len(items):
             return tuple(received(part, item, what) for part, item in zip(parts, items, strict=True))
+        case TupleSort(items=items, labels=labels), {"m": pairs} if sorted(map(_label, pairs)) == sorted(labels):
+            named = {_label(pair): pair[1] for pair in pairs}
+            return tuple(received(named[label], item, what) for label, item in zip(labels, items, strict=True))
         case SequenceSort(item=item), {"t": parts}:
             return SequenceValue(tuple(received(part, item, what) for part in parts))
         case FunctionSort(), _:
@@ -87,6 +90,11 @@ def received(data: Any, sort: Sort, what: str) -> Value:
         case SetSort(), _:
             pass
     raise Malformed(f"{what} is {told(data)}, which is no value of {show_sort(sort)}")
+
+
+def _label(pair: Any) -> str:
+    """The field that a pair of a dict is about; no text: none."""
+    return pair[0] if isinstance(pair[0], str) else ""
 
 
 def _data(data: Any, sort: DataSort, what: str) -> Value | None:

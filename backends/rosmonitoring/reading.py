@@ -102,6 +102,10 @@ def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
             return element(raw, sort, names)
         case DataSort():
             return _data(raw, sort, names)
+        case TupleSort(items=items, labels=labels) if labels and isinstance(raw, Mapping):
+            if missing := [label for label in labels if label not in raw]:
+                raise MappingError(f"{show(raw)} has no {', '.join(missing)}")
+            return tuple(convert(raw[label], item, names) for label, item in zip(labels, items, strict=True))
         case TupleSort(items=items):
             if isinstance(raw, list) and len(raw) == len(items):
                 return tuple(convert(part, item, names) for part, item in zip(raw, items, strict=True))

@@ -58,6 +58,11 @@ def fits(sort: Sort, wire: Wire, known: Definitions) -> bool:
             return fits(item, inner, known)
         case TupleSort(items=items), Array(item=inner, length=length):
             return length == len(items) and all(fits(item, inner, known) for item in items)
+        case TupleSort(items=items, labels=labels), Nested() if labels:
+            named = dict(record(wire, known))
+            return all(
+                label in named and fits(item, named[label], known) for label, item in zip(labels, items, strict=True)
+            )
         case TupleSort(items=items), Nested():
             parts = record(wire, known)
             return len(parts) == len(items) and all(
@@ -99,6 +104,8 @@ def converter(sort: Sort, wire: Wire, names: Mapping[str, str], known: Definitio
             return lambda raw: tuple([p(x) for p, x in zip(parts, _items(raw, length), strict=True)])
         case TupleSort(items=items), Nested():
             fields = record(wire, known)
+            if sort.labels:  # by name, whatever else the message holds
+                fields = tuple((label, dict(fields)[label]) for label in sort.labels)
             readers = [
                 (name, converter(item, inner, names, known, gaps))
                 for item, (name, inner) in zip(items, fields, strict=True)

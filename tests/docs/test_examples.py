@@ -21,6 +21,7 @@ VERDICTS = {
     "warehouse": "Holds if 5 suppositions hold",
     "ventilator": "Holds",
     "geofence": "Holds if 2 suppositions hold",
+    "docking": "Holds if 1 supposition holds",
 }
 
 

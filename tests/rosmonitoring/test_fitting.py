@@ -23,7 +23,8 @@ from avow.ros.definitions import Definitions, Scalar
 from avow.system.plan import System
 
 NODE = """
-context {{ Level : {{ok, error}}; Near : REAL --> BOOL; Two : (REAL, REAL); }}
+context {{ Level : {{ok, error}}; Near : REAL --> BOOL; Two : (REAL, REAL);
+  Rec : [y : REAL, x : REAL]; Deep : [id : NATURAL, at : Rec]; }}
 node n {{
   inputs( v : {sort} )
   outputs( o : BOOL )
@@ -38,6 +39,8 @@ FORMULAS = {
     "Level": "out.o or in.v == ok",
     "Near": "out.o or exists(x in REAL | in.v(x))",
     "Two": "out.o or in.v == (1.0, 2.0)",
+    "Rec": "out.o or in.v.x > 0",
+    "Deep": "out.o or in.v.at.x > in.v.id",
 }
 
 
@@ -111,6 +114,7 @@ def test_headers_are_never_meant(make_system: Callable[..., System]) -> None:
         ("Level", {"field": "x", "values": {"BAD": "error"}}, "uint8 OK=0\nuint8 x", "neither a number nor a constant"),
         ("Level", "x", "uint8 OK=0\nuint8 x", "which number is error"),
         ("Two", "x", "float64[3] x", "x is float64[3], which cannot be read as (REAL, REAL)"),
+        ("Rec", None, "float64 x\nfloat64 z", "no field of a/V can be read as it"),
     ],
 )
 def test_wrong_paths_and_types_are_faults_of_the_plan(
@@ -137,6 +141,10 @@ def test_wrong_paths_and_types_are_faults_of_the_plan(
         ("Two", None, "float64[2] p", {"p": [1, 2]}, (1, 2)),
         ("Two", None, "float64[2] p", {"p": [1, 2, 3]}, "has 3 items, not 2"),
         ("Two", None, "float64 x\nfloat64 y", {"x": 1, "y": 2}, (1, 2)),
+        ("Rec", None, "float64 x\nstring name\nfloat64 y", {"x": 1, "name": "n", "y": 2}, (2, 1)),
+        ("Rec", "p", "a/P p\na/P q", {"p": {"x": 1, "y": 2, "z": 3}, "q": {}}, (2, 1)),
+        ("Rec", "p", "a/P p", {"p": {"x": 1, "z": 3}}, "no field y"),
+        ("Deep", None, "uint8 id\na/P at", {"id": 7, "at": {"x": 1, "y": 2, "z": 3}}, (7, (2, 1))),
         ("REAL", "ranges[1]", "float32[] ranges", {"ranges": [1, 2]}, Fraction(2)),
         ("REAL", "ranges[-1]", "float32[] ranges", {"ranges": [1, 2, 3]}, Fraction(3)),
         ("REAL", "ranges[4]", "float32[] ranges", {"ranges": [1, 2]}, "no field ranges[4]"),
@@ -171,7 +179,8 @@ def test_wrong_paths_and_types_are_faults_of_the_plan(
 def test_readings(
     make_system: Callable[..., System], sort: str, entry: Any, definition: str, fields: dict[str, Any], expected: Any
 ) -> None:
-    found = value(system_of(make_system, sort, "a/V", entry, messages={"a/V": definition}), **fields)
+    messages = {"a/V": definition, "a/P": "float64 x\nfloat64 y\nfloat64 z"}
+    found = value(system_of(make_system, sort, "a/V", entry, messages=messages), **fields)
     assert expected in found if isinstance(expected, str) and isinstance(found, str) else found == expected
 
 
