@@ -59,8 +59,8 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A test whose tool is missing is skipped, visibly."""
     for item in items:
-        for name, present in _NEEDS.items():
-            if item.get_closest_marker(name) and not present():
+        for name in {mark.name for mark in item.iter_markers()} & _NEEDS.keys():
+            if not _NEEDS[name]():
                 item.add_marker(pytest.mark.skip(reason=f"{name}: not on this machine"))
 
 
