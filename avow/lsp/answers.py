@@ -201,6 +201,8 @@ def _about(document: Document, name: Occurrence, status: StatusLookup, sanity: S
         case What.ELEMENT:
             sort = of_contract(contract).elements.get(meaning.name)
             return f"`{meaning.name}`: an element of `{sort.name}`" if sort is not None else None
+        case What.FIELD:
+            return f"field `{meaning.name}` of a record"
         case What.VARIABLE:
             return _about_variable(document, meaning)
 

@@ -26,6 +26,7 @@ _OF_MEANING: Mapping[What, str] = {
     What.CONSTANT: "variable",
     What.DEFINITION: "function",
     What.ELEMENT: "enumMember",
+    What.FIELD: "property",
     What.VARIABLE: "parameter",
 }
 _OPERATORS = frozenset(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from avow.language.contract import Contract, Definition, Node, Port
@@ -10,7 +10,7 @@ from avow.language.environment import of_contract
 from avow.language.lexer import LONG_UNITS, STEPS, UNITS
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.sorts import DataSort, FunctionSort, SequenceSort
+from avow.language.sorts import DataSort, FunctionSort, SequenceSort, Sort, TupleSort, components
 from avow.language.terms import Past, Role
 from avow.lsp.names import Text
 from avow.lsp.places import Place, place_of
@@ -23,8 +23,8 @@ class Offer:
 
     label: str
     kind: str
-    """keyword, operator, function, type, element, constant, definition, input, output, variable, node, guarantee, unit,
-    key"""
+    """keyword, operator, function, type, element, field, constant, definition, input, output, variable, node,
+    guarantee, unit, key"""
     detail: str = ""
     template: str = ""
     about: str = ""
@@ -108,6 +108,7 @@ def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator
         yield from _ports(node, Role.INPUT if words[-2] == "IN" else Role.OUTPUT, "")
         return
     if words[-1:] == ["DOT"]:
+        yield from _fields(place, node, contract)
         return
     if words[-1:] == ["NUMBER"] and "LSQUARE" in words and "RSQUARE" not in words[words.index("LSQUARE") :]:
         yield from (Offer(unit, "unit") for unit in (*STEPS, *UNITS, *LONG_UNITS))
@@ -133,6 +134,28 @@ def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator
 
 def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...]:
     return node.definitions if node is not None else contract.definitions
+
+
+def _fields(place: Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
+    """Those of the record before the point; where it is none of the node's ports, those of all records."""
+    chain: list[str] = []
+    for token in reversed(place.before):
+        if token.type not in ("NAME", "DOT", "IN", "OUT"):
+            break
+        chain += [token.text] if token.type == "NAME" else []
+    chain.reverse()
+    ports = (*node.inputs, *node.outputs) if node is not None else ()
+    found: list[Sort] = [p.sort for p in ports if chain and p.name == chain[0]]
+    for name in chain[1:] if found else ():
+        found = [dict(zip(s.labels, s.items, strict=False))[name] for s in _records(found) if name in s.labels]
+    whole = found or [*components(*(sort for _, sort in contract.types), *(p.sort for p in ports))]
+    for sort in _records(whole):
+        pairs = zip(sort.labels, sort.items, strict=False)
+        yield from (Offer(label, "field", show_sort(item)) for label, item in pairs)
+
+
+def _records(sorts: Iterable[Sort]) -> list[TupleSort]:
+    return [sort for sort in sorts if isinstance(sort, TupleSort)]
 
 
 def _ports(node: Node | None, role: Role, before: str) -> Iterator[Offer]:

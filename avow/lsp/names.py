@@ -23,10 +23,12 @@ from avow.language.syntax import (
     ConstantDeclaration,
     Define,
     Element,
+    FieldOf,
     NamedType,
     NodePort,
     PortName,
     Quantification,
+    RecordType,
     SetDisplay,
     Syntax,
     TypeDeclaration,
@@ -50,6 +52,8 @@ class What(StrEnum):
     CONSTANT = "constant"
     DEFINITION = "definition"
     ELEMENT = "element"
+    FIELD = "field"
+    """Of all records that have one of the name: their types do not count as different things."""
     VARIABLE = "variable"
 
 
@@ -239,6 +243,10 @@ class _Reader:
                 case NamedType(text=name):
                     if name in self.environment.types:
                         yield from self.at(Meaning(What.TYPE, name), part.start, part.end)
+                case RecordType(fields=fields):
+                    for field_ in fields:
+                        token = field_.name
+                        yield from self.at(Meaning(What.FIELD, token.text), token.start, token.end, True)
                 case Element(name=token):
                     yield from self.at(Meaning(What.ELEMENT, token.text), token.start, token.end, True)
                 case _:  # names nothing by itself
@@ -256,6 +264,10 @@ class _Reader:
                     yield from self.at(ports.meaning(self.node, name, role), part.end - len(name), part.end)
                 case NodePort(node=name):  # a field of a record; a contract speaks of its own ports only
                     yield from self.at(scope.get(name) or self.meaning(name), part.start, part.start + len(name))
+                    yield from self.at(Meaning(What.FIELD, part.name), part.end - len(part.name), part.end)
+                case FieldOf(body=body, name=token):
+                    yield from self.at(Meaning(What.FIELD, token.text), token.start, token.end)
+                    stack.append((body, scope))
                 case Quantification(binders=binders, body=body):
                     inner = dict(scope)
                     for binder in binders:

@@ -36,6 +36,7 @@ _OFFERS = {
     "element": types.CompletionItemKind.EnumMember,
     "constant": types.CompletionItemKind.Constant,
     "definition": types.CompletionItemKind.Function,
+    "field": types.CompletionItemKind.Field,
     "input": types.CompletionItemKind.Field,
     "output": types.CompletionItemKind.Field,
     "variable": types.CompletionItemKind.Variable,

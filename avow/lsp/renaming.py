@@ -21,7 +21,7 @@ from avow.formulas.formula import digest
 from avow.language.contract import Contract, Node, Port
 from avow.language.lexer import KEYWORDS, LIMITED
 from avow.language.load import check_in_part
-from avow.language.sorts import Constructor, DataSort, EnumSort, OpaqueSort
+from avow.language.sorts import Constructor, DataSort, EnumSort, OpaqueSort, TupleSort
 from avow.language.source import Source
 from avow.language.terms import Builtin, Construct, EnumValue, Past, Role, Variable
 from avow.lsp.names import CLAUSES, OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
@@ -244,6 +244,8 @@ def _changed(part: object, name: str, value: object, meaning: Meaning | None, ne
     match part:
         case Port() | Variable() if name == "name" and meaning.what in PORTS and value == meaning.name:
             return new
+        case TupleSort() if name == "labels" and meaning.what is What.FIELD and isinstance(value, tuple):
+            return tuple(new if label == meaning.name else label for label in value)
         case EnumSort() if name == "members" and meaning.what is What.ELEMENT and isinstance(value, tuple):
             return tuple(new if member == meaning.name else member for member in value)
         case EnumValue() | Constructor() if name == "name" and meaning.what is What.ELEMENT and value == meaning.name:

@@ -75,7 +75,9 @@ def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
         result = _Build(file, place).transform(interactive.feed_eof(last))
     except UnexpectedCharacters as error:
         span = Span(file, error.line, error.column, error.line, error.column + 1)
-        raise Rejected(Diagnostic("HOARE100", f"this character has no meaning here: {error.char!r}", span)) from error
+        hint = "a program has no fields of records: it assigns a record as a whole" if error.char == "." else None
+        message = f"this character has no meaning here: {error.char!r}"
+        raise Rejected(Diagnostic("HOARE100", message, span, hint=hint)) from error
     except UnexpectedToken as error:
         raise Rejected(_explain(error, file, last)) from error
     except VisitError as error:

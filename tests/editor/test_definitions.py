@@ -1,4 +1,4 @@
-"""What an editor offers and says of local definitions."""
+"""What an editor offers and says of local definitions and records."""
 
 from __future__ import annotations
 
@@ -54,3 +54,28 @@ def test_it_completes_them() -> None:
     told = signature(document.taken_apart, document.project.contract, TEXT.index("beyond(1, 2)") + len("beyond(1, "))
     assert told is not None
     assert (told.label, told.active) == ("beyond(a : REAL, b : REAL)", 1)
+
+
+RECORDS = """\
+context { Pose : [px, py : REAL]; Both : [one : Pose, id : NATURAL]; }
+node n { inputs( at : Both ) outputs( to : Pose ) topics()
+  guarantee g ( in.at.one.px == to.px and forall(p in Pose | p.py != 1 or p == to) ) }
+"""
+
+
+def test_it_knows_fields() -> None:
+    document = analyse(RECORDS, "n.rcl")
+    assert [d for d in document.diagnostics if d.is_error] == []
+    use = RECORDS.index("px == to")
+    assert [o.start for o in references(document, use)] == [
+        *(RECORDS.index("px, py"), use, RECORDS.index("px and")),
+    ]
+    assert hover(document, use) == "field `px` of a record"
+
+    def offered(before: str) -> list[str]:
+        at = RECORDS.index(before) + len(before)
+        return [o.label for o in offers(document.taken_apart, document.project.contract, at)]
+
+    assert offered("in.at.") == ["one", "id"]
+    assert offered("in.at.one.") == ["px", "py"]
+    assert set(offered("| p.")) == {"px", "py", "one", "id"}
