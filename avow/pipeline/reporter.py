@@ -158,7 +158,10 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         plugins = any(a.surveyed.system.plan.plugins for a in state.assessments)  # their code may be anywhere
         undisturbed = not (plugins or self.failures or self.runtime_errors or self._earlier())
         if "verify" in self._selected and complete and undisturbed and is_settled(state):
-            state.shortcut.keep(state.results.all)
+            from avow.pipeline.work import programs
+
+            works = (work for a in state.assessments for work in a.surveyed.catalogue.works)
+            state.shortcut.keep(state.results.all, programs(works))
 
     def _line(self, text: str) -> None:
         self._clear()

@@ -13,13 +13,14 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
 import avow.backends
 from avow.base import codec
 from avow.base.notes import read_note, write_note
+from avow.base.programs import program_files
 from avow.base.tools import package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
@@ -61,14 +62,15 @@ class Shortcut:
         asked = {name.partition(":")[2] for name in wanted}
         return results if asked - {""} <= names else None
 
-    def keep(self, results: Sequence[Result]) -> None:
-        """Note that everything is settled as things stand. Without effect where a link leads out of the workspace,
-        where a plan reads launch files (which stand anywhere, and say what else is read), or where something was edited
-        during the run: the results are not of what stands there now."""
+    def keep(self, results: Sequence[Result], programs: Iterable[str] = ()) -> None:
+        """Note that everything is settled as things stand, the outside tools' `programs` too. Without effect where a
+        link leads out of the workspace, where a plan reads launch files (which stand anywhere, and say what else is
+        read), or where something was edited during the run: the results are not of what stands there now."""
         try:
             if self._begun != _sources(self.workspace) or _reads_elsewhere(self.workspace):
                 return
-            observed = _observed(self.workspace)
+            tools = (Observed(str(file), Seen.READ) for path in programs for file in program_files(path))
+            observed = (*_observed(self.workspace), *dict.fromkeys(tools))
             kept = {
                 "identity": _identity(self.workspace, observed),
                 "observed": to_json(observed),

@@ -19,6 +19,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
+from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest
@@ -234,9 +235,14 @@ def tool_identities(tool: Backend, offered: Offered = None) -> tuple[tuple[str, 
     `offered`, of what can be sent there: the tools there."""
     if offered is not None and is_portable(tool):
         return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
-    return tuple(
-        (t.name, t.version or "", package_digest(t.package) if t.package else _program(t.path)) for t in tool.tools()
-    )
+    found = ((t, package_digest(t.package) if t.package else program_digest(t.path)) for t in tool.tools())
+    return tuple((t.name, t.version or "", mark) for t, mark in found)
+
+
+def programs(works: Iterable[Work]) -> tuple[str, ...]:
+    """Where the outside tools are that these works use."""
+    used = (method_backend(work.system, planned_method(work)) for work in works if not work.is_engine)
+    return tuple(dict.fromkeys(tool.path for backend in used for tool in backend.tools() if tool.path))
 
 
 def is_portable(tool: Backend) -> bool:
@@ -373,20 +379,6 @@ def _contract_digest(contract: Contract) -> str:
         parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
         parts += [[node.name, c.kind, c.name, node_digest(node, c)] for c in node.clauses]
     return digest(json.dumps(sorted(parts)))  # the order of declarations means nothing
-
-
-def _program(path: str | None) -> str:
-    """The digest of a tool's program: a version is what it says of itself."""
-    try:
-        info = Path(path or "").stat()
-        return _program_as(path or "", (info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
-    except OSError:
-        return ""
-
-
-@functools.lru_cache(maxsize=1000)
-def _program_as(path: str, mark: tuple[int, ...]) -> str:
-    return _digest(Path(path))
 
 
 def _digest(path: Path) -> str:

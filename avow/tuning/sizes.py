@@ -112,3 +112,10 @@ ANSWERED_BY_ONE = 500
 
 CONTRACTS_KEPT = 8
 """Contracts that stay checked in memory: a run loads one, and then asks what there is to say of it."""
+
+PROGRAM_FILES = 5_000
+"""Files of an outside tool that its key covers: Dafny has 60, MCAPL 3,000; a script that names a folder of the system's
+would have no end."""
+
+SCRIPT_BYTES = 65_536
+"""So much of a tool's script is looked through for the files that it names: a launcher has a few lines."""

@@ -1,4 +1,4 @@
-"""A tool that is a Python package counts by the bytes of all its files."""
+"""A tool counts by the bytes of all the files that it is made of."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from avow.base import tools
+from avow.base import programs, tools
 from avow.base.notes import cache_folder
+from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
+from avow.pipeline.results import Result
 from avow.pipeline.work import engine_identity, tool_identities
 
 
@@ -74,3 +76,51 @@ def test_solver_and_generator_are_in_the_keys_and_in_the_shortcut() -> None:
     for name, package in (("hoare", "z3"), ("python", "z3"), ("hypothesis", "hypothesis")):
         assert tools.package_digest(package) in {mark for _, _, mark in tool_identities(backend(name))}
         assert package in shortcut._PACKAGES
+
+
+def _program(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+    return path
+
+
+def test_a_launcher_counts_with_all_that_it_launches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    engine = _program(tmp_path / "lib" / "made" / "engine.exe", "1")
+    elsewhere = _program(tmp_path / "other" / "shared.dll", "1")
+    (engine.parent / "shared.dll").symlink_to(elsewhere)
+    launcher = _program(tmp_path / "bin" / "made", f'#!/bin/sh\nexec {engine} "$@"\n')
+    _program(launcher.with_name("neighbour"), "a program of its own")
+    assert not {p.name for p in programs.program_files(str(launcher))} & {"neighbour"}
+
+    def now() -> str:
+        programs.program_files.cache_clear()
+        return programs.program_digest(str(launcher))
+
+    known = [now()]
+    assert now() == known[0]
+    for path, text in ((engine, "2"), (elsewhere, "2"), (engine.with_name("prelude"), ""), (launcher, "#!/bin/sh\n")):
+        path.write_text(text)
+        known.append(now())
+    assert len(set(known)) == len(known)
+
+
+def test_a_binary_counts_with_its_libraries() -> None:
+    files = programs.program_files(os.path.realpath("/bin/sh"))
+    if not Path("/usr/bin/ldd").exists():
+        pytest.skip("no ldd")
+    assert any(p.name.startswith("libc.") for p in files)
+
+
+def test_where_a_tools_library_is_another_there_is_something_to_do(tmp_path: Path) -> None:
+    library = _program(tmp_path / "made" / "engine.exe", "1")
+    workspace, done = Workspace(tmp_path / "here"), Result("s", 0, {}, "", "", ())
+    for folder in (workspace.contracts, workspace.artifacts, workspace.reports):
+        folder.mkdir(parents=True)
+    first = shortcut.Shortcut(workspace)
+    assert first.nothing_to_do(("verify",)) is None
+    first.keep([done], [str(library)])
+    assert shortcut.Shortcut(workspace).nothing_to_do(("verify",)) == (done,)
+    library.write_text("2")
+    assert shortcut.Shortcut(workspace).nothing_to_do(("verify",)) is None

@@ -1,0 +1,87 @@
+"""Of what a tool's program is made: what it says of its version need not change when what it loads does."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from avow.base import process
+from avow.base.files import digest, digest_file
+from avow.base.notes import cache_folder, read_note, write_note
+from avow.tuning.running import VERSION_SECONDS
+from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
+
+_SHARED = frozenset({"bin", "sbin", "lib", "lib64", "tmp", "etc", "dev"})
+"""Folders of many programs: what lies in one says nothing of a program in it."""
+
+
+def program_digest(path: str | None) -> str:
+    """SHA-256 of all files of `program_files`; empty where there is no program. Kept, sealed, for as long as each is
+    the same by inode, size and times."""
+    if path is None:
+        return ""
+    files = program_files(path)
+    mark = digest(json.dumps([[str(file), _mark(file)] for file in files]))
+    note = cache_folder() / f"program-{digest(path)[:16]}.json"
+    known = read_note(note) or {}
+    if known.get("of") != mark:
+        known = {"of": mark, "digest": digest(json.dumps([[str(file), _digest(file)] for file in files]))}
+        with contextlib.suppress(OSError):  # a read-only home costs that each time
+            write_note(note, known)
+    return str(known["digest"])
+
+
+@functools.cache
+def program_files(path: str) -> tuple[Path, ...]:
+    """The program; of a script, what it names by its whole path, with what lies beside that where it has a folder of
+    its own; of a binary, the libraries that it is linked with; of a folder, what is in its `bin` and `lib`."""
+    found: dict[Path, None] = {}
+    waiting = [Path(path)]
+    while waiting and len(found) < PROGRAM_FILES:
+        file = Path(os.path.realpath(waiting.pop()))
+        if file not in found and file.is_file():
+            found[file] = None
+            waiting += _named(file)
+        elif file.is_dir():
+            compiled = [folder for name in ("bin", "lib") if (folder := file / name).is_dir()]
+            found |= dict.fromkeys(p for folder in compiled or [file] for p in folder.rglob("*") if p.is_file())
+    return tuple(sorted(found))
+
+
+def _named(file: Path) -> Iterator[Path]:
+    try:
+        with file.open("rb") as opened:
+            begin = opened.read(SCRIPT_BYTES)
+    except OSError:
+        return
+    if begin[:2] == b"#!":
+        for name in re.findall(rb"(?<![\w$}])/[\w./+@-]+", begin):
+            named = Path(os.fsdecode(name))
+            if named.is_file():
+                yield named
+                if named.parent.name not in _SHARED:
+                    yield from sorted(named.parent.iterdir())
+    elif begin[:4] == b"\x7fELF":
+        with contextlib.suppress(process.ToolMissing):
+            listed = process.run(["ldd", str(file)], seconds=VERSION_SECONDS).stdout
+            yield from (Path(name) for name in re.findall(r"(?:=>|^)\s*(/\S+)", listed, re.MULTILINE))
+
+
+def _mark(file: Path) -> list[int]:
+    try:
+        info = file.stat()
+    except OSError:
+        return []
+    return [info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns]
+
+
+def _digest(file: Path) -> str:
+    try:
+        return digest_file(file)
+    except OSError:
+        return "missing"
