@@ -273,8 +273,10 @@ def condition_text(condition: Condition) -> str:
 TOLERANCE = (
     "The official monitor compares by CLP(R), in floating point: to it, numbers less than 1e-10 apart are equal.",
     "A value that near to a number of the contract, or to another value, may be judged otherwise than by Avow.",
+    "Of a message with a word where a number is compared the official monitor dies, in place of saying false.",
 )
-"""Compiled conditions are constraints of SWI-Prolog's library clpr, whose comparisons have this tolerance."""
+"""Compiled conditions are constraints of SWI-Prolog's library clpr, whose comparisons have this tolerance, and take
+numbers only."""
 
 
 def write(specification: Specification) -> str:
