@@ -8,6 +8,7 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -20,6 +21,7 @@ from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import publisher
 
 from .answering import accused, ask, judge_answer, saw
+from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
 from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
 from .options import Setup, same_topic
@@ -79,11 +81,14 @@ class Monitor:
     """Clauses that speak of other steps."""
     _timed: list[Watched] = field(default_factory=list)
     """Those that also speak of the time between steps, assumptions first."""
+    _clock: Clock | None = None
+    """Where it does not go by the times of the events."""
     _so_far: SoFar | None = None
     """Of a node whose clauses speak of other steps."""
 
     def __post_init__(self) -> None:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
+        self._clock = None if self.setup.time is By.RECEIPT else Clock(self.setup.time)
         self._observe()
         answers = self.setup.answers
         self.paired = self.setup.heard
@@ -118,13 +123,25 @@ class Monitor:
                 self.values[name] = self.values[source]
 
     def listens(self, topic: str) -> bool:
-        """Whether a topic's messages say anything of the node."""
-        return same_topic(topic) in self._readers
+        """Whether a topic's messages say anything of the node, or of its time."""
+        known = same_topic(topic)
+        return known in self._readers or (known == SIMULATED and self.setup.time is By.SIM)
 
     def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
         """Judge one event, which stands at a place of the trace (by default, its number). Never raises for what the
         event holds."""
         self.events += 1
+        if self._clock is None:
+            return self._step(event, place)
+        found: list[Violation] = []
+        now = self.events
+        for number, each, where in self._clock.ready(now, event, place or now):
+            self.events = number
+            found += self._step(each, where)
+        self.events = now
+        return found
+
+    def _step(self, event: Mapping[str, Any], place: int) -> list[Violation]:
         topic = event.get("topic")
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
@@ -133,7 +150,7 @@ class Monitor:
         names = [name for name, _ in readers or ()]
         if readers is not None and self._so_far is not None and self._timed:
             self._so_far.hears(time_of(event), self._timed)
-        found = self.tick(event, set(names))
+        found = self._tick(event, set(names))
         if readers is None or not isinstance(topic, str):
             return found
         self.relevant += 1
@@ -210,8 +227,13 @@ class Monitor:
             self.lose(watched)
         return [(name, read) for name, read in readers if self.setup.whose(name, event)]
 
-    def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
-        """Time has passed, with or without a message of these variables: deadlines do not wait for one."""
+    def tick(self, event: Mapping[str, Any]) -> list[Violation]:
+        """Time has passed: deadlines do not wait for a message."""
+        passed = event if self._clock is None else self._clock.passed(event)
+        return [] if passed is None else self._tick(passed, frozenset())
+
+    def _tick(self, event: Mapping[str, Any], names: Set[str]) -> list[Violation]:
+        """The same, with or without a message of these variables."""
         late = self.timing.passes(event, names)
         found = [self.violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
         for watched, deadline in overdue(self._timed, event):
@@ -222,7 +244,7 @@ class Monitor:
 
     @property
     def deadline(self) -> float:
-        return min(self.timing.deadline, soonest(self._timed))
+        return min(self.timing.deadline, soonest(self._timed)) if self._clock is None else math.inf
 
     def settle_previous(self) -> None:
         """An answer is over: what it said is now what the step before said."""
@@ -251,7 +273,7 @@ class Monitor:
     def by_values(self) -> bool:
         """Whether a verdict depends on values alone, the latest or those that an answer answered, and changes nothing
         for the next."""
-        return self._so_far is None
+        return self._so_far is None and self._clock is None
 
     def reader(self, name: str) -> Reader | None:
         """What reads a variable's messages; None of one whose value is made of several."""
@@ -280,6 +302,7 @@ class Monitor:
     def finish(self) -> list[Violation]:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
+        self.backwards = self.backwards or ("" if self._clock is None else self._clock.finish())
         if self.pairing is not None:
             self.settle(None, found)
             self.backwards = self.backwards or self.pairing.uneven()

@@ -27,6 +27,7 @@ from avow.system.schema import suggest
 
 from . import observing
 from .bags import Event, Origin, carried, is_bag
+from .clocks import By
 from .ends import mapping_of, method_of, published, show_entry, sources, written_out
 from .fitting import Undecided
 from .numbers import whole
@@ -67,6 +68,8 @@ class Setup:
     filtered: frozenset[str] = frozenset()
     """The topics (without their leading slash) whose messages a filter passes on only while nothing is broken."""
     leeway: Leeway = field(default_factory=Leeway)
+    time: By = By.RECEIPT
+    """By which clock its messages come."""
     shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     """Each output whose topic other nodes publish too: this node, and all of them, by their whole names."""
 
@@ -128,6 +131,7 @@ def setup(
         data.get("losses"),
         filtered,
         work.leeway(data),
+        By(str(data.get("time", By.RECEIPT))),
         work.shared,
     )
     return made, tuple(work.faults)

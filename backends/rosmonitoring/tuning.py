@@ -112,6 +112,9 @@ LAST_DOMAIN = 232
 LATEST_TIME = 10**12
 """Seconds, 31,700 years: a greater time of an event is none, but perhaps nanoseconds."""
 
+EVENTS_WITHOUT_CLOCK = 10_000
+"""Events that wait for a clock's first reading: seconds; where it never comes, what came later is not judged."""
+
 GRACE = Fraction(1, 20)
 """Seconds after a deadline until silence is told: messages have a way to go."""
 
