@@ -92,7 +92,7 @@ class _Searches:
                 return Search(compiler, term.variables, term.body, True, unique=True).exactly_one
 
     def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable]) -> Candidates:
-        return Plan(compiler, parts, variables, frozenset(), complete=False)
+        return Plan(compiler, parts, variables, frozenset(), complete=False, rows=False)
 
 
 SEARCHES = _Searches()

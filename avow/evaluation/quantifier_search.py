@@ -16,7 +16,7 @@ from typing import Any
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
 from avow.evaluation.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.evaluation.patterns import pattern, patterns
-from avow.evaluation.table_rows import Lookup, Step, Unrestricted, rows
+from avow.evaluation.table_rows import Lookup, Step, Unrestricted, table_rows
 from avow.evaluation.unrestricted_variables import leftover_steps
 from avow.formulas.renaming import bound_names
 from avow.language.operators import FLIPPED, OPPOSITE
@@ -60,7 +60,7 @@ class Search:
                 compiler.bind(variable)
         self._relations = tuple(sorted({compiler.slot(v) for v in relations(body)}))
         self._plans: dict[tuple[bool, ...], tuple[Plan, ...]] = {}
-        self._fallbacks: dict[int, Plan] = {}
+        self._fallbacks: dict[tuple[int, tuple[bool, ...] | None], Plan] = {}
         self._plan(tuple(False for _ in self._relations))
 
     def exists(self, env: Env) -> bool:
@@ -94,15 +94,18 @@ class Search:
                 yield tuple([env[s] for s in self._slots])
 
     def _solutions(self, env: Env) -> Iterator[Doubt]:
-        for at, plan in enumerate(self._plan(tuple([env[s].default is True for s in self._relations]))):
-            unrestricted = False
-            for reason in plan.solutions(env):
-                if isinstance(reason, Unrestricted):
-                    unrestricted = True
-                else:
-                    yield reason
-            if unrestricted:
-                yield from self._without_tables(at).solutions(env)
+        defaults = tuple([env[s].default is True for s in self._relations])
+        for at, plan in enumerate(self._plan(defaults)):
+            fallbacks = (self._fallback(at, defaults, tables=tables) for tables in (True, False))
+            tried: Plan | None = plan
+            while tried is not None:
+                unrestricted = False
+                for reason in tried.solutions(env):
+                    if isinstance(reason, Unrestricted):
+                        unrestricted = True
+                    else:
+                        yield reason
+                tried = next(fallbacks, None) if unrestricted else None
 
     def all(self, env: Env) -> dict[tuple[Any, ...], None]:
         """All assignments, each once; of values that nothing names, one stands for the others. Raises NotEvaluable."""
@@ -113,20 +116,25 @@ class Search:
             found[tuple([env[s] for s in self._slots])] = None
         return found
 
-    def _without_tables(self, at: int) -> Plan:
-        """For values of functions under which no table restricts anything."""
-        if at not in self._fallbacks:
+    def _fallback(self, at: int, defaults: tuple[bool, ...], *, tables: bool) -> Plan:
+        """For values of functions under which what they have elsewhere (no table at all) restricts nothing."""
+        key = at, defaults if tables else None
+        if key not in self._fallbacks:
             parts, variables = self._branches[at]
-            self._fallbacks[at] = Plan(
-                self._compiler, parts, variables, frozenset(), complete=True, unique=self._unique, tables=False
+            true = self._true(defaults) if tables else frozenset[int]()
+            self._fallbacks[key] = Plan(
+                self._compiler, parts, variables, true, complete=True, unique=self._unique, tables=tables, rows=False
             )
-        return self._fallbacks[at]
+        return self._fallbacks[key]
+
+    def _true(self, defaults: tuple[bool, ...]) -> frozenset[int]:
+        return frozenset(slot for slot, default in zip(self._relations, defaults, strict=True) if default)
 
     def _plan(self, defaults: tuple[bool, ...]) -> tuple[Plan, ...]:
         """Which parts restrict depends on the relations' defaults, nearly always FALSE: one plan for each case met."""
         found = self._plans.get(defaults)
         if found is None:
-            true = frozenset(slot for slot, default in zip(self._relations, defaults, strict=True) if default)
+            true = self._true(defaults)
             found = tuple(
                 Plan(self._compiler, parts, variables, true, complete=True, unique=self._unique)
                 for parts, variables in self._branches
@@ -148,13 +156,15 @@ class Plan:
         complete: bool,
         unique: bool = False,
         tables: bool = True,
+        rows: bool = True,
         depth: int = 0,
     ) -> None:
         """`complete`: bind every variable, else only those that parts restrict. `unique`: bind also variables that no
-        part mentions, since it matters how many values they have. `tables`: functions' tables restrict variables."""
+        part mentions, since it matters how many values they have. `tables`: functions'
+        tables restrict variables; `rows`: also where something is not so elsewhere."""
         self._compiler = compiler
         self._depth = depth
-        self._tables = tables
+        self._tables, self._rows = tables, rows
         self._true = true_defaults
         by_name = {v.name: v for v in variables}
         mentioned = frozenset[str]().union(*(p.names for p in parts))
@@ -250,7 +260,7 @@ class Plan:
                 found = self._membership(term, unbound)
             case _:  # only by what functions have elsewhere
                 found = None
-        return found or (rows(self._compiler, part, unbound) if self._tables else None)
+        return found or (table_rows(self._compiler, part, unbound) if self._rows else None)
 
     def _cover(
         self, options: Sequence[tuple[Term, bool]], unbound: set[str], variables: Sequence[Variable] = ()
@@ -267,7 +277,14 @@ class Plan:
             wanted = [Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
             wanted += occurring(parts, unbound)
             plan = Plan(
-                self._compiler, parts, wanted, self._true, complete=False, tables=self._tables, depth=self._depth + 1
+                self._compiler,
+                parts,
+                wanted,
+                self._true,
+                complete=False,
+                tables=self._tables,
+                rows=self._rows,
+                depth=self._depth + 1,
             )
             common &= plan.bound
             plans.append(plan)

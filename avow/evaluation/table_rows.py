@@ -52,7 +52,7 @@ class Lookup:
         return self._index.get(tuple([code(env) for code in self._codes]), ())
 
 
-def rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None:
+def table_rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None:
     """Of a part in which the variables are arguments of functions only: at a point of one of these, it can hold."""
     elsewhere: dict[Term, Variable] = {}
     term = _elsewhere(part.term, unbound, elsewhere)
@@ -75,6 +75,8 @@ def rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None:
 
     def run(env: Env) -> Iterator[None]:
         found = [(function(env), match) for function, match in tables]
+        if any(value.table.__class__ is not dict for value, _ in found):  # not all of it is known
+            raise Unrestricted("a function's table is open")
         away = [*env, *[None] * (compiler.size - len(env))]  # a plan may be made when the environment has been
         for slot, (value, _) in zip(slots, found, strict=True):
             away[slot] = value.default
