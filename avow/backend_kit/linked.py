@@ -17,8 +17,7 @@ from avow.backend_kit.registry import backend, judge_of_runs
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
-from avow.formulas.values import Element, Value, show
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Element, SequenceValue, Value, show
 from avow.system.plan import Method, System
 from avow.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 

@@ -15,8 +15,7 @@ from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names
 from avow.calculus.scenario import CannotRun, Point, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.formulas.formula import free_variables, substitute
-from avow.formulas.values import FunctionValue, Value, show
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import FunctionValue, SequenceValue, Value, show
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import BOOL, FunctionSort, NaturalSort, OpaqueSort, SequenceSort, Sort
 from avow.language.terms import Role, Term, Variable

@@ -52,7 +52,7 @@ def is_open(value: Value) -> bool:
     match value:
         case FunctionValue(default=default):
             return default is ANY
-        case values_.Sequence(items=items):
+        case values_.SequenceValue(items=items):
             return any(item is ANY for item in items)
         case _:  # other values are known as a whole
             return False
@@ -84,10 +84,10 @@ def decided(value: Value, point: Point, result: Value) -> Value:
     match value:
         case FunctionValue(table=table, default=default):
             return FunctionValue(dict(sorted({**table, point: result}.items(), key=_order)), default)
-        case values_.Sequence(items=items):
+        case values_.SequenceValue(items=items):
             [at] = point
             assert isinstance(at, int)
-            return values_.Sequence((*items[:at], result, *items[at + 1 :]))
+            return values_.SequenceValue((*items[:at], result, *items[at + 1 :]))
     raise AssertionError("only functions and sequences are open")
 
 
@@ -96,8 +96,8 @@ def closed(value: Value, result: Value) -> Value:
     match value:
         case FunctionValue(table=table):
             return FunctionValue(table, result)
-        case values_.Sequence(items=items):
-            return values_.Sequence(tuple(result if item is ANY else item for item in items))
+        case values_.SequenceValue(items=items):
+            return values_.SequenceValue(tuple(result if item is ANY else item for item in items))
     raise AssertionError("only functions and sequences are open")
 
 
@@ -116,9 +116,9 @@ def opened(found: Mapping[str, Value], names: Lazy) -> tuple[Mapping[str, Value]
         match value:
             case FunctionValue(table=table, default=default):
                 asking[name] = FunctionValue(_OpenTable(name, table, wanted, points), default)
-            case values_.Sequence(items=items):
+            case values_.SequenceValue(items=items):
                 asks: Any = _OpenItems(name, items, wanted)
-                asking[name] = values_.Sequence(asks)
+                asking[name] = values_.SequenceValue(asks)
     return ({**found, **asking} if asking else found), wanted
 
 
@@ -220,7 +220,7 @@ class _OpenItems(Sequence[Value]):
 def asking(value: Value) -> bool:
     """Whether a value that was computed holds on to an open sequence."""
     match value:
-        case values_.Sequence(items=items):
+        case values_.SequenceValue(items=items):
             return isinstance(items, _OpenItems) or any(map(asking, items))
         case Data(arguments=items) | tuple(items):
             return any(map(asking, items))

@@ -181,7 +181,7 @@ class Compiler:
                 return lambda env: tuple([c(env) for c in codes])
             case SequenceTerm(items=items) | SetTerm(items=items):
                 codes = tuple(map(self.code, items))
-                return lambda env: values.Sequence(tuple([c(env) for c in codes]))
+                return lambda env: values.SequenceValue(tuple([c(env) for c in codes]))
             case Apply():
                 return self._apply(term)
             case Index():
@@ -269,7 +269,7 @@ class Compiler:
             start, end = low(env), high(env)
             if end - start >= VALUES_ENUMERATED:
                 raise NotEvaluable("the sequence is too long to write out")
-            return values.Sequence(tuple(range(start, end + 1)))
+            return values.SequenceValue(tuple(range(start, end + 1)))
 
         return run
 

@@ -51,7 +51,7 @@ def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
                 return None
             several, size = inner, len(items)
             return lambda env, value: (
-                isinstance(value, values.Sequence) and len(value.items) == size and several(env, value.items)
+                isinstance(value, values.SequenceValue) and len(value.items) == size and several(env, value.items)
             )
         case Widen(term=inside):
             narrow = pattern(compiler, inside, unbound)

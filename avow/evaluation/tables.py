@@ -11,8 +11,7 @@ from avow.evaluation.evaluate import SEARCHES, compile_term, filler, guarded
 from avow.evaluation.quantifier_search import Search
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.formulas.renaming import rename_apart
-from avow.formulas.values import Data, FunctionValue, Opaque, Value
-from avow.formulas.values import Sequence as Items
+from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -92,7 +91,7 @@ def unnamed(sort: Sort) -> Value:
         case TupleSort(items=items):
             return tuple(map(unnamed, items))
         case SequenceSort(item=item):
-            return Items((unnamed(item),))
+            return SequenceValue((unnamed(item),))
         case OpaqueSort(name=name):
             return Opaque(name, 10**60)
         case DataSort(constructors=constructors):

@@ -224,7 +224,7 @@ def _collect(value: Any, carrier: str, found: set[Any]) -> None:
         case str():
             if carrier == "string":
                 found.add(value)
-        case Data(arguments=items) | values.Sequence(items=items):
+        case Data(arguments=items) | values.SequenceValue(items=items):
             for item in items:
                 _collect(item, carrier, found)
         case tuple():

@@ -16,8 +16,7 @@ from typing import Generic, TypeVar
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth, subterms
-from avow.formulas.values import FunctionValue, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import FunctionValue, SequenceValue, Value
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, SetSort, Sort
 from avow.language.terms import (
     And,

@@ -1,8 +1,8 @@
 """Concrete values of each sort, shared by everything that computes with them (evaluation, tests, monitors, simulation).
 
 BOOL is bool; INTEGER and NATURAL are int; REAL is `Fraction` (exact); STRING is str; an enumeration's element is an
-`Element`; an algebraic value is a `Data`; a tuple is a tuple; a sequence is a list frozen as `Sequence`; a function is
-a `FunctionValue`; an element of an unspecified sort is an `Opaque`.
+`Element`; an algebraic value is a `Data`; a tuple is a tuple; a sequence is a list frozen as `SequenceValue`; a
+function is a `FunctionValue`; an element of an unspecified sort is an `Opaque`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Data:
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class SequenceValue:
     items: tuple[Value, ...]
 
     def __str__(self) -> str:
@@ -89,7 +89,7 @@ class Binary(Fraction):
         return self._hash
 
 
-Value = bool | int | Fraction | str | Element | Data | Sequence | Opaque | FunctionValue | tuple["Value", ...]
+Value = bool | int | Fraction | str | Element | Data | SequenceValue | Opaque | FunctionValue | tuple["Value", ...]
 
 
 def show(value: Value) -> str:

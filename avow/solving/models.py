@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, Sequence, Value
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     BoolSort,
     DataSort,
@@ -92,7 +92,7 @@ class Model:
                 self._constructor(expr, sort, 1)
                 return tuple(self._value(expr.arg(k), item) for k, item in enumerate(items))
             case SequenceSort(item=item):
-                return Sequence(tuple(self._value(part, item) for part in _units(expr)))
+                return SequenceValue(tuple(self._value(part, item) for part in _units(expr)))
             case OpaqueSort(name=name):
                 universe = [u.sexpr() for u in self.z3_model.get_universe(self.translator.sort(sort)) or ()]
                 text = expr.sexpr()
@@ -208,7 +208,7 @@ def default_value(sort: Sort) -> Value:
         case TupleSort(items=items):
             return tuple(map(default_value, items))
         case SequenceSort():
-            return Sequence(())
+            return SequenceValue(())
         case OpaqueSort(name=name):
             return Opaque(name, 0)
         case FunctionSort(result=result):

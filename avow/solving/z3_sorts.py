@@ -7,8 +7,7 @@ from fractions import Fraction
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     INTEGER,
     BoolSort,

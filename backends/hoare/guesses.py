@@ -11,7 +11,7 @@ from typing import assert_never
 
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import subterms
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, Sequence, Value
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     INTEGER,
     NATURAL,
@@ -102,7 +102,7 @@ class Draw:
                 return tuple(self.value(item, depth + 1) for item in items)
             case SequenceSort(item=item):
                 length = rng.choice(LENGTHS) if depth < VALUE_DEPTH else 0
-                return Sequence(tuple(self.value(item, depth + 1) for _ in range(length)))
+                return SequenceValue(tuple(self.value(item, depth + 1) for _ in range(length)))
             case DataSort(constructors=constructors):
                 plain = [c for c in constructors if not any(isinstance(p, DataSort) for p in c.parameters)]
                 made = rng.choice(plain if plain and depth >= VALUE_DEPTH else constructors)

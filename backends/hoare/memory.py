@@ -15,8 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import longest_limits, remembers
-from avow.formulas.values import Data, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Data, SequenceValue, Value
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
 from avow.language.sorts import DataSort, NaturalSort, SequenceSort, Sort, TupleSort

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     BoolSort,

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from collections.abc import Sequence as Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeVar
 
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, Sequence, Value
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     STRING,
     BoolSort,
@@ -65,7 +64,7 @@ class Source:
             self._at += 1
         return value % bound
 
-    def of(self, values: Sized[T]) -> T:
+    def of(self, values: Sequence[T]) -> T:
         """One of some values; the first is the simplest."""
         return values[self.below(len(values))]
 
@@ -127,12 +126,12 @@ class Generator:
                     plain = self._value(Source(b""), item, {}, 1, False)
                     chance = random.Random(length)
                     mixed = (self._value(Source(chance.randbytes(8)), item, {}, 1, True) for _ in range(length))
-                    yield from (Sequence((plain,) * length), Sequence(tuple(mixed)))
+                    yield from (SequenceValue((plain,) * length), SequenceValue(tuple(mixed)))
                     if length > COMMON_LENGTHS and isinstance(item, RealSort | IntegerSort | NaturalSort):
                         yield from _odd_one_out(self.pools.edges.get(item, ()), length)
                 for value in self.pools.edges.get(item, ()):
                     simple = self._number(Source(b""), item, False) if item != STRING else value
-                    yield from (Sequence((value,)), Sequence((simple, value)))
+                    yield from (SequenceValue((value,)), SequenceValue((simple, value)))
             case _:  # the edges of the sort itself
                 yield from self.pools.edges.get(sort, ())
 
@@ -172,7 +171,7 @@ class Generator:
                 value = self._row(source, items, near, depth)
             case SequenceSort(item=item):
                 each = range(self._length(source, depth))
-                value = Sequence(tuple(self._value(source, item, near, depth + 1, source.coin()) for _ in each))
+                value = SequenceValue(tuple(self._value(source, item, near, depth + 1, source.coin()) for _ in each))
             case FunctionSort():
                 value = self._function(source, sort, near, depth)
             case SetSort():
@@ -279,7 +278,7 @@ class Generator:
         return FunctionValue({p: v for p, v in table.items() if v != default}, default)
 
 
-def _in_turn(streams: Sized[tuple[str, Iterator[Value]]]) -> Iterator[tuple[str, Value]]:
+def _in_turn(streams: Sequence[tuple[str, Iterator[Value]]]) -> Iterator[tuple[str, Value]]:
     """One value of each in its turn, so that none has to wait for the end of another."""
     waiting = list(streams)
     while waiting:
@@ -291,7 +290,7 @@ def _in_turn(streams: Sized[tuple[str, Iterator[Value]]]) -> Iterator[tuple[str,
         waiting = still
 
 
-def table(rows: Sized[tuple[Value, ...]], sort: FunctionSort) -> FunctionValue:
+def table(rows: Sequence[tuple[Value, ...]], sort: FunctionSort) -> FunctionValue:
     """A scenario's rows as a relation that holds at these; or as a function, each row ending in its result. Beside its
     rows a function's value is one that they do not have, where that is easily found."""
     if isinstance(sort.result, BoolSort):
@@ -312,5 +311,5 @@ def _odd_one_out(edges: Iterable[Value], length: int) -> Iterator[Value]:
     numbers = sorted(value for value in edges if isinstance(value, int | Fraction))
     if numbers:
         low, high = numbers[0], numbers[-1]
-        yield Sequence((*(low,) * (length - 1), high))
-        yield Sequence((*(high,) * (length - 1), low))
+        yield SequenceValue((*(low,) * (length - 1), high))
+        yield SequenceValue((*(high,) * (length - 1), low))

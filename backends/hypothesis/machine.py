@@ -10,8 +10,7 @@ import sys
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Data, FunctionValue, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Data, FunctionValue, SequenceValue, Value
 
 EXACT, FINITE, ANY = "exact", "float64", "float64-with-nan"
 """The option `numbers`: fractions; doubles; doubles, and whoever fails on one that is no number is refuted."""

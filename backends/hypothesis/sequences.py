@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.formulas.temporal.cells import longest_limits
-from avow.formulas.values import Data, Element, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Data, Element, SequenceValue, Value
 from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 

@@ -274,8 +274,7 @@ def _plain(name: str) -> str:
 
 
 def _sequence(length: Any, elements: Any) -> Any:
-    from avow.formulas.values import FunctionValue
-    from avow.formulas.values import Sequence as SequenceValue
+    from avow.formulas.values import FunctionValue, SequenceValue
 
     count = length if isinstance(length, int) and 0 <= length <= 64 else 0
     if not isinstance(elements, FunctionValue):

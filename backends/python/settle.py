@@ -23,8 +23,7 @@ from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, RETRY
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Element, Value
-from avow.formulas.values import Sequence as SequenceValue
+from avow.formulas.values import Element, SequenceValue, Value
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import Observed
 from avow.language.sorts import RealSort, SequenceSort

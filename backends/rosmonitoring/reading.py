@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any, assert_never
 
-from avow.formulas.values import Data, FunctionValue, Sequence, Value
+from avow.formulas.values import Data, FunctionValue, SequenceValue, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -112,7 +112,7 @@ def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
             raise MappingError(f"{show(raw)} is not a list of {len(items)}")
         case SequenceSort(item=item):
             if isinstance(raw, list):
-                return Sequence(tuple(convert(part, item, names) for part in raw))
+                return SequenceValue(tuple(convert(part, item, names) for part in raw))
             raise MappingError(f"{show(raw)} is not a list")
         case FunctionSort():
             return _relation_literal(raw, sort, names)

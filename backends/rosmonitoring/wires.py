@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Binary, Element, Sequence, Value
+from avow.formulas.values import Binary, Element, SequenceValue, Value
 from avow.language.sorts import (
     BoolSort,
     EnumSort,
@@ -98,7 +98,7 @@ def converter(sort: Sort, wire: Wire, names: Mapping[str, str], known: Definitio
             return lambda raw: element(raw, sort, names)
         case SequenceSort(item=item), Array(item=inner, length=length):
             part = converter(item, inner, names, known, frozenset())
-            return lambda raw: Sequence(tuple(map(part, _items(raw, length))))
+            return lambda raw: SequenceValue(tuple(map(part, _items(raw, length))))
         case TupleSort(items=items), Array(item=inner, length=length):
             parts = [converter(item, inner, names, known, gaps) for item in items]
             return lambda raw: tuple([p(x) for p, x in zip(parts, _items(raw, length), strict=True)])

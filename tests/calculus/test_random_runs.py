@@ -14,7 +14,7 @@ from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
 from avow.evaluation.evaluate import compile_term
-from avow.formulas.values import Element, FunctionValue, Sequence, Value
+from avow.formulas.values import Element, FunctionValue, SequenceValue, Value
 from avow.language.contract import Port
 from avow.language.sorts import BoolSort, EnumSort, FunctionSort, SequenceSort, Sort
 from avow.system.plan import Endpoint
@@ -107,7 +107,7 @@ def everything(sort: Sort) -> list[Value]:
         case EnumSort():
             return list(TINTS)
         case SequenceSort():
-            return [Sequence(tuple(map(Element, row))) for row in ROWS]
+            return [SequenceValue(tuple(map(Element, row))) for row in ROWS]
         case FunctionSort():
             return [
                 FunctionValue({(a,): r for a, r in zip(TINTS, results, strict=True)}, TINTS[0])
@@ -151,7 +151,7 @@ class Enumeration:
             "blue": TINTS[1],
             "TRUE": True,
             "FALSE": False,
-            "<red>": Sequence((TINTS[0],)),
+            "<red>": SequenceValue((TINTS[0],)),
         }
         ranges: list[list[Value]] = [
             everything(self.ports[n].sort) if (given := initial[n]) is None else [known[given]] for n in self.late

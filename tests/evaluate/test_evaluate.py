@@ -11,7 +11,7 @@ from helpers import some
 
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.evaluation.truth import judge
-from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
+from avow.formulas.values import Data, Element, FunctionValue, SequenceValue, Value
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -265,7 +265,7 @@ def test_linear_never_guesses_an_unrestricted_inner_variable() -> None:
 
 def test_sequences_and_sets() -> None:
     s = given("s", SequenceSort(INTEGER))
-    values: dict[str, Value] = {"in.s": Sequence((3, 5))}
+    values: dict[str, Value] = {"in.s": SequenceValue((3, 5))}
     assert evaluate(Index(s, nat(1), INTEGER), values) == 5
     assert evaluate(Length(s, NATURAL), values) == 2
     with pytest.raises(NotEvaluable, match="outside a sequence"):
@@ -282,7 +282,7 @@ def test_sequences_and_sets() -> None:
         )
         is True
     )
-    assert evaluate(SequenceRange(nat(2), nat(1), SequenceSort(NATURAL)), {}) == Sequence(())
+    assert evaluate(SequenceRange(nat(2), nat(1), SequenceSort(NATURAL)), {}) == SequenceValue(())
     colour = given("r", COLOUR)
     dangerous = SetTerm((EnumValue("red", COLOUR), EnumValue("orange", COLOUR)), SetSort(COLOUR))
     assert evaluate(In(colour, dangerous), {"in.r": Element("red")}) is True

@@ -15,7 +15,7 @@ from avow.backends.hoare.interpreter import Machine, NoEnd
 from avow.base.verdict import Outcome, Verdict
 from avow.evaluation.evaluate import evaluate
 from avow.evidence.status import Status
-from avow.formulas.values import Sequence
+from avow.formulas.values import SequenceValue
 from avow.solving.models import default_value
 from hoare.systems import make_job
 
@@ -188,7 +188,7 @@ def test_random_loops_against_running_them(tmp_path: Path, seed: int) -> None:
             given = {
                 "a": rng.randrange(-3, 6),
                 "b": rng.randrange(-3, 6),
-                "s": Sequence(tuple(rng.randrange(3) for _ in range(rng.randrange(4)))),
+                "s": SequenceValue(tuple(rng.randrange(3) for _ in range(rng.randrange(4)))),
             }
             state = {v.name: given.get(v.name, default_value(v.sort)) for v in checked.state}
             state |= {g.name: state[v.name] for v, g in checked.ghosts.items()}

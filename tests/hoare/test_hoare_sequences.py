@@ -15,7 +15,7 @@ from avow.backends.hoare.backend import load
 from avow.backends.hoare.interpreter import Machine
 from avow.base.verdict import Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
-from avow.formulas.values import Element, Sequence
+from avow.formulas.values import Element, SequenceValue
 from avow.solving.models import default_value
 from hoare.systems import make_job
 
@@ -237,10 +237,10 @@ def test_what_is_proved_survives_random_runs(tmp_path: Path, seed: int) -> None:
         checked = load(job).checked.program
         for _ in range(60):
             inputs = {
-                "loads": Sequence(
+                "loads": SequenceValue(
                     tuple(Fraction(rng.choice((-1, 0, 1, 2))) for _ in range(rng.choice((0, 1, 2, 2, 3))))
                 ),
-                "counts": Sequence(()),
+                "counts": SequenceValue(()),
                 "mode": Element(rng.choice(("off", "slow", "fast"))),
                 "k": rng.choice((-1, 0, 1, 2)),
             }

@@ -12,7 +12,7 @@ from helpers import some
 
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.formula import conjunction
-from avow.formulas.values import Sequence
+from avow.formulas.values import SequenceValue
 from avow.language.contract import Node
 from avow.language.definedness import defined, unless_without_value, with_value
 from avow.language.load import check_text, parse_formula
@@ -128,7 +128,7 @@ def made(r: random.Random, depth: int) -> Made:
 
 
 def values(p: dict[str, Any]) -> dict[str, Any]:
-    return {f"in.{name}": Sequence(value) if name == "s" else value for name, value in p.items()}
+    return {f"in.{name}": SequenceValue(value) if name == "s" else value for name, value in p.items()}
 
 
 @pytest.mark.parametrize("seed", some(range(400), 60))

@@ -6,7 +6,7 @@ import pytest
 
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term
-from avow.formulas.values import Sequence
+from avow.formulas.values import SequenceValue
 from avow.language.definedness import defined
 from avow.sanity.analysis import Bounds, analyse
 
@@ -50,7 +50,7 @@ def test_the_condition_says_when_nothing_outside_matters(text: str, short: bool,
     for items, expected in (((0,), short), ((0, 0), at_one)):
         for b in (False, True) if expected else ("b -> s" in text,):
             try:
-                holds = bool(compile_term(condition)({"out.s": Sequence(items), "out.b": b}))
+                holds = bool(compile_term(condition)({"out.s": SequenceValue(items), "out.b": b}))
             except NotEvaluable:
                 holds = False
             assert holds is expected

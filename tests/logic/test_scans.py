@@ -15,7 +15,7 @@ from helpers import some
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.formula import conjunction
-from avow.formulas.values import Sequence
+from avow.formulas.values import SequenceValue
 from avow.language.contract import Node
 from avow.language.sorts import NATURAL, REAL
 from avow.language.terms import And, Arithmetic, Compare, Implies, Index, Length, Literal, Role, Term, Variable
@@ -112,14 +112,14 @@ def random_scan(rng: random.Random) -> Node:
     return node(f"inputs( s : <REAL> ) outputs( m : REAL, k : REAL ) | assume( {assumption} ) {clauses}")
 
 
-SCANS = [Sequence(items) for length in range(4) for items in product(map(Fraction, range(3)), repeat=length)]
+SCANS = [SequenceValue(items) for length in range(4) for items in product(map(Fraction, range(3)), repeat=length)]
 
 
-def allowed(about: Node, scan: Sequence) -> bool:
+def allowed(about: Node, scan: SequenceValue) -> bool:
     return all(compile_term(clause.formula)({"in.s": scan}) for clause in about.assumptions)
 
 
-def has_output(about: Node, scan: Sequence) -> bool:
+def has_output(about: Node, scan: SequenceValue) -> bool:
     """Whether some outputs do. They are compared with the elements, 1, and one another: so it is enough to try these
     numbers, and two numbers between each, below and above all."""
     edges = sorted({*map(Fraction, scan.items), Fraction(1)})
@@ -135,8 +135,8 @@ def test_brute_force_agrees(seed: int) -> None:
     answer = asked(about, 2_000)
     stuck = [scan for scan in SCANS if allowed(about, scan) and not has_output(about, scan)]
     if answer.verdict is Verdict.REFUTED:
-        (scan,) = answer.inputs.values() or (Sequence(()),)
-        assert isinstance(scan, Sequence)
+        (scan,) = answer.inputs.values() or (SequenceValue(()),)
+        assert isinstance(scan, SequenceValue)
         assert allowed(about, scan)
         assert not has_output(about, scan)
     else:

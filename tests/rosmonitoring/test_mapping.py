@@ -13,7 +13,7 @@ from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.rml_translate import translate
 from avow.backends.rosmonitoring.watched import Fault
 from avow.base.diagnostics import Diagnostic
-from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
+from avow.formulas.values import Data, Element, FunctionValue, SequenceValue, Value
 from avow.ros.bags import enveloped
 from avow.system.plan import System
 
@@ -79,7 +79,7 @@ def faults_of(system: System) -> tuple[Diagnostic, ...]:
         ("in.c", {"topic": "c", "level": "red"}, Element("red")),
         ("in.at", {"topic": "at", "posX": 1, "frame": "map", "posY": 2.5}, {(Fraction(1), Fraction(5, 2))}),
         ("in.at", {"topic": "at", "data": {"posX": 1, "posY": 2}}, {(Fraction(1), Fraction(2))}),
-        ("in.list", {"topic": "list", "data": [1, 2]}, Sequence((1, 2))),
+        ("in.list", {"topic": "list", "data": [1, 2]}, SequenceValue((1, 2))),
     ],
 )
 def test_the_definition_decides_the_field(

@@ -12,7 +12,7 @@ from helpers import some
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
-from avow.formulas.values import FunctionValue, Sequence, Value
+from avow.formulas.values import FunctionValue, SequenceValue, Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL, FunctionSort, SequenceSort
@@ -72,7 +72,7 @@ def run_of(rng: random.Random, length: int = 6) -> list[Step]:
             "in.f": FunctionValue({(n,): True for n in some()}, False),
             "in.g": FunctionValue({(n,): rng.randrange(NAMED) for n in some()}, 0),
             "in.p": FunctionValue(pairs, False),
-            "in.s": Sequence(tuple(some())),
+            "in.s": SequenceValue(tuple(some())),
         }
 
     return [step() for _ in range(length)]
@@ -119,7 +119,7 @@ def said(clause: str, ports: str = "f : NATURAL --> BOOL, g : NATURAL --> REAL, 
 def test_each_item_of_an_array_has_its_own_past() -> None:
     """An index that the array of the step before did not have, has no value before."""
     near = said("forall(i in indices(in.s) | previous(in.s(i), in.s(i)) - 1 <= in.s(i) or in.s(i) == 0)")
-    run: list[Step] = [{"in.s": Sequence(tuple(items))} for items in ((5, 5), (5, 4), (4, 0), (1, 0), (1, 1))]
+    run: list[Step] = [{"in.s": SequenceValue(tuple(items))} for items in ((5, 5), (5, 4), (4, 0), (1, 0), (1, 1))]
     assert test_cells.judged(near, run) == [True, True, True, False, True]
 
 

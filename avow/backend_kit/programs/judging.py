@@ -12,7 +12,7 @@ from avow.drive.steps import plain
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
 from avow.formulas.conditions import Condition, conditions
-from avow.formulas.values import Binary, Element, Sequence, Value, show
+from avow.formulas.values import Binary, Element, SequenceValue, Value, show
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort
@@ -47,7 +47,7 @@ class Formula:
         """As `holds`, where a value (of a sequence the first item) is NaN or an infinity: compared as IEEE 754 does.
         None where that cannot be told."""
         held = values[name]
-        put: Any = Sequence((special, *held.items[1:])) if isinstance(held, Sequence) else special  # type: ignore[arg-type]
+        put: Any = SequenceValue((special, *held.items[1:])) if isinstance(held, SequenceValue) else special  # type: ignore[arg-type]
         try:
             return bool(self.evaluator({**values, name: put})) if self.evaluator is not None else None
         except (NotEvaluable, ValueError, ArithmeticError, TypeError):
@@ -82,7 +82,7 @@ def exact(value: Any) -> Value:
         case str():
             return Element(value)
         case list():
-            return Sequence(tuple(exact(item) for item in value))
+            return SequenceValue(tuple(exact(item) for item in value))
         case _:  # an int or a fraction
             return value  # type: ignore[no-any-return]
 
