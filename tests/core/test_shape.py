@@ -23,6 +23,50 @@ STAYS = {
 """What outlives a run in `avow.pipeline`, and why it may. A function that keeps answers is pure, and its answers are of
 its arguments; one without arguments is listed."""
 
+PROCESS = "a process has one: what it may do, what it started, what it has to end, what it spent"
+ONCE = (
+    "a file of the package, a grammar, a library or a tool: read, loaded or asked when first needed, and the same after"
+)
+KEPT = "what was computed of the same arguments: faster, and never another answer"
+PATCHED = "another's module, in the process of a subject or for the time of a search"
+ELSEWHERE = {
+    "avow/assurance/policy._data": ONCE,
+    "avow/backend_kit/registry._trusted": PROCESS,
+    "avow/backend_kit/registry.every_code": ONCE,
+    "avow/backend_kit/registry.installed": ONCE,
+    "avow/base/process._adopted_since": PROCESS,
+    "avow/base/process._ended_by_others": PROCESS,
+    "avow/base/process._libc": ONCE,
+    "avow/base/process._lock": PROCESS,
+    "avow/base/process._running": PROCESS,
+    "avow/calculus/kept_answers._kept": "where a work's answers are kept, for the time of that work",
+    "avow/calculus/scenario._KEYS": KEPT,
+    "avow/fretish/sentence._lark": ONCE,
+    "avow/isolation/level.seals": ONCE,
+    "avow/isolation/senses._posixsubprocess.fork_exec": PATCHED,
+    "avow/isolation/senses.datetime.datetime": PATCHED,
+    "avow/isolation/senses.posix.environ": PATCHED,
+    "avow/isolation/senses.sqlite3.connect": PATCHED,
+    "avow/isolation/tracing.traces": ONCE,
+    "avow/language/load._under": KEPT,
+    "avow/language/parser._lark": ONCE,
+    "avow/lsp/plan_completion._schema": ONCE,
+    "avow/report/page.environment": ONCE,
+    "avow/solving/limits._kennel": PROCESS,
+    "avow/solving/limits._spent": PROCESS,
+    "avow/solving/smtlib._cvc5": ONCE,
+    "avow/solving/z3_module.z3": ONCE,
+    "avow/system/schema.plan_schema": ONCE,
+    "backends/ajpf/parser._grammar": ONCE,
+    "backends/ajpf/spin_tool.version": ONCE,
+    "backends/hoare/parser._lark": ONCE,
+    "backends/hypothesis/bench.providers.is_local_module_file": PATCHED,
+    "backends/rosmonitoring/rml_reader._parser": ONCE,
+    "backends/rosmonitoring/traces._decoder": ONCE,
+}
+"""What outlives a call in the other rooms, and why it may."""
+FUNCTIONS = {"attrgetter", "itemgetter"}
+
 CHANGES = {"add", "append", "clear", "discard", "extend", "insert", "pop", "popitem", "remove", "setdefault", "update"}
 HOLDERS = {"ContextVar", "Lock", "RLock", "defaultdict", "deque", "dict", "list", "local", "set"}
 CACHES = {"by_identity", "cache", "lru_cache"}
@@ -39,6 +83,7 @@ def state(source: str) -> set[str]:
     written as constants, constants that something changes, functions without arguments that keep what they
     answer, names of other modules."""
     tree = ast.parse(source)
+    nodes = list(ast.walk(tree))
     values = {
         target.id: node.value
         for node in tree.body
@@ -48,23 +93,23 @@ def state(source: str) -> set[str]:
     }
     modules = {
         (a.asname or a.name).partition(".")[0]
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Import | ast.ImportFrom)
         for a in node.names
         if isinstance(node, ast.Import) or a.name.islower()
     }
     holders = {name for name, value in values.items() if _holds(name, value)}
-    return holders | (set(_changed(tree)) & set(values)) | set(_of_others(tree, modules)) | set(_keeping(tree))
+    return holders | (set(_changed(nodes)) & set(values)) | set(_of_others(nodes, modules)) | set(_keeping(tree))
 
 
 def _holds(name: str, value: ast.expr | None) -> bool:
     if name.startswith("__") or name.strip("_").isupper() or name.strip("_")[:1].isupper():
         return isinstance(value, ast.Call) and _called(value) in HOLDERS - {"dict", "list", "set"}
-    return True
+    return not (isinstance(value, ast.Call) and _called(value) in FUNCTIONS)
 
 
-def _changed(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+def _changed(nodes: list[ast.AST]) -> Iterator[str]:
+    for node in nodes:
         if isinstance(node, ast.Global):
             yield from node.names
         elif (
@@ -80,8 +125,8 @@ def _changed(tree: ast.Module) -> Iterator[str]:
             yield node.func.value.id
 
 
-def _of_others(tree: ast.Module, modules: set[str]) -> Iterator[str]:
-    for node in ast.walk(tree):
+def _of_others(nodes: list[ast.AST], modules: set[str]) -> Iterator[str]:
+    for node in nodes:
         if not (isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)):
             continue
         if isinstance(node.value, ast.Name) and node.value.id in modules:
@@ -109,6 +154,12 @@ def _called(node: ast.expr) -> str:
 def test_what_a_run_knows_stands_in_its_object() -> None:
     found = {f"{p.stem}.{name}" for p in sorted(PIPELINE.glob("*.py")) for name in state(p.read_text("utf-8"))}
     assert found == set(STAYS), "put it into `State` or `Run`; what is of the process, and not of a run, has its reason"
+
+
+def test_what_outlives_a_call_has_its_reason() -> None:
+    files = [p for room in ("avow", "backends") for p in (ROOT / room).rglob("*.py") if PIPELINE not in p.parents]
+    found = {f"{p.relative_to(ROOT).with_suffix('')}.{name}" for p in files for name in state(p.read_text("utf-8"))}
+    assert found == set(ELSEWHERE), "put it into an object that whoever needs it is handed"
 
 
 @pytest.mark.parametrize(

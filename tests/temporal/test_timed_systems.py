@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 from fractions import Fraction
-from itertools import product
 from pathlib import Path
 
 import pytest
@@ -13,25 +11,17 @@ from click.testing import CliRunner
 from helpers import some
 
 from avow.base.verdict import Verdict
-from avow.calculus.composition import compose
-from avow.calculus.obligations import all_obligations, settle_all
 from avow.cli.simulate import command as simulate
-from avow.evaluation.evaluate import compile_term
-from avow.evaluation.running import Keeper
 from avow.formulas.formula import substitute
-from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import Unsaid
 from avow.formulas.temporal.clock import Timed, one_step
-from avow.formulas.values import Value
 from avow.language.load import check_text
-from avow.language.printer import show_term
 from avow.language.sorts import REAL
 from avow.language.terms import Implies, Literal, Past, Term, histories, timed
 from avow.sanity.viability import viable
-from avow.system.load import load_system
 from temporal.test_clock import X, formula
+from temporal.test_systems import Enumeration, system, verdicts
 
-STATES = 300
 STOPPER = """
 node lidar {{ inputs( fault : BOOL ) outputs( silent : BOOL ) topics() guarantee same ( out.silent <=> in.fault ) }}
 node stopper {{
@@ -46,17 +36,6 @@ node log {{
   guarantee fine ( out.fine )
 }}
 """
-
-
-def verdicts(folder: Path) -> dict[str, Verdict]:
-    composition = compose(load_system(folder))
-    obligations = all_obligations(composition)
-
-    class Limits:
-        seconds, seed = 5.0, 0
-
-    found = settle_all(composition, obligations, Limits())
-    return {o.name: outcome.verdict for o, outcome in zip(obligations, found, strict=True)}
 
 
 def stopped(folder: Path, pace: str, by: str, more: str = "") -> Verdict:
@@ -120,47 +99,6 @@ def clause(rng: random.Random) -> Term:
             return found
 
 
-class Enumeration:
-    """Every run, in steps of a second, of two nodes over truth values: `a` reads `e` and says `w`, `b` reads `w`."""
-
-    def __init__(self, said: Term, assumed: Term, promised: Term) -> None:
-        self.parts = []
-        for term, names in ((said, "ew"), (assumed, "ww"), (promised, "wv")):
-            records = Timed()
-            self.parts.append((compile_term(records.clause(term)), Keeper(records.cells), names))
-
-    def reach(self) -> Iterator[bool]:
-        """At every step that a run can come to, whether b's assumption holds."""
-        first = (*(tuple(keeper.memory.items()) for _, keeper, _ in self.parts), True)
-        seen, waiting = {first}, [first]
-        while waiting:
-            *memories, kept = waiting.pop()
-            for e, w, v in product((False, True), repeat=3):
-                values = {"e": e, "w": w, "v": v}
-                holds, after = [], []
-                for (judge, keeper, (one, other)), memory in zip(self.parts, memories, strict=True):
-                    keeper.memory = dict(memory)
-                    ports: dict[str, Value] = {
-                        "in.a": values[one],
-                        "out.b": values[other],
-                        CLOCK.qualified: Fraction(1),
-                    }
-                    holds.append(bool(judge(keeper.at(ports))))
-                    keeper.advance(ports)
-                    after.append(tuple(keeper.memory.items()))
-                said, assumed, promised = holds
-                still = kept and assumed
-                if not said or (still and not promised):
-                    continue
-                yield assumed
-                state = (*after, still)
-                if state not in seen:
-                    seen.add(state)
-                    waiting.append(state)
-                    if len(seen) > STATES:
-                        raise OverflowError
-
-
 def drawn(seed: int) -> tuple[Term, Term, Term]:
     rng = random.Random(seed)
     return clause(rng), clause(rng), clause(rng)
@@ -171,21 +109,12 @@ def drawn(seed: int) -> tuple[Term, Term, Term]:
 def test_no_run_says_otherwise(seed: int, tmp_path: Path) -> None:
     said, assumed, promised = drawn(seed)
 
-    def text(term: Term, one: str, other: str) -> str:
-        return show_term(term, "rcl").replace("in.a", f"in.{one}").replace("out.b", other)
-
-    (tmp_path / "system.rcl").write_text(
-        "node a { inputs( e : BOOL ) outputs( w : BOOL ) topics() steps( every 1 s ) "
-        f"guarantee g ( {text(said, 'e', 'out.w')} ) }}\n"
-        f"node b {{ inputs( w : BOOL ) outputs( v : BOOL ) topics() assume m ( {text(assumed, 'w', 'in.w')} )"
-        f" guarantee h ( {text(promised, 'w', 'out.v')} ) }}\n"
-    )
-    (tmp_path / "plan.yaml").write_text("{}")
+    folder = system(tmp_path, said, assumed, promised, pace="steps( every 1 s )")
     try:
-        met = all(Enumeration(said, assumed, promised).reach())
+        met = all(assumed for assumed, _, _ in Enumeration(said, assumed, promised, Timed).reach())
     except (OverflowError, Unsaid):
         pytest.skip("too many states, or not said")
-    found = verdicts(tmp_path)["whole.b.m"]
+    found = verdicts(folder)["whole.b.m"]
     assert found is not Verdict.PROVED or met
     assert found is not Verdict.REFUTED or not met
 
