@@ -14,9 +14,9 @@ from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
+from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.lexer import Token
 from avow.language.lookups import lookups
-from avow.language.outline import FileSyntax, NodeSyntax
 from avow.language.printer import show_sort, show_term
 from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort

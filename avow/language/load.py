@@ -16,10 +16,11 @@ from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.environment import of_contract
+from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.lexer import Token, tokens
 from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
-from avow.language.outline import FileSyntax, NodeSyntax, read
+from avow.language.outline import read
 from avow.language.parser import parse
 from avow.language.scope import BOTH_ROLES, Defined, Scope
 from avow.language.sorts import Sort

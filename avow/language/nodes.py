@@ -11,10 +11,10 @@ from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
 from avow.language.definedness import with_value
 from avow.language.environment import did_you_mean
+from avow.language.file_syntax import ClauseSyntax, NodeSyntax
 from avow.language.flat import flat
 from avow.language.lexer import Token, unquote
 from avow.language.limits import sort_extent, term_extent
-from avow.language.outline import ClauseSyntax, NodeSyntax
 from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
 from avow.language.source import Reports

@@ -8,15 +8,14 @@ begin a section even where a bracket before them was never closed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
 
-from avow.base.records import dataclass
 from avow.language.contract import ClauseKind
 from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keyword
+from avow.language.file_syntax import ClauseSyntax, FileSyntax, NodeSyntax
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
-from avow.language.syntax import Declaration, Define, PortList, TermSyntax, TopicList
+from avow.language.syntax import Declaration, Define, PortList, TopicList
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _NESTED = {**_OPEN, "LSQUARE": "RSQUARE"}
@@ -25,43 +24,6 @@ _TOP = frozenset(("CONTEXT", "NODE"))
 _SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "DEFINE", "ASSUME", "GUARANTEE"))
 _SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
 _ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "STEPS": 3, "DEFINE": 4, "ASSUME": 5, "GUARANTEE": 6}
-
-
-@dataclass(frozen=True, slots=True)
-class ClauseSyntax:
-    kind: ClauseKind
-    name: Token | None
-    sentence: Token | None
-    formula: TermSyntax | None
-    """None: it was in error, which has been reported."""
-    inside: tuple[int, int]
-    """Where the formula stands, between the parentheses."""
-    start: int
-    end: int
-
-
-@dataclass(slots=True)
-class NodeSyntax:
-    """`broken` are names that a part in error seems to declare; nothing more should be said about them."""
-
-    name: Token
-    start: int
-    end: int = 0
-    inputs: PortList | None = None
-    outputs: PortList | None = None
-    topics: TopicList | None = None
-    definitions: list[Define] = field(default_factory=list)
-    clauses: list[ClauseSyntax] = field(default_factory=list)
-    broken: set[str] = field(default_factory=set)
-
-
-@dataclass(slots=True)
-class FileSyntax:
-    declarations: list[Declaration] = field(default_factory=list)
-    nodes: list[NodeSyntax] = field(default_factory=list)
-    broken: set[str] = field(default_factory=set)
-    parts: list[tuple[int, int]] = field(default_factory=list)
-    """Where each declaration, node, and part of a node stands: what a comment before it is about."""
 
 
 def read(tokens: Sequence[Token], reports: Reports) -> FileSyntax:
