@@ -44,7 +44,7 @@ METHODS = {
     "sensor": {"in.r": "value", "out.value": "value", "out.level": "level"},
     "guard": {"in.value": "value", "out.slow": "stop"},
 }
-FAULTS = ("none", "value", "label", "stop", "negative", "environment", "nan", "inf", "silence", "jump")
+FAULTS = ("none", "value", "label", "stop", "negative", "environment", "nan", "inf", "silence", "jump", "lost", "twice")
 Said = tuple[float, str, dict[str, Any], int]
 """When, on which topic, what, and with which number."""
 
@@ -78,7 +78,7 @@ def run(rng: random.Random, fault: str, length: int) -> tuple[list[Said], int]:
         told = {"value": value, "level": 2 if value >= 50 else 0}
         slow = value >= 50
         if k == when:
-            if fault in ("environment", "nan", "inf", "silence", "jump"):
+            if fault in ("environment", "nan", "inf", "silence", "jump", "lost", "twice"):
                 wrong = 3 * k
             elif fault == "stop":
                 slow, wrong = not slow, 3 * k + 2
@@ -91,6 +91,10 @@ def run(rng: random.Random, fault: str, length: int) -> tuple[list[Said], int]:
         said.append((time + rng.uniform(-0.002, 0.004), "/rate", told, 3 * k + 1))
         if k % 5 == 0 or k == when:  # it has a rate of its own, and a delay
             said.append((time + rng.uniform(0.0, 0.03), "/guard/stop", {"stop": slow}, 3 * k + 2))
+    if fault == "lost":
+        said = [one for one in said if one[3] != 3 * when + 1]
+    if fault == "twice":
+        said += [(time + 0.001, *rest) for time, *rest in said if rest[-1] == 3 * when]  # type: ignore[misc]
     return sorted(said, key=lambda one: one[0]), wrong
 
 
