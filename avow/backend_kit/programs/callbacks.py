@@ -8,7 +8,7 @@ import random
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from avow.system.paths import inside
 from avow.system.plan import Driving, Source, System
 from avow.system.schema import suggest
 from avow.system.topics import whole_name
-from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP
+from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 
 SECOND = 10**9
 STEP = SECOND // 10
@@ -161,7 +161,12 @@ class Driver:
         for _ in range(messages if topics else 0):
             topic = chance.choice(topics)
             at += drawing.gap()
-            yield Event(topic, at, drawing.message(Nested(self.topics.heard[topic]), at))
+            kind = self.topics.heard[topic]
+            made = drawing.message(Nested(kind), at)
+            before = drawing.made.setdefault(kind, [])
+            made = _with_floats(made, chance.choice(before)) if before and chance.random() < NUMBERS_AGAIN else made
+            before.append(made)
+            yield Event(topic, at, made)
 
     def words(self) -> list[str]:
         """What a text of the contract's types may be."""
@@ -412,6 +417,18 @@ def _words(sort: Any) -> tuple[str, ...]:
             return ()
 
 
+def _with_floats(made: Any, before: Any) -> Any:
+    """A message with the floats of an earlier one of its type: a robot comes where it was told to go."""
+    match made, before:
+        case {"d": fields}, {"d": others}:
+            pairs = zip(fields, others, strict=True)
+            return {"d": [[name, _with_floats(mine, old)] for (name, mine), (_, old) in pairs]}
+        case {"f": _}, {"f": _}:
+            return before
+        case _:  # what is no float
+            return made
+
+
 @dataclass(slots=True)
 class _Drawing:
     """Draws messages, at times that lie as far apart as the numbers say, in seconds."""
@@ -421,6 +438,8 @@ class _Drawing:
     known: Definitions
     chance: random.Random
     last: float = 0.0
+    made: dict[str, list[Any]] = field(default_factory=dict)
+    """Type → the messages so far."""
 
     def gap(self) -> int:
         if self.chance.random() < 0.7:

@@ -50,7 +50,7 @@ def drive(fault=None, seconds=400.0, tap=None, sources=None):
         bus.tap(tap)
     chosen = parameters(fault, sources)
     for bus.speaker, start in NODES.items():
-        start(bus, chosen)
+        start(bus, chosen[bus.speaker])
     bus.speaker = "world"
     world = Simulation(bus, TICK, chosen)
     done = []

@@ -16,7 +16,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -27,55 +26,26 @@ sys.path.append("/usr/lib/python3/dist-packages")  # where Debian has rospy; las
 import faults  # noqa: E402
 from bus import TICK  # noqa: E402
 from drive import parameters  # noqa: E402
-from wiring import DEFINITION, FIELDS, NODES, TYPE, Simulation  # noqa: E402
+from wiring import NODES, Simulation  # noqa: E402
 
 FILTERED = {"agent": ("/command",)}
 """As in the plan: what these say there comes to the monitor first."""
 
 
-class Bus:
-    """The calls of `bus.Bus`, by rospy; every topic is latched, as the plan supposes. `change`: a fault of `faults`."""
-
-    def __init__(self, name, change=None):
-        import genpy.dynamic
-        import rospy
-
-        self.rospy = rospy
-        self.kind = genpy.dynamic.generate_dynamic(TYPE, DEFINITION)[TYPE]
-        self.lock = threading.Lock()
-        self.spoken = {}
-        self.change = change
-        self.started = time.monotonic()
-        rospy.init_node(name)
-
-    def announce(self, topic):
-        self.spoken[topic] = self.rospy.Publisher(f"/{topic}", self.kind, queue_size=100, latch=True)
-
-    def hear(self, topic, act):
-        def heard(message):
-            with self.lock:
-                act({field: getattr(message, field) for field in FIELDS[topic]})
-
-        self.rospy.Subscriber(f"/{topic}", self.kind, heard, queue_size=100)
-
-    def say(self, topic, message):
-        if self.change is not None:
-            message = self.change(topic, message, time.monotonic() - self.started)
-        if message is not None:
-            self.spoken[topic].publish(self.kind(**message))
-
-
 def one(name, fault=None, sources=None):
     """Be one node, or the world."""
+    import rospy
+    from ros_nodes import Bus
+
     bus = Bus(name, faults.SAID.get(fault))
     chosen = parameters(fault, sources)
     if name != "world":
-        NODES[name](bus, chosen)
-        bus.rospy.spin()
+        NODES[name](bus, chosen[name])
+        rospy.spin()
         return
     world = Simulation(bus, TICK, chosen)
-    rate = bus.rospy.Rate(1 / TICK)
-    while not bus.rospy.is_shutdown():
+    rate = rospy.Rate(1 / TICK)
+    while not rospy.is_shutdown():
         world.tick()
         rate.sleep()
 
