@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import numbers
 from collections.abc import Callable
 from typing import Any
 
@@ -21,24 +22,48 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         ns: int
 
         def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-            if isinstance(secs, float):
-                whole = int(secs // 1)
-                self.ns = whole * SECOND + round((secs - whole) * SECOND)
-            else:
-                self.ns = secs * SECOND + nsecs
+            if not isinstance(secs, numbers.Integral):
+                if nsecs != 0:
+                    raise ValueError("if secs is a float, nsecs cannot be set")
+                whole = int(secs)
+                secs, nsecs = whole, int((secs - whole) * 1000000000)  # cut off, as genpy does
+            self.ns = int(secs) * SECOND + int(nsecs)
+            self.possible()
+
+        def possible(self) -> None:
+            """Raises TypeError where there is no such moment."""
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("__"):
+                raise AttributeError(name)
+            raise driven.refuse(f"rospy.{type(self).__name__}.{name}")
 
         @classmethod
         def of(cls, ns: int) -> Any:
             made = cls()
             made.ns = ns
+            made.possible()
             return made
 
         @classmethod
         def from_sec(cls, seconds: float) -> Any:
             return cls(float(seconds))
 
-        secs = property(lambda self: self.ns // SECOND)
-        nsecs = property(lambda self: self.ns % SECOND)
+        @property
+        def secs(self) -> int:
+            return self.ns // SECOND
+
+        @secs.setter
+        def secs(self, secs: int) -> None:
+            self.ns = secs * SECOND + self.ns % SECOND
+
+        @property
+        def nsecs(self) -> int:
+            return self.ns % SECOND
+
+        @nsecs.setter
+        def nsecs(self, nsecs: int) -> None:
+            self.ns = self.secs * SECOND + nsecs
 
         def to_sec(self) -> float:
             return float(self.secs) + float(self.nsecs) / 1e9
@@ -61,8 +86,11 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def __hash__(self) -> int:
             return hash(self.ns)
 
+        def __str__(self) -> str:
+            return str(self.ns)
+
         def __repr__(self) -> str:
-            return f"{type(self).__name__}({self.secs}, {self.nsecs})"
+            return f"rospy.{type(self).__name__}[{self.ns}]"
 
     class Duration(Moment):
         __slots__ = ()
@@ -73,6 +101,26 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def __sub__(self, other: Any) -> Any:
             return Duration.of(self.ns - other.ns) if isinstance(other, Duration) else NotImplemented
 
+        def __mul__(self, by: Any) -> Any:
+            if isinstance(by, numbers.Integral):
+                return Duration.of(self.ns * int(by))
+            return Duration.from_sec(self.to_sec() * float(by)) if isinstance(by, numbers.Real) else NotImplemented
+
+        __rmul__ = __mul__
+
+        def __truediv__(self, by: Any) -> Any:
+            if isinstance(by, Duration):
+                return self.to_sec() / by.to_sec()
+            return Duration.from_sec(self.to_sec() / float(by)) if isinstance(by, numbers.Real) else NotImplemented
+
+        def __floordiv__(self, by: Any) -> Any:
+            if isinstance(by, Duration):
+                return int(self.to_sec() // by.to_sec())
+            return Duration.from_sec(self.to_sec() // float(by)) if isinstance(by, numbers.Real) else NotImplemented
+
+        def __mod__(self, by: Any) -> Any:
+            return Duration.from_sec(self.to_sec() % by.to_sec()) if isinstance(by, Duration) else NotImplemented
+
         def __neg__(self) -> Any:
             return Duration.of(-self.ns)
 
@@ -81,6 +129,10 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
 
     class Time(Moment):
         __slots__ = ()
+
+        def possible(self) -> None:
+            if self.ns < 0:
+                raise TypeError("time values must be positive")
 
         @staticmethod
         def now() -> Any:
