@@ -6,8 +6,9 @@
 import sys
 from pathlib import Path
 
-if Path(sys.path[0]).resolve() == Path(__file__).resolve().parent:
-    del sys.path[0]  # put there by doit: no module of this folder is to stand in for one of Avow's
+if (here := Path(__file__).resolve().parent) in map(Path.resolve, map(Path, sys.path[:2])):
+    # put there by doit and by `python -m`: no module of this folder is to stand in for one of Avow's
+    sys.path[:2] = [place for place in sys.path[:2] if Path(place).resolve() != here]
 
 from avow.pipeline.tasks import Pipeline
 
