@@ -62,6 +62,7 @@ class Clock:
         if self._by is By.SIM and str(event.get("topic", "")).lstrip("/") != SIMULATED:
             return None
         try:
-            return seconds(at(event, way))
+            read = seconds(at(event, way))
         except MappingError:
             return None
+        return None if self._by is By.STAMP and not read else read  # ROS leaves 0 where nobody has set it

@@ -74,6 +74,11 @@ def test_without_the_clock_nothing_is_judged(make_system: Make, monkeypatch: pyt
         monitor = Monitor(found(made(make_system, by)))
         assert [v for event in run("receipt", 9) for v in monitor.step(event)] == monitor.finish() == []
         assert what in monitor.backwards
+    unset = Monitor(found(made(make_system, "stamp")))
+    for event in run("receipt", 9):
+        unset.step({**event, "header": {"stamp": time(0)}})
+    assert unset.finish() == []
+    assert "no message had a `header.stamp`" in unset.backwards
     monkeypatch.setattr(clocks, "EVENTS_WITHOUT_CLOCK", 5)
     late = Monitor(found(made(make_system, "sim")))
     events = run("sim", 2.9)
