@@ -217,11 +217,12 @@ def _assumptions(facts: Facts, closed: Mapping[str, Closed]) -> Iterator[_Raw]:
 
 
 def _meaning(requirements: Sequence[Requirement], statements: Statements) -> Iterator[_Raw]:
-    """Requirements without a formula: that the guarantees named amount to the sentence is a person's word."""
+    """Requirements without a formula: that the guarantees named amount to the sentence is a person's word; and where a
+    formula says less than its sentence, what the plan says of the rest."""
     for r in requirements:
-        if not r.formula and not r.temporal:
-            place = f"requirements.{r.id}.amounts"
-            said = statements.at(place)
+        place = f"requirements.{r.id}.amounts"
+        said = statements.at(place)
+        if said.says or said.because or (not r.formula and not r.temporal):
             words = f"The guarantees named amount to the sentence of {r.id}"
             if not said.says:
                 said = replace(said, says=words)
