@@ -37,13 +37,14 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
+    subterms,
 )
-from avow.solving.limits import spent, until
+from avow.solving.limits import spend, spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
 from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
-from avow.tuning.effort import OFFER_STEP_EFFORT, OFFERS_EFFORT
+from avow.tuning.effort import OFFER_STEP_EFFORT, OFFER_WRITING_STEPS, OFFERS_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +99,11 @@ def offers(
     """What would make the hypotheses imply the goal, at most one offer for each place."""
     end = until(effort)
     found: dict[tuple[str, str], Offer] = {}
+    size = sum(1 for term in (goal, *hypotheses.values()) for _ in subterms(term))
     for number, place in enumerate(places):
         if number >= OFFER_PLACES or spent() > end:
             break
+        spend(size * OFFER_WRITING_STEPS)
         known = {label: term for label, term in hypotheses.items() if label != place.without}
         offer = _offer(frame, known, goal, place)
         if offer is not None and len(offer.clause) <= OFFER_LENGTH:

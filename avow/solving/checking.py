@@ -165,7 +165,7 @@ class Said:
 HANGS = "the solver hangs"
 
 
-def put(translator: Sorts, solver: Any, effort: int, seed: int | None = 0, *assumptions: Expr) -> Said:
+def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> Said:
     """Put what a solver holds to it: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends what hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
@@ -182,7 +182,7 @@ def put(translator: Sorts, solver: Any, effort: int, seed: int | None = 0, *assu
     return Said("unknown", HANGS if interrupted.is_set() else _reason(solver))
 
 
-def configured(solver: Any, effort: int, seed: int | None) -> None:
+def configured(solver: Any, effort: float, seed: int | None) -> None:
     """Set a solver's limit and seed; None for one that has no seed."""
     solver.set("rlimit", steps(effort))
     if isinstance(solver, z3.Solver) and seed is not None:

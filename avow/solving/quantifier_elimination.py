@@ -44,12 +44,12 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.solving.checking import charge
+from avow.solving.checking import charge, put
 from avow.solving.limits import watchdog
 from avow.solving.questions import entails, solve
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS
+from avow.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS, STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,10 +120,14 @@ def _eliminate(formula: Term) -> Term | None:
         z3.Tactic("ctx-simplify", ctx=translator.context),
         ctx=translator.context,
     )
+    solver, before = chain.solver(), translator.steps
+    solver.add(goal.as_expr())
+    put(translator, solver, ELIMINATION_STEPS / STEPS, None)  # to apply it has no limit of its own
+    if translator.steps - before >= ELIMINATION_STEPS:
+        return None
     with watchdog(ELIMINATION_SECONDS, translator.context.interrupt):
         result = chain.apply(goal)
-    if charge(translator) > ELIMINATION_STEPS:  # it counts its steps, but keeps no limit
-        return None
+    charge(translator)
     free = {v.qualified: v for v in free_variables(formula)}
     reader = TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]

@@ -104,9 +104,14 @@ OFFERS_EFFORT = 3_000
 OFFER_STEP_EFFORT = 500
 """For one question of an offer: six of them fit into the time for all."""
 
+OFFER_WRITING_STEPS = 2_000
+"""Steps that each part of a question's formulas counts for where an offer is sought at one place: they are written down
+anew for each of some tens of values. Four assumptions that mix limits in ms and in steps have 2,000 parts, which took a
+second at each place."""
+
 ELIMINATION_STEPS = 250_000
 """Z3's steps to eliminate variables; the tests' offers took 4,000 at most, two rounds of a game over a limit in seconds
-180,000. Z3 counts there, but keeps no limit: what took more is thrown away, so that no machine decides the answer."""
+180,000. Z3 keeps no limit where it applies what eliminates; so it is first run as a solver, which has one."""
 
 ELIMINATION_SECONDS = 4.0
 """Processor time after which an elimination hangs: its steps allowed take a tenth of this at most."""

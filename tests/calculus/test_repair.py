@@ -9,9 +9,12 @@ import pytest
 from helpers import some
 
 from avow.base.verdict import Outcome, Verdict
+from avow.calculus.discharge import would_hold
 from avow.cli.compose import command
+from avow.solving.limits import spent
+from avow.tuning.effort import OFFERS_EFFORT
 
-from .make import make, node, outcomes
+from .make import make, node, outcomes, settled
 from .test_commands import invoke
 
 CONSUMER = node("b", "x : REAL", "", "A small: in.x < 1")
@@ -217,3 +220,30 @@ def test_whatever_is_offered_does_it(tmp_path: Path, seed: int) -> None:
             # a guarantee of b helps only where b's own assumption is met: the kernel does not take it without
             unmet = settled["whole.b.A1"].verdict is not Verdict.PROVED and "the kernel" in settled[name].summary
             assert unmet or settled[name].verdict is Verdict.PROVED, (name, offer, system({}))
+
+
+@pytest.mark.slow
+def test_offers_are_bounded_by_what_they_write_down_too(tmp_path: Path) -> None:
+    """Four assumptions that mix limits in ms and in steps: what nothing counted took minutes."""
+    source = node(
+        "source",
+        "e : BOOL, f : BOOL",
+        "a : BOOL, b : BOOL",
+        "G: out.a <=> in.e",
+        "G: held[200 ms](in.f) -> within[3 steps](out.b)",
+    )
+    reader = node(
+        "n",
+        "a : BOOL, b : BOOL",
+        "y : BOOL",
+        "A one: held[300 ms](in.a) -> in.b",
+        "A two: in.a -> within[4 steps](in.b)",
+        "A three: in.b -> within[500 ms](in.a)",
+        "A four: held[3 steps](in.a) -> once[1 s](in.b)",
+    )
+    composition, answers = settled(make(tmp_path, source + reader))
+    found = answers.settled[next(c for c in answers.settled if c.clause == "one")]
+    assert found.verdict is Verdict.REFUTED
+    before = spent()
+    would_hold(composition.frame, composition.whole, found)
+    assert spent() - before < 2 * OFFERS_EFFORT
