@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gc
 import os
+import resource
 import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -16,7 +17,7 @@ from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
 from avow.pipeline.run_info import FRESH, new_run
 from avow.pipeline.state import State
-from avow.tuning.running import COLLECTED
+from avow.tuning.running import BYTE_CODE_ROOM, COLLECTED
 
 if TYPE_CHECKING:
     from avow.pipeline.executors import Elsewhere
@@ -36,7 +37,7 @@ class Pipeline:
         self, root: Path, asked: Sequence[str], answer: IO[str] | None = None, elsewhere: Elsewhere | None = None
     ) -> None:
         leave_here()
-        sys.dont_write_bytecode = False  # as the workers': else a container's run compiles all of it every time
+        sys.dont_write_bytecode = not _has_room()  # else a container's run compiles all of it every time
         gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
@@ -91,6 +92,13 @@ class Pipeline:
             if not name.startswith("-") and name not in known:
                 print(f"error: there is no task {name}; `doit list --all` shows them", file=sys.stderr)
                 raise SystemExit(2)
+
+
+def _has_room() -> bool:
+    """Whether byte code can be kept: Python does not notice that it wrote half of it, and fails on it ever after."""
+    place = os.statvfs(Path(__file__).parent)
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return limit == resource.RLIM_INFINITY and place.f_bavail * place.f_frsize > BYTE_CODE_ROOM
 
 
 _OF_MEMORY = ("forget", "ignore", "reset-dep", "dumpdb")

@@ -102,3 +102,6 @@ DRIVEN_MEGABYTES = 2048
 
 DRIVEN_CALLBACKS = 200_000
 """Callbacks of such a run: what calls itself without end makes more."""
+
+BYTE_CODE_ROOM = 100_000_000
+"""Bytes free on the disk, below which no byte code is kept: all that Avow imports has a tenth of it."""
