@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from avow.ros.listing import Listing
 
 _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
+_DOMAIN = re.compile(r"(dds(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 
 def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
@@ -56,7 +57,8 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
         origins.append(bag.name)
     assert listing is not None
     if graph is not None:
-        origins.append("the running graph" if _MASTER.match(graph) else Path(graph).name)
+        origins.append("the running graph" if _MASTER.match(graph) or _DOMAIN.match(graph) else Path(graph).name)
+        given = replace(given, ros2=given.ros2 or _DOMAIN.match(graph) is not None)
     listing = with_calls(_sound(listing))
     if not any(node.publishes or node.subscribes for node in listing.nodes):
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: there is no node with a topic"))
@@ -79,17 +81,20 @@ _OPTION = (
 
 
 def _listing(graph: str) -> Listing:
+    from avow.ros.dds import LOOPBACK, ask_domain, domain_of
     from avow.ros.listing import NoListing, ask_master, parse_listing
     from avow.tuning.sizes import ROS_GRAPH_BYTES
 
     try:
         if _MASTER.match(graph):
             return ask_master(os.environ.get("ROS_MASTER_URI", "http://localhost:11311") if graph == "ros1" else graph)
+        if domain := _DOMAIN.match(graph):
+            return ask_domain(domain_of(domain[1]), domain[2] or LOOPBACK[0])
         data = Path(graph).read_bytes()
         if len(data) > ROS_GRAPH_BYTES:
             raise NoListing(f"it has more than {ROS_GRAPH_BYTES} bytes")
         return parse_listing(data.decode("utf-8"))
-    except (NoListing, UnicodeDecodeError) as no:
+    except (NoListing, ValueError) as no:  # also of text that is not UTF-8
         raise Rejected(Diagnostic("CLI011", f"{graph}: {no}")) from None
     except OSError as error:
         raise Rejected(Diagnostic("CLI011", f"{graph} cannot be read: {error.strerror or error}")) from None

@@ -49,8 +49,8 @@ _MONITOR = """\
     "--from-graph",
     "graph",
     metavar="SOURCE",
-    help="Draft it from a running ROS 1 master (`ros1`, or its http://… address), or from a file with what "
-    "`rosnode info` or `ros2 node info` say of its nodes, or JSON.",
+    help="Draft it from a running ROS 1 master (`ros1`, or its http://… address), from a running ROS 2 graph "
+    "(`dds[:DOMAIN][@ADDRESS]`), or from a file: what `rosnode info` or `ros2 node info` say of the nodes, or JSON.",
 )
 @click.option("--distro", help="The ROS distribution whose message types hold: noetic, humble, jazzy, …")
 @json_option()

@@ -45,6 +45,18 @@ VERSION_SECONDS = 20.0
 MASTER_SECONDS = 5.0
 """For a ROS master to answer: one on the same network does within milliseconds."""
 
+DDS_SECONDS = 3.0
+"""For which a DDS domain is listened to before its graph is drafted: who is there answers a newcomer within one."""
+
+DDS_PAUSE = 0.05
+"""Seconds between two looks at what DDS has found meanwhile."""
+
+DDS_NAMES = (24, 16)
+"""Bytes of an endpoint's name in ROS 2's announcements: up to Humble, and since."""
+
+LAST_DOMAIN = 232
+"""The greatest DDS domain: its ports are computed from it, and end at 65535."""
+
 DRAFT_MESSAGES = 200_000
 """Messages of a bag that a draft looks at for its comments: seconds, and the ranges of what follows are no others."""
 

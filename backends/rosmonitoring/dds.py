@@ -13,17 +13,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped
+from avow.ros.dds import dds_topic, dds_type, settings
 from avow.ros.definitions import Definitions
 
-from .dds_types import DIAGNOSTICS, NO_DDS, Types, dds_topic, dds_type, filled
+from .dds_types import DIAGNOSTICS, NO_DDS, Types, filled
 from .graphs import Inbox, Status
-from .tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LAST_DOMAIN, LIVE_PAUSE
-
-LOOPBACK = ("127.0.0.1", "localhost")
+from .tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LIVE_PAUSE
 
 
 @dataclass(slots=True)
@@ -236,26 +234,3 @@ def _event(heard: _Heard, data: bytes, now: float) -> Event:
         return enveloped(heard.read(data), heard.topic, now)
     except ValueError as error:
         raise ValueError(f"{heard.topic}: {error}") from None
-
-
-def settings(host: str) -> str:
-    """Cyclone DDS's configuration: this network alone; on loopback no multicast, and peers are asked one by one."""
-    interface = (
-        f"<Interfaces><NetworkInterface address={quoteattr(host.replace('localhost', LOOPBACK[0]))}/></Interfaces>"
-    )
-    if host not in LOOPBACK:
-        return f"<CycloneDDS><Domain><General>{interface}</General></Domain></CycloneDDS>"
-    return (
-        f"<CycloneDDS><Domain><General>{interface}<AllowMulticast>false</AllowMulticast></General><Discovery>"
-        f"<Peers><Peer Address={quoteattr(LOOPBACK[0])}/></Peers><ParticipantIndex>auto</ParticipantIndex>"
-        "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex></Discovery></Domain></CycloneDDS>"
-    )
-
-
-def domain_of(text: str) -> int:
-    """``dds`` (ROS_DOMAIN_ID, else 0) or ``dds:42``. Raises Rejected."""
-    said = text.removeprefix("dds").removeprefix(":") or os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not (said.isascii() and said.isdigit() and len(said) <= 3 and int(said) <= LAST_DOMAIN):
-        what = f"{said!r} is no DDS domain: 0 to {LAST_DOMAIN}"
-        raise Rejected(Diagnostic("MON303", what, hint="--live dds:0"))
-    return int(said)

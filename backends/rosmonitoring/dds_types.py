@@ -1,8 +1,4 @@
-"""ROS 2's messages as DDS carries them: what topics and types are called, how they are made, and what a sample holds.
-
-Sources: https://design.ros2.org/articles/topic_and_service_names.html (``rt/`` before a topic's name) and
-https://github.com/ros2/rosidl_dds (``pkg::msg::dds_::Type_``).
-"""
+"""ROS 2's messages as DDS carries them: how types are made, and what a sample holds."""
 
 from __future__ import annotations
 
@@ -12,6 +8,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import plainer
+from avow.ros.dds import dds_type
 from avow.ros.definitions import Array, Definitions, Field, Message, Nested, Scalar, Wire, parse_message
 
 NO_DDS = Diagnostic("MON305", "DDS needs the packages cyclonedds and rosbags", hint="pip install 'avow[dds]'")
@@ -39,15 +36,6 @@ _TIME = {
 }
 _EMPTY = Message("", (Field("structure_needs_at_least_one_member", Scalar("uint8")),))
 """What ROS 2 makes of a message without fields."""
-
-
-def dds_topic(topic: str) -> str:
-    return f"rt/{topic.lstrip('/')}"
-
-
-def dds_type(kind: str) -> str:
-    package, _, name = kind.partition("/")
-    return f"{package}::msg::dds_::{name}_"
 
 
 class Types:

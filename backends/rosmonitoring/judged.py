@@ -14,7 +14,8 @@ from avow.language.terms import And, Compare, Term
 
 from .coverage import Tally
 from .engine import Monitor
-from .pairing import TICKS, Asked, Choices, time_of
+from .pairing import Asked, Choices, time_of
+from .tuning import TICKS
 from .watched import Answer, Fault, Part, Violation, Watched
 
 

@@ -13,10 +13,11 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.calls import is_part
+from avow.ros.dds import domain_of
 
 from .bags import Event
 from .coverage import coverage
-from .dds import Dds, domain_of
+from .dds import Dds
 from .enforce import RAW, filtered
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
@@ -158,7 +159,11 @@ def _graph(text: str, heard: list[str], running: Session, host: str, *, enforce:
     if enforce:
         raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
     if kind == "dds":
-        return Dds(domain_of(text), heard, running.kinds, running.known, host)
+        try:
+            domain = domain_of(text)
+        except ValueError as error:
+            raise Rejected(Diagnostic("MON303", str(error), hint="--live dds:0")) from None
+        return Dds(domain, heard, running.kinds, running.known, host)
     if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
         return Rosbridge(address, heard)
     hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"

@@ -10,10 +10,11 @@ from typing import Any
 
 from .answering import asks, judges_answers_alone, speaks
 from .engine import Monitor
-from .pairing import TICKS, Asked, ticks_of
+from .pairing import Asked, ticks_of
 from .plans import Plan, Watch, below, is_seen
 from .rules import Path
 from .shapes import Shape
+from .tuning import TICKS
 from .watched import Violation, Watched
 
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))

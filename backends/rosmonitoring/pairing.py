@@ -26,7 +26,7 @@ from .numbers import Decimal, NotANumber, exact
 from .reading import Reader, at
 from .rules import Path
 from .traces import parse_event
-from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME
+from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS
 from .wires import MappingError, seconds
 
 if TYPE_CHECKING:
@@ -46,9 +46,7 @@ class Answers:
 
 
 Ticks = int | Fraction
-"""A time in units of 10^-20 seconds, exact: a whole number wherever a trace writes it in so many decimals."""
-
-TICKS = 10**20
+"""A time in units of 10^-20 seconds (`TICKS`), exact: a whole number wherever a trace says it in decimals."""
 
 
 def ticks(seconds: Fraction) -> Ticks:

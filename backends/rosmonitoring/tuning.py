@@ -106,14 +106,14 @@ LISTENER_SECONDS = 1.0
 DDS_MATCH = 5.0
 """Seconds after which a writer that was found and is not matched is told."""
 
-LAST_DOMAIN = 232
-"""The greatest DDS domain: its ports are computed from it, and end at 65535."""
-
 LATEST_TIME = 10**12
 """Seconds, 31,700 years: a greater time of an event is none, but perhaps nanoseconds."""
 
 EVENTS_WITHOUT_CLOCK = 10_000
 """Events that wait for a clock's first reading: seconds; where it never comes, what came later is not judged."""
+
+TICKS = 10**20
+"""In a second: times are compared as whole numbers of these, since a trace writes at most 20 decimals."""
 
 GRACE = Fraction(1, 20)
 """Seconds after a deadline until silence is told: messages have a way to go."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from cyclonedds.core import Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int32, int64, sequence, uint8, uint32
+from cyclonedds.idl.types import array, bounded_str, float32, float64, int32, int64, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter, Publisher
 from cyclonedds.qos import Policy
 from cyclonedds.sub import DataReader
@@ -85,6 +85,47 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
     status: sequence[DiagnosticStatus]
 
 
+@dataclass
+class Gid24(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    data: array[uint8, 24]
+
+
+@dataclass
+class Gid16(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    data: array[uint8, 16]
+
+
+@dataclass
+class Node24(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    node_namespace: bounded_str[256]
+    node_name: bounded_str[256]
+    reader_gid_seq: sequence[Gid24]
+    writer_gid_seq: sequence[Gid24]
+
+
+@dataclass
+class Node16(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    node_namespace: bounded_str[256]
+    node_name: bounded_str[256]
+    reader_gid_seq: sequence[Gid16]
+    writer_gid_seq: sequence[Gid16]
+
+
+@dataclass
+class Participant24(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    gid: Gid24
+    node_entities_info_seq: sequence[Node24]
+
+
+@dataclass
+class Participant16(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    gid: Gid16
+    node_entities_info_seq: sequence[Node16]
+
+
+NODES = {24: (Gid24, Node24, Participant24), 16: (Gid16, Node16, Participant16)}
+"""What ROS 2 says of its nodes: rmw_dds_common, up to Humble and since."""
+
 KINDS = {kind.__name__: kind for kind in (Double, Wrong, Short, Single, Scan)}
 QOS = {
     "reliable": Policy.Reliability.Reliable(duration(seconds=1)),
@@ -133,6 +174,19 @@ def main():
                     writer.write(value(kind, given), *((said["time"],) if "time" in said else ()))
                     if "pause" in said:
                         time.sleep(said["pause"])
+            case "node":  # announce a node, with some of the writers
+                size = said["size"]
+                gid, node, whole = NODES[size]
+
+                def named(entity, gid=gid, size=size):
+                    return gid(list(entity.guid.bytes + bytes(size - 16)))
+
+                topic = Topic(participant, "ros_discovery_info", whole)
+                kept = Qos(QOS["reliable"], QOS["transient_local"], Policy.History.KeepLast(1))
+                teller = DataWriter(participant, topic, kept)
+                own = [named(writers[name][1]) for name in said["writers"]]
+                teller.write(whole(named(participant), [node(said["space"], said["name"], [], own)]))
+                writers["ros_discovery_info"] = (whole, teller)
             case "gone":
                 del writers[said["name"]]
             case "verdicts":

@@ -15,12 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from avow.backends.rosmonitoring import dds
 from avow.backends.rosmonitoring.live import follow, graph_of
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected
+from avow.cli.init import command as init
+from avow.ros.dds import ask_domain
+from avow.ros.listing import Listed, Listing
+from avow.system.load import load_system
 from avow.system.plan import System
 
 from .processes import LONGEST, running, wait_for
@@ -305,3 +310,25 @@ def test_without_the_package_it_is_told(make_system: Callable[..., System], monk
     monkeypatch.setitem(sys.modules, "cyclonedds.idl", None)
     with pytest.raises(Rejected, match="cyclonedds"):
         graph_of("dds", session(make_system(RCL, MAPPING)), "127.0.0.1")
+
+
+@pytest.mark.slow
+@needs_dds
+@pytest.mark.parametrize("size", [24, 16])
+def test_a_running_graph_is_drafted(peer: Peer, size: int, tmp_path: Path) -> None:
+    """A node that announces itself as ROS 2's do, and a participant that does not say who it is."""
+    peer.write("robot1/s")
+    peer.write("other", "Single")
+    peer("node", size=size, space="/robot1", name="sensor", writers=["robot1/s"])
+    found: list[Listing] = []
+    wait_for(lambda: found.append(ask_domain(peer.domain, seconds=0.5)) or len(found[-1].nodes) == 2)
+    assert found[-1] == Listing(
+        (Listed("/participant_1", ("/other",)), Listed("/robot1/sensor", ("/robot1/s",))),
+        {"/other": "std_msgs/Float32", "/robot1/s": "std_msgs/Float64"},
+    )
+    folder = tmp_path / "robot"
+    done = CliRunner().invoke(init, [str(folder), "--from-graph", f"dds:{peer.domain}", "--distro", "humble"])
+    assert done.exit_code == 0, done.output
+    drafted = load_system(folder / "contracts/robot")
+    assert [node.name for node in drafted.contract.nodes] == ["participant_1", "sensor"]
+    assert "ros_version: ros2" in (folder / "contracts/robot/plan.yaml").read_text("utf-8")
