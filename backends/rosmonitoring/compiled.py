@@ -278,7 +278,8 @@ class Compiled:
             return watch.tokens[at] if same else next(self._fresh)
         if name in watch.regional and len(texts) == 1 and texts[0] in self._shapes[which].numbers:
             place = bisect(watch.regional[name], float(found[0]))
-            return place if place % 2 == 0 else next(self._fresh)
+            if place % 2 == 0:
+                return place
         known = self._tokens(which, watch, name)
         if not found:
             return next(self._fresh)
@@ -365,7 +366,13 @@ class Compiled:
                 key = f"a{texts[0]}" if len(texts) == 1 else "(" + ", ".join(f"a{k}" for k in texts) + ")"
                 if name in watch.regional and len(texts) == 1 and texts[0] in made.numbers:
                     scope[f"b{number}_{at}"] = watch.regional[name]
-                    checks += [f"{variable} = bisect(b{number}_{at}, float({key}))", f"if {variable} & 1: return False"]
+                    scope[f"k{number}_{at}"] = self._tokens(which, watch, name)
+                    checks += [
+                        f"{variable} = bisect(b{number}_{at}, float({key}))",
+                        f"if {variable} & 1:",  # at a number of the contract, or beside it: only the same text is alike
+                        f"    {variable} = k{number}_{at}.get({key})",
+                        f"    if {variable} is None: return False",
+                    ]
                     fresh[at] = variable
                     continue
                 scope[f"k{number}_{at}"] = self._tokens(which, watch, name)

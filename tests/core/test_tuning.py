@@ -24,7 +24,6 @@ ROOMS = {
 
 NOT_TUNED = {
     ("avow/drive/rospy.py", "SECOND"),  # in nanoseconds
-    ("backends/rosmonitoring/pairing.py", "TICKS"),  # a unit of time
     ("avow/drive/rclpy.py", "SECOND"),
     ("avow/backend_kit/programs/callbacks.py", "SECOND"),
     ("avow/base/process.py", "_PR_SET_PDEATHSIG"),  # Linux names its calls by numbers
