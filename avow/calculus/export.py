@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.calculus.composition import Composition
-from avow.calculus.derivation import Goal
+from avow.calculus.derivation import Goal, Phase, SideCondition
 from avow.calculus.hierarchy import carried, innermost
 from avow.formulas.formula import free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
@@ -53,10 +53,19 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
     # values back has to show it again.
     parts = goal.inner_first()
     delayed = [(part, condition.about) for part in parts for condition in part.conditions if condition.delayed]
+    # What was shown with the help of the step before is not shown of values that merely come in as such.
+    apart_from_before = {
+        (part, condition.about)
+        for part in parts
+        for condition in part.conditions
+        if not condition.delayed and _by_the_step_before(composition, part, condition)
+    }
+    delayed += sorted(apart_from_before, key=lambda each: (each[0].name, str(each[1])))
     for part, name in dict.fromkeys([*((goal, name) for name in goal.root.assumed), *delayed]):
         level = composition.frame_of(part)
         original = level.node(name.node).clause(name.clause)
         apart = name in part.root.assumed and goal.name in composition.around.values()
+        apart = apart or (part, name) in apart_from_before
         term = carried(level, part, name) if apart else level.clause(name.node, name.clause)
         label = re.sub(r"\W", "_", innermost(str(name)))
         if apart:
@@ -76,6 +85,14 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
     label = re.sub(r"\W", "_", goal.name if goal is not composition.whole else frame.system.name)
     whole = Node(label, tuple(inputs.values()), tuple(outputs.values()), (), tuple(assumptions), tuple(guarantees))
     return replace(frame.system.contract, files=(), nodes=(whole,))
+
+
+def _by_the_step_before(composition: Composition, part: Goal, condition: SideCondition) -> bool:
+    """Whether a proof of a side condition may have used it: not where one question about one step was enough."""
+    answer = composition.known(part).get(condition)
+    graph = composition.frame_of(part).graph
+    delays = any(e.delayed and {e.source.node, e.target.node} <= set(part.nodes) for e in graph.edges)
+    return delays if answer is None else any(case.phase is not Phase.SAME_STEP for case in answer.cases)
 
 
 def _whatever(term: Term, outputs: set[Variable]) -> Term:

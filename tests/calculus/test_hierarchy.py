@@ -7,11 +7,16 @@ from pathlib import Path
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.derivation import Rule
+from avow.calculus.export import derived_contract
 from avow.cli.compose import command
+from avow.formulas.formula import substitute
+from avow.language.sorts import INTEGER
+from avow.language.terms import Literal, Role, Variable
+from avow.solving.questions import solve
 from avow.system.load import load_system
 from avow.system.plan import System
 
-from .make import make, node, outcomes
+from .make import make, node, outcomes, settled
 from .test_commands import invoke
 
 CONTEXT = "context { Level : {low, high}; Limit = 10; }\n"
@@ -99,3 +104,21 @@ def test_memory_inside_is_shown_again_outside(tmp_path: Path) -> None:
     assert found["whole.display.positive"].verdict is Verdict.PROVED
     bad = outcomes(larger(tmp_path / "bad", sink, part, plan % -5))
     assert Verdict.REFUTED in {o.verdict for name, o in bad.items() if name.startswith("whole.clock")}
+
+
+def test_what_the_step_before_has_shown_is_assumed_by_the_derived_contract(tmp_path: Path) -> None:
+    """Outside, any value may come in as that of the step before: of such nothing was shown."""
+    text = node("z", "", "y : INTEGER", "G: out.y <= 5") + node("p", "y : INTEGER", "x : INTEGER", "G: out.x == in.y")
+    text += node("c", "x : INTEGER", "w : INTEGER", "A a: in.x <= 5", "G: out.w <= 5")
+    plan = "connections: [{from: z.y, to: p.y, delayed: true, initial: 0}]\n"
+    composition, answers = settled(make(tmp_path, text, plan))
+    assert answers.verdict is Verdict.PROVED
+    (derived,) = derived_contract(composition, composition.whole).nodes
+    (assumed,) = derived.assumptions
+    wrong = {Variable(Role.INPUT, "y_before", INTEGER): Literal(100, INTEGER)}
+    assert solve([substitute(assumed.formula, wrong)]).status == "unsat"
+    instantly = make(tmp_path / "instantly", text, "{}")
+    composition, answers = settled(instantly)
+    assert answers.verdict is Verdict.PROVED
+    (derived,) = derived_contract(composition, composition.whole).nodes
+    assert derived.assumptions == ()
