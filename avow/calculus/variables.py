@@ -234,6 +234,7 @@ class Frame:
                 other = kept.setdefault(meaning, called)
                 if other != called and (self.timed or not node):
                     self.shared[called] = other
+                    self._mappings.clear()  # what reads the one reads the other from here on
 
     def placed(self, node: str, term: Term, earlier: int = 0) -> Term:
         """A term over a node's ports (``node.port`` where there is no node) in system-level variables."""
