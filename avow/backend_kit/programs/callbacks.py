@@ -480,7 +480,9 @@ class _Drawing:
         if turn < 0.3:
             found = self.last + self.chance.choice((-1, 1)) * self.chance.choice(self.numbers.steps)
             found = self.chance.choice((found, math.nextafter(found, -math.inf), math.nextafter(found, math.inf)))
-        elif turn < 0.6:
+        elif turn < 0.5:
+            found = self.chance.choice(self.numbers.steps)
+        elif turn < 0.65:
             found += self.chance.uniform(-1.0, 1.0)
         self.last = found if math.isfinite(found) else 0.0
         return self.last
