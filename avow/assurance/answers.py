@@ -86,7 +86,7 @@ class Headline(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Supposition:
-    """Something that requirements rest on without its being shown, each once."""
+    """Something that requirements, or other guarantees, rest on without its being shown, each once."""
 
     number: str
     """``S1``: on this report's pages only; `key` is what stays."""
@@ -101,7 +101,7 @@ class Supposition:
     until: str
     expired: bool
     needed_by: tuple[str, ...]
-    """Requirements."""
+    """Requirements; empty where only guarantees need it that no requirement rests on."""
     where: tuple[str, ...]
     """Places of the plan, or claims whose evidence says it."""
     date: str = field(default="", metadata=LATER)
@@ -122,6 +122,11 @@ class Supposition:
     @property
     def words(self) -> str:
         return self.says or NO_WORDS
+
+    @property
+    def needing(self) -> tuple[str, ...]:
+        """Whose supposition it is, for the column *needed by*."""
+        return self.needed_by or ("guarantees only",)
 
 
 NO_WORDS = "(no plain words yet)"

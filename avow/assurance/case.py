@@ -174,7 +174,8 @@ def conclude(facts: Facts) -> Case:
     relied = {v.id: r for v in views if (r := relied_upon(v, said.judge))}
     closure = Closure(views, facts.nodes, rests, standings)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
-    supposed = suppositions(facts, views, relied, closed, said)
+    whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])
+    supposed = suppositions(facts, views, relied, closed, whole, said)
     requirements = tuple(
         held(requirement_view(r, names, standings, statuses), closed[r.id], views, relied, supposed, facts)
         for r in facts.requirements
@@ -190,7 +191,7 @@ def conclude(facts: Facts) -> Case:
         *remarks(facts.sources, views),
     )
     single = _single(views)
-    basis = closure.of(names.every_guarantee()).claims if not closed else {n for c in closed.values() for n in c.claims}
+    basis = whole.claims if not closed else {n for c in closed.values() for n in c.claims}
     weakened = weakenings(views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id)
     changed = changes(facts.baseline, requirements, views, supposed, weakened)
     by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}

@@ -1,4 +1,8 @@
-"""What requirements rest on without its being shown: each supposition once, in plain words, with owner and date."""
+"""What the case rests on without its being shown: each supposition once, in plain words, with owner and date.
+
+That is what a requirement needs, and what the evidence of any other guarantee supposes: a page that names the evidence
+names what that supposes.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +27,8 @@ from avow.system.plan import Requirement, Statement
 _SORTS = tuple(Sort)
 _SCENARIO = Statement("suppositions.compose.scenario", "Nothing occurs that the plan's finite scenario does not list")
 """The bounds of a check within the scenario, each named by its record, are one supposition."""
+_WHOLE = ""
+"""Stands among the requirements for all guarantees together."""
 _PLATFORM = ("persistence", "one-output", "entered")
 
 
@@ -81,17 +87,20 @@ class _Raw:
     statement: Statement
     where: str
     needed: Callable[[str], bool]
-    """Whether a requirement needs it."""
+    """Whether a requirement (or `_WHOLE`) needs it."""
 
 
 def suppositions(
     facts: Facts,
     views: Sequence[ObligationView],
     relied: Mapping[str, Relied],
-    closed: Mapping[str, Closed],
+    required: Mapping[str, Closed],
+    whole: Closed,
     statements: Statements,
 ) -> tuple[Supposition, ...]:
-    """Those that some requirement needs, numbered: by what they are about, the most needed first."""
+    """Those that some requirement needs (`required`: what each rests on), or some guarantee (`whole`: what they all
+    rest on), numbered: by what they are about, the most needed first."""
+    closed = {**required, _WHOLE: whole}
     raw = [
         *_reasons(views, closed, statements),
         *_constants(facts, closed, statements),
@@ -103,8 +112,11 @@ def suppositions(
     merged: dict[tuple[Sort, str], list[_Raw]] = {}
     for item in raw:
         merged.setdefault((item.sort, item.statement.says or item.statement.because or item.text), []).append(item)
-    found = [_one(items, tuple(closed), statements) for items in merged.values()]
-    needed = [s for s in found if s.needed_by]
+    needed = [
+        _one(items, tuple(required), statements)
+        for items in merged.values()
+        if any(item.needed(name) for item in items for name in closed)
+    ]
     needed.sort(key=lambda s: (_SORTS.index(s.sort), -len(s.needed_by), s.key))
     return tuple(replace(s, number=f"S{at}") for at, s in enumerate(needed, start=1))
 

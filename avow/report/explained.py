@@ -28,7 +28,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
             yield f"requirement {r.id}", lines
     for s in case.suppositions:
         if name in (s.number, s.key):
-            lines = [s.words, full_reason(s), s.term, f"needed by {some(s.needed_by)}", f"from {some(s.where)}"]
+            lines = [s.words, full_reason(s), s.term, f"needed by {some(s.needing)}", f"from {some(s.where)}"]
             yield f"supposition {s.number} ({s.sort}), {s.key}", [line for line in lines if line]
     for node in case.nodes:
         if name in (node.name, node.title):

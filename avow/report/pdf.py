@@ -195,7 +195,7 @@ def _weakest(case: Case) -> str:
 def _supposition(supposition: Supposition) -> list[str]:
     s = supposition
     reason = full_reason(s)
-    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needed_by), s.term]
+    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needing), s.term]
 
 
 def _module(module: RequirementModule) -> dict[str, Any]:

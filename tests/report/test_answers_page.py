@@ -17,6 +17,7 @@ from avow.base.verdict import Verdict
 from avow.report.answers_page import render_answers, worded
 from avow.report.page import render_page
 from avow.report.pdf import _data as pdf_data
+from avow.report.short import markdown_head, terminal_lines
 from avow.system.plan import Requirement, Statement
 from report.chromium import measure
 from report.first_screen import counts, departures, words
@@ -179,3 +180,27 @@ def test_counts_that_differ_are_told() -> None:
     assert counts(found, page) == []
     for good, bad in ((found.answers.verdict, "Holds"), ('class="supposition"', "class=s"), ("policy: ", "policy ")):
         assert counts(found, page.replace(good, bad)) != [], good
+
+
+ELSEWHERE = Requirement("R", "It is safe.", None, None, ("b.g",))
+
+
+@pytest.mark.parametrize("requirements", [[], [ELSEWHERE]], ids=["none", "of another node"])
+def test_what_evidence_supposes_is_told_whether_or_not_a_requirement_needs_it(requirements: list[Requirement]) -> None:
+    claims = [guarantee("a", "g"), guarantee("a", "h"), guarantee("b", "g")]
+    made = system({"a": ["g", "h"], "b": ["g"]}, plans=[node_plan(n, "low", "hoare") for n in "ab"])
+    made = replace(made, plan=replace(made.plan, requirements=tuple(requirements)))
+    listed = [evidence(g, hypotheses=("inputs are finite",) if g.node == "a" else ()) for g in claims]
+    found = make_case(made, claims, listed)
+    (finite,) = [s for s in found.suppositions if s.text == "inputs are finite"]
+    assert (finite.needed_by, finite.needing, finite.where) == ((), ("guarantees only",), (claims[0].id, claims[1].id))
+    assert finite.key in {w for kind in found.weakenings if kind.key == "unowned" for w in kind.claims}
+    assert "it rests on no suppositions" not in found.answers.statement
+    assert not counts(found, render_answers(found))
+    page = " ".join(render_answers(found).split())
+    assert "inputs are finite" in page
+    assert "guarantees only" in page
+    assert "inputs are finite" in str(pdf_data(found))
+    (line,) = [line for line in terminal_lines(found) if line.startswith("4 Supposed")]
+    assert line == f"4 Supposed ({found.answers.owned} with owner and date)"
+    assert "Nothing." not in "\n".join(markdown_head(found)).split("## 4")[1].split("## 5")[0]
