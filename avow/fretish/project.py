@@ -22,6 +22,7 @@ from avow.language.terms import Builtin, Past
 
 from .meaning import Unsaid, demands, remarks
 from .sentence import (
+    FIRST,
     Call,
     Denied,
     Expression,
@@ -377,6 +378,8 @@ class _Node:
                 raise Unsaid(f"Avow does not know the function `{name}` of {len(arguments)} arguments")
 
     def _named(self, name: str) -> str:
+        if name == FIRST and name not in self.given:
+            return "rose(TRUE)"
         if (other := self.words.setdefault(_word(name), name)) != name:
             raise Unsaid(_clash(other, name, _word(name)))
         given = self.given.get(name, Given())

@@ -276,4 +276,8 @@ def _alone(arrow: Token, left: Any) -> None:
 
 _ARROWS = ("IMPLIES", "IFF")
 
+FIRST = "FTP"
+"""FRET's own name for: this is the first step of the run."""
+
+
 _SIGNS = {"->": "=>", "<->": "<=>", "xor": "xor", "mod": "mod"}

@@ -34,7 +34,7 @@ from avow.language.terms import (
     Widen,
 )
 
-from .sentence import is_assumption
+from .sentence import FIRST, is_assumption
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +172,8 @@ def _say(term: Term) -> str:
             raise _Beyond(f"`{operator}`")
         case History(operator=Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"
+        case History(operator=Past.ROSE, arguments=(inner,)) if inner == TRUE:
+            return FIRST
         case History(operator=Past.HELD | Past.ONCE as operator, arguments=(inner,), limit=Limit(steps=True) as limit):
             name = "persisted" if operator is Past.HELD else "occurred"
             return f"{name}({_say(limit.amount)}, {_say(inner)})"
@@ -197,6 +199,6 @@ def _number(value: Fraction) -> str:
 
 
 def _name(name: str) -> str:
-    if "'" in name:
+    if "'" in name or name == FIRST:
         raise _Beyond(f"the name `{name}`")
     return name

@@ -38,6 +38,11 @@ def made(tmp_path: Path, text: str, outputs: str = "") -> str:
         ("whenever hot and if wet is false the pump shall satisfy off", "in.hot and (not in.wet) -> eventually(off)"),
         ("Pump shall within 2 seconds satisfy off", "rose(TRUE) -> within[2 s](off)"),
         ("in idle mode the pump shall always satisfy off", "in.idle -> off"),
+        ("the pump shall always satisfy FTP | level < preReal(0, level)", "rose(TRUE) or level < previous(level, 0)"),
+        (
+            "upon b & !FTP the pump shall at the next timepoint satisfy off",
+            "rose(in.b and not rose(TRUE)) -> next(off)",
+        ),
         ("while a | b, upon c unless d shall the pump for 5 ticks satisfy off", None),
         ("pump shall until x = y satisfy (if a then preBool(false, b) & persisted(3, c))", None),
         ("pump shall never satisfy absReal(x - 1) > 2 mod 3 xor !off <=> true", None),
