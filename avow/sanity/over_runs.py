@@ -18,7 +18,7 @@ from avow.language.contract import ClauseKind, Node
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
 from avow.sanity.results import Bounds, Finding, listing
-from avow.sanity.viability import Viability, viable
+from avow.sanity.viability import Viability, told_apart, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.system.formulas import ports_of
@@ -42,7 +42,7 @@ class OverRuns:
             for clause in self.node.guarantees
             for trigger in triggers(clause.formula)
         )
-        self.remembering = one_step(replace(self.node, guarantees=(*self.node.guarantees, *asked)))
+        self.remembering = told_apart(one_step(replace(self.node, guarantees=(*self.node.guarantees, *asked))))
 
     @property
     def assumptions(self) -> Mapping[str, Term]:

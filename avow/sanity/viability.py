@@ -17,11 +17,26 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Remembering
+from avow.formulas.traversal import transform
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
 from avow.language.sorts import BOOL
-from avow.language.terms import FALSE, TRUE, Compare, Iff, Implies, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    Apply,
+    Compare,
+    Conditional,
+    Iff,
+    Implies,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+)
 from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import eliminable, eliminated
 from avow.solving.questions import entails, solve
@@ -126,12 +141,56 @@ class Contract:
         return answer.verdict is Verdict.PROVED
 
 
+def told_apart(remembering: Remembering) -> Remembering:
+    """The same contract with a cell for each value of a quantified variable, where that has few: a cell that is a
+    function is no value of a game. All cells stay as they are where one has too many."""
+    kept: list[Cell] = []
+    parts: dict[Variable, list[tuple[tuple[Term, ...], Variable]]] = {}
+    for cell in remembering.cells:
+        if not cell.parameters:
+            kept.append(cell)
+            continue
+        values = [finite_values(v.sort) for v in cell.parameters]
+        few = [[value_term(x, v.sort) for x in some] for v, some in zip(cell.parameters, values, strict=True) if some]
+        if len(few) < len(values) or len(kept) + math.prod(map(len, few)) > GAME_MEMORIES:
+            return remembering
+        parts[cell.before] = []
+        for number, place in enumerate(product(*few)):
+            here = dict(zip(cell.parameters, place, strict=True))
+            before = Variable(Role.INPUT, f"{cell.name} {number}", cell.now.sort)
+            parts[cell.before].append((place, before))
+            initial = None if cell.initial is None else substitute(cell.initial, here)
+            kept.append(replace(cell, before=before, parameters=(), initial=initial, now=substitute(cell.now, here)))
+
+    def read(term: Term) -> Term:
+        if not isinstance(term, Apply) or not isinstance(term.function, Variable) or term.function not in parts:
+            return term
+        (_, found), *others = parts[term.function]
+        chosen: Term = found
+        for place, cell in others:
+            there = conjunction(map(_same, term.arguments, place))
+            chosen = Conditional(there, cell, chosen, cell.sort)
+        return chosen
+
+    if not parts:
+        return remembering
+    node = remembering.node
+    assumptions = tuple(replace(c, formula=transform(c.formula, read)) for c in node.assumptions)
+    guarantees = tuple(replace(c, formula=transform(c.formula, read)) for c in node.guarantees)
+    cells = tuple(
+        replace(c, now=transform(c.now, read), initial=None if c.initial is None else transform(c.initial, read))
+        for c in kept
+    )
+    return replace(remembering, node=replace(node, assumptions=assumptions, guarantees=guarantees), cells=cells)
+
+
 class Contradicted(Exception):  # noqa: N818 - it says what happened
     """cvc5 says the opposite of what Z3 does."""
 
 
 def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> Viability:
     """Decide it, as far as it can be decided."""
+    remembering = told_apart(remembering)
     if remembering.unsaid:
         name, why = next(iter(remembering.unsaid.items()))
         return Viability(Verdict.UNKNOWN, f"{name} speaks of {why.reason}")
@@ -153,6 +212,10 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
 
 
 def _decided(contract: Contract) -> Viability:
+    if any(cell.parameters for cell in contract.remembering.cells):  # no term writes such a memory down
+        if contract.closed(TRUE):
+            return Viability(Verdict.PROVED, "whatever was before")
+        return Viability(Verdict.UNKNOWN, "something is remembered for each value of a quantified variable")
     game = _Game(contract)
     if game.explored():
         return game.answer()
@@ -161,8 +224,8 @@ def _decided(contract: Contract) -> Viability:
     return _approached(contract)
 
 
-def _same(variable: Variable, value: Term) -> Term:
-    return Iff(variable, value) if variable.sort == BOOL else Compare("==", variable, value)
+def _same(one: Term, other: Term) -> Term:
+    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
 
 
 @dataclass(slots=True)

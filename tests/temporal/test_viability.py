@@ -70,6 +70,36 @@ def node_of(assumed: Term, promised: list[Term]) -> Node:
     )
 
 
+EACH = """inputs( e : {{p, q, r}}, a : BOOL ) outputs( o : {{p, q, r}} ) topics()
+  guarantee g ( forall(x in {{p, q, r}} | {} ) )"""
+
+
+@pytest.mark.parametrize(
+    ("clause", "verdict"),
+    [
+        ("rose(in.e == x) -> within[0 steps](o == x)", Verdict.PROVED),
+        ("rose(in.e == x) -> for[1 steps](o == x)", Verdict.REFUTED),
+        ("once(in.e == x) -> o == x", Verdict.REFUTED),
+    ],
+)
+def test_what_is_remembered_for_each_value_is_played_through(clause: str, verdict: Verdict) -> None:
+    contract, found = check_text(f"node n {{ {EACH.format(clause)} }}", "n.rcl")
+    assert contract is not None, found
+    answer = viable(compile_node(contract.nodes[0]))
+    assert answer.verdict is verdict, answer
+    assert answer.run is None or len(answer.run.trace) == 2
+
+
+def test_what_is_remembered_for_each_number_is_no_crash() -> None:
+    text = """node n { inputs( b : BOOL ) outputs( o : BOOL ) topics()
+      guarantee g ( forall(x in NATURAL | once(b and x > 3) -> o) )
+      guarantee h ( forall(x in NATURAL | once(b and x > 2) -> next(not o)) ) }"""
+    contract, found = check_text(text, "n.rcl")
+    assert contract is not None, found
+    answer = viable(compile_node(contract.nodes[0]), effort=100)
+    assert (answer.verdict, "for each value" in answer.reason) == (Verdict.UNKNOWN, True)
+
+
 @pytest.mark.parametrize("seed", some(range(1000), 15, slow=25))
 def test_the_game_says_the_same(seed: int) -> None:
     assumed, promised = drawn(seed)
