@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from avow.base.records import dataclass
+from avow.evidence.claims import Reestablished
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 
@@ -32,17 +33,6 @@ class ProofGrade(StrEnum):
     """The calculus says so, and the kernel did not establish it in this run."""
     TOOL_TRUSTED = "tool-trusted"
     """The word of another engine: its tools have to be trusted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reestablished:
-    """An obligation that the kernel established from its certificate. `solvers`: how many answered each question."""
-
-    obligation: str
-    solvers: int
-    key: str
-    scope: str
-    """Under which its certificate stands in `KernelRun.certificates`."""
 
 
 @dataclass(frozen=True, slots=True)

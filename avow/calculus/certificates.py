@@ -22,14 +22,14 @@ from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
 from avow.kernel.solvers import Said, Solvers
-from avow.kernel.statements import Kind, Statement, Statements, statements
+from avow.kernel.statements import Claimed, Statement, Statements, statements
 
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
     from avow.calculus.derivation import Goal
 
 
-POSSIBLE = frozenset({Kind.POSSIBLE, Kind.IMPOSSIBLE, Kind.START})
+POSSIBLE = frozenset({Claimed.POSSIBLE, Claimed.IMPOSSIBLE, Claimed.START})
 """Claims that something is possible, or (of which one is enough) left no room by a node alone."""
 
 
@@ -46,7 +46,7 @@ class Certificates:
     _kernels: dict[str, Kernel] = field(default_factory=dict)
     _places: dict[str, dict[tuple[How, str, str], list[int]]] = field(default_factory=dict)
     """Scope → the entries for a claim."""
-    _named: dict[tuple[Kind, str], Statement] = field(default_factory=dict)
+    _named: dict[tuple[Claimed, str], Statement] = field(default_factory=dict)
     _extended: dict[tuple[Written, ...], Statements] = field(default_factory=dict)
 
     @property
@@ -71,7 +71,7 @@ class Certificates:
 
     def condition(self, goal: Goal, about: str, bounds: Bounds) -> Established | None:
         """The assumption of a node (``agent.low``, or ``robot.agent.low`` of a node in a subsystem) in a derivation."""
-        claim = self.claim(Kind.ASSUMPTION, innermost(about))
+        claim = self.claim(Claimed.ASSUMPTION, innermost(about))
         if claim is None:
             return None
         if goal.name not in self.made:
@@ -89,7 +89,7 @@ class Certificates:
         self, name: str, hint: Hint, bounds: Bounds, lemmas: tuple[Written, ...] = ()
     ) -> Established | None:
         """A requirement, of the whole system."""
-        claim = self.claim(Kind.REQUIREMENT, name)
+        claim = self.claim(Claimed.REQUIREMENT, name)
         if claim is None:
             return None
         scope = requirement_scope(name)
@@ -134,10 +134,10 @@ class Certificates:
         """Certificates to try, that something is possible or left no room. First values of a loop may be there only
         where the environment is as it is assumed to be: without, if that is enough."""
         match claim.kind:
-            case Kind.IMPOSSIBLE:
+            case Claimed.IMPOSSIBLE:
                 yield (Entry(How.SHOWN, "", claim.digest, step=Question()),)
-            case Kind.START:
-                known = (s for s in self.known.every if s.kind is Kind.ENVIRONMENT)
+            case Claimed.START:
+                known = (s for s in self.known.every if s.kind is Claimed.ENVIRONMENT)
                 given = tuple(Entry(How.ENVIRONMENT, s.node, s.digest) for s in known)
                 for assumed in ((), given) if given else ((),):
                     uses = tuple(Use(k) for k in range(len(assumed)))
@@ -153,7 +153,7 @@ class Certificates:
                 parts.setdefault(claim.name, []).append(claim)
         return list(parts.values())
 
-    def kept_for(self, scope: str, kind: Kind, name: str) -> Established | None:
+    def kept_for(self, scope: str, kind: Claimed, name: str) -> Established | None:
         """What the kernel says of a claim from the certificate of an earlier run."""
         claim = self.claim(kind, name)
         return self.established(self.kept.get(scope), claim) if claim is not None else None
@@ -169,16 +169,16 @@ class Certificates:
             places = self._places[certificate.scope] = {}
             for i, entry in enumerate(certificate.entries):
                 places.setdefault((entry.how, entry.node, entry.digest), []).append(i)
-        how = How.POSSIBLE if claim.kind in (Kind.POSSIBLE, Kind.START) else How.SHOWN
+        how = How.POSSIBLE if claim.kind in (Claimed.POSSIBLE, Claimed.START) else How.SHOWN
         for i in self._places[certificate.scope].get((how, claim.node, claim.digest), ()):
             try:
                 # of an assumption, what its questions name is told as claims of their own
-                return kernel.establish(i, alone=claim.kind is Kind.ASSUMPTION)
+                return kernel.establish(i, alone=claim.kind is Claimed.ASSUMPTION)
             except Refused:
                 continue
         return None
 
-    def claim(self, kind: Kind, name: str) -> Statement | None:
+    def claim(self, kind: Claimed, name: str) -> Statement | None:
         """The claim of that name as it is now; None where it has no text."""
         if not self._named:
             self._named = {(s.kind, s.called): s for s in self.known.every}
@@ -229,11 +229,11 @@ def requirement_scope(name: str) -> str:
 def scope_of(claim: Statement) -> str | None:
     """The scope of the certificate of a claim about the whole system; None of another."""
     match claim.kind:
-        case Kind.REQUIREMENT:
+        case Claimed.REQUIREMENT:
             return requirement_scope(claim.name)
-        case Kind.POSSIBLE | Kind.IMPOSSIBLE | Kind.START:
+        case Claimed.POSSIBLE | Claimed.IMPOSSIBLE | Claimed.START:
             return existence_scope(possible_name(claim))
-        case Kind.ASSUMPTION | Kind.GUARANTEE | Kind.ENVIRONMENT | Kind.INITIAL | Kind.DEFINITION:
+        case Claimed.ASSUMPTION | Claimed.GUARANTEE | Claimed.ENVIRONMENT | Claimed.INITIAL | Claimed.DEFINITION:
             # a clause or a formula of the plan: its derivation's, or none
             return None
         case _:
@@ -242,7 +242,7 @@ def scope_of(claim: Statement) -> str | None:
 
 def possible_name(claim: Statement) -> str:
     """The obligation of which a claim that something is possible is a part."""
-    return claim.name if claim.kind is Kind.START else claim.name.rpartition(".")[0]
+    return claim.name if claim.kind is Claimed.START else claim.name.rpartition(".")[0]
 
 
 def existence_scope(name: str) -> str:

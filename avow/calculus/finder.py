@@ -24,7 +24,7 @@ from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused
 from avow.kernel.solvers import Said, Solvers
-from avow.kernel.statements import Kind, Statement, Statements
+from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
 from avow.solving.z3_module import z3
@@ -53,9 +53,9 @@ class Item:
     @property
     def label(self) -> str:
         """What the engine calls it."""
-        if self.claim.kind is Kind.ENVIRONMENT:
+        if self.claim.kind is Claimed.ENVIRONMENT:
             return f"environment {self.claim.name}"
-        if self.claim.kind is Kind.DEFINITION:
+        if self.claim.kind is Claimed.DEFINITION:
             return f"memory {self.claim.called}"
         return f"{self.claim.node}.{self.claim.name}" if self.claim.node else self.claim.name
 
@@ -121,27 +121,27 @@ class Finder:
         """All that may ever be an entry."""
         found: list[Item] = []
         own = set(self.nodes)
-        found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Kind.ENVIRONMENT]
+        found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Claimed.ENVIRONMENT]
         found += [Item(How.SHOWN, s) for s in self.invariants()]
         for s in self.known.every:
-            if s.kind is Kind.DEFINITION and (s.node in own or self.remembered(s)):
+            if s.kind is Claimed.DEFINITION and (s.node in own or self.remembered(s)):
                 found.append(Item(How.DEFINED, s))
             if s.node not in own or s.node not in self.known.assumptions:
                 continue
-            if s.kind is Kind.ASSUMPTION:
+            if s.kind is Claimed.ASSUMPTION:
                 name = f"{s.node}.{s.name}"
                 if name in self.open or (not s.nodes and s.places and name not in self.hints):
                     found.append(Item(How.ENVIRONMENT if not s.nodes else How.OPEN, s))
                 else:
                     found.append(Item(How.SHOWN, s))
-            elif s.kind is Kind.GUARANTEE:
+            elif s.kind is Claimed.GUARANTEE:
                 found.append(Item(How.GUARANTEE, s))
         return found
 
     def invariants(self) -> list[Statement]:
         """The claims of the lemmas."""
         wanted = set(map(label, self.lemmas))
-        return [s for s in self.known.every if s.kind is Kind.REQUIREMENT and s.name in wanted]
+        return [s for s in self.known.every if s.kind is Claimed.REQUIREMENT and s.name in wanted]
 
     def remembered(self, definition: Statement) -> bool:
         """Whether it is what is remembered for one of the goals."""
@@ -160,14 +160,14 @@ class Finder:
         add(item for item in ever if item.how in (How.ENVIRONMENT, How.OPEN, How.DEFINED))
         of_node: dict[str, list[Item]] = {name: [] for name in self.nodes}
         for item in ever:
-            if item.claim.node in of_node and item.claim.kind is not Kind.ENVIRONMENT:
+            if item.claim.node in of_node and item.claim.kind is not Claimed.ENVIRONMENT:
                 of_node[item.claim.node].append(item)
         waiting, progress = list(self.nodes), True
         while waiting and progress:
             progress = False
             for name in list(waiting):
                 mine = of_node[name]
-                assumed = [item for item in mine if item.claim.kind is Kind.ASSUMPTION]
+                assumed = [item for item in mine if item.claim.kind is Claimed.ASSUMPTION]
                 found = [item for item in assumed if item not in done and self.shown(item, done)]
                 add(found)
                 progress = progress or bool(found)
@@ -340,7 +340,7 @@ class Finder:
         if item.how is How.GUARANTEE:
             same = (s for mark in self.known.assumptions[claim.node] for s in self.known.by_digest[mark])
             labels = dict.fromkeys(
-                f"{s.node}.{s.name}" for s in same if s.node == claim.node and s.kind is Kind.ASSUMPTION
+                f"{s.node}.{s.name}" for s in same if s.node == claim.node and s.kind is Claimed.ASSUMPTION
             )
             conds = (ranks[i] for label in labels if (i := self._now.get(label)) is not None and i in ranks)
             return Entry(item.how, claim.node, claim.digest, tuple(sorted(conds)))
@@ -355,7 +355,7 @@ class Finder:
 
     def initials(self) -> tuple[Statement, ...]:
         if self._initials is None:
-            self._initials = tuple(s for s in self.known.every if s.kind is Kind.INITIAL and s.unary)
+            self._initials = tuple(s for s in self.known.every if s.kind is Claimed.INITIAL and s.unary)
         return self._initials
 
     def core(self, item: Item, premises: _Uses, *, initially: int | None = None) -> _Base | None:

@@ -16,7 +16,7 @@ from avow.calculus.entailment import implied
 from avow.calculus.induction import BEFORE, Deeper, Steps, deeper
 from avow.calculus.variables import Frame
 from avow.formulas.formula import free_variables, negation, rename
-from avow.kernel.statements import Kind, Wiring
+from avow.kernel.statements import Claimed, Wiring
 from avow.language.contract import Contract
 from avow.language.load import parse_formula
 from avow.language.printer import show_term
@@ -125,7 +125,7 @@ def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
 def with_lemmas(told: Wiring, contract: Contract, lemmas: Iterable[Written]) -> Wiring:
     """A system with the claims of some lemmas: of those that say something of it as it is now."""
     found = ((label(each), read(each, contract, told)) for each in lemmas)
-    more = tuple((Kind.REQUIREMENT, "", name, term) for name, term in found if term is not None)
+    more = tuple((Claimed.REQUIREMENT, "", name, term) for name, term in found if term is not None)
     return replace(told, formulas=(*told.formulas, *more))
 
 

@@ -22,14 +22,15 @@ from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCon
 from avow.calculus.discharge import Bounds
 from avow.calculus.existence import circles, joined, loops, start_name
 from avow.calculus.hierarchy import innermost
+from avow.calculus.hypotheses import Resting
 from avow.calculus.requirements import requirement_question
-from avow.calculus.resting import Resting
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
+from avow.evidence.claims import Reestablished
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import digest
 from avow.kernel.check import Established
-from avow.kernel.statements import Kind as Claimed
+from avow.kernel.statements import Claimed
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
@@ -100,47 +101,34 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], lim
         yield replace(outcome, details={**outcome.details, **told(bounds.effort)})
 
 
-@dataclass(frozen=True, slots=True)
-class Reestablished:
-    """That the kernel establishes an obligation from a certificate kept."""
-
-    key: str
-    solvers: int
-    """How many answered each of its questions."""
-    scope: str
-    """The certificate's."""
-
-
 def reestablished(certificates: Certificates, obligation: str) -> Reestablished | None:
     """What the kernel says of an obligation (by its id) from the certificates kept; None where it does not establish
     it. Nothing is searched for."""
     _, _, kind, name = obligation.split("/", 3)
     if kind == Kind.REQUIREMENT:
         scope = requirement_scope(name)
-        return _told(certificates.kept_for(scope, Claimed.REQUIREMENT, name), scope)
+        return _all_told(obligation, [certificates.kept_for(scope, Claimed.REQUIREMENT, name)], scope)
     if certificates.parts(name):
         possible = certificates.kept_existence(name)
-        return _all_told(possible, existence_scope(name)) if possible is not None else None
+        return _all_told(obligation, possible or (None,), existence_scope(name))
     for goal in certificates.composition.goals:
         for part in goal.root.walk():
             if part.rule is Rule.R4 and name == _loop_name(certificates.composition, goal, part):
                 about = [innermost(str(c.about)) for c in part.side_conditions]
                 each = [certificates.kept_for(goal.name, Claimed.ASSUMPTION, one) for one in about]
-                there = [one for one in each if one is not None]
-                return _all_told(there, goal.name) if len(there) == len(each) else None
+                return _all_told(obligation, each, goal.name)
         for condition in goal.conditions:
             if name == f"{goal.name}.{condition.about}":
                 found = certificates.kept_for(goal.name, Claimed.ASSUMPTION, innermost(str(condition.about)))
-                return _told(found, goal.name)
+                return _all_told(obligation, [found], goal.name)
     return None
 
 
-def _all_told(found: Sequence[Established], scope: str) -> Reestablished:
-    return Reestablished(questions.common_key(found), min((one.solvers for one in found), default=1), scope)
-
-
-def _told(found: Established | None, scope: str) -> Reestablished | None:
-    return Reestablished(found.key, found.solvers, scope) if found is not None else None
+def _all_told(obligation: str, asked: Sequence[Established | None], scope: str) -> Reestablished | None:
+    found = [one for one in asked if one is not None]
+    if len(found) < len(asked):
+        return None
+    return Reestablished(obligation, min((one.solvers for one in found), default=1), questions.common_key(found), scope)
 
 
 # -- generation --------------------------------------------------------------------------------------------------------

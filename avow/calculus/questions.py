@@ -217,8 +217,9 @@ class RuleQuestion:
 
 
 def common_key(found: Sequence[Established]) -> str:
-    """The key of an answer that several claims make up: a loop's, the side conditions of its members."""
-    return sha256("".join(one.key for one in found))
+    """The key of an answer that several claims make up: a loop's, the side conditions of its members.
+    That of one claim is its own."""
+    return found[0].key if len(found) == 1 else sha256("".join(one.key for one in found))
 
 
 def made_up(answer: Answer, found: Sequence[Established] | None, *, late: bool) -> Answer:

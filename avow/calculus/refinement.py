@@ -18,7 +18,7 @@ from avow.calculus.entailment import implied
 from avow.calculus.refinement_certificate import established
 from avow.formulas.formula import rename, sort_digest, transform
 from avow.kernel.certificate import Certificate
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
@@ -138,7 +138,7 @@ def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callab
     certificate, shown = established(same, abstract)
     demands = []
     for at, demand in enumerate(found.demands):
-        kind = Kind.ASSUMPTION if at < len(concrete.assumptions) else Kind.REQUIREMENT
+        kind = Claimed.ASSUMPTION if at < len(concrete.assumptions) else Claimed.REQUIREMENT
         one = shown.get((kind, demand.clause.name))
         if one is None:
             why = "the engine finds that it follows; the kernel could not establish it"

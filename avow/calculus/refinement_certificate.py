@@ -11,12 +11,12 @@ from collections.abc import Iterable
 from avow.calculus.finder import Finder, Hint
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.statements import Kind, Place, Statement, Wiring, statements
+from avow.kernel.statements import Claimed, Place, Statement, Wiring, statements
 from avow.language.contract import Clause, Node
 from avow.language.terms import Role, Term
 
 
-def established(concrete: Node, abstract: Node) -> tuple[Certificate, dict[tuple[Kind, str], Established]]:
+def established(concrete: Node, abstract: Node) -> tuple[Certificate, dict[tuple[Claimed, str], Established]]:
     """The certificate that was found, and by kind and name what the kernel establishes of the assumptions of the first
     node, and (as requirements) of the guarantees of the second. Types have to be the same in both."""
     at = concrete.name
@@ -25,22 +25,25 @@ def established(concrete: Node, abstract: Node) -> tuple[Certificate, dict[tuple
             (concrete,),
             {(Role.OUTPUT, at, p.name): Place(f"{at}.{p.name}", at, 0, p.sort) for p in concrete.outputs}
             | {(Role.INPUT, at, p.name): Place(f"in.{p.name}", None, 0, p.sort) for p in abstract.inputs},
-            tuple(_said(Kind.ENVIRONMENT, at, abstract.assumptions) + _said(Kind.REQUIREMENT, at, abstract.guarantees)),
+            (
+                *_said(Claimed.ENVIRONMENT, at, abstract.assumptions),
+                *_said(Claimed.REQUIREMENT, at, abstract.guarantees),
+            ),
         )
     )
     given = tuple((f"environment {a.name}", 0) for a in abstract.assumptions)
     hints = {f"{at}.{a.name}": Hint(given) for a in concrete.assumptions}
-    goals = tuple(claim for claim in known.every if claim.kind is Kind.REQUIREMENT)
+    goals = tuple(claim for claim in known.every if claim.kind is Claimed.REQUIREMENT)
     finder = Finder(known, "refinement", (at,), lambda _: frozenset(), False, frozenset(), hints, goals=goals)
     certificate = finder.find()
     kernel = Kernel(known, certificate, finder.solvers)
-    wanted = [claim for claim in known.every if claim.kind in (Kind.ASSUMPTION, Kind.REQUIREMENT)]
-    assumed = {claim.digest for claim in known.every if claim.kind is Kind.ENVIRONMENT}
+    wanted = [claim for claim in known.every if claim.kind in (Claimed.ASSUMPTION, Claimed.REQUIREMENT)]
+    assumed = {claim.digest for claim in known.every if claim.kind is Claimed.ENVIRONMENT}
     found = {(claim.kind, claim.name): _shown(kernel, claim, assumed) for claim in wanted}
     return certificate, {name: one for name, one in found.items() if one is not None}
 
 
-def _said(kind: Kind, node: str, clauses: Iterable[Clause]) -> list[tuple[Kind, str, str, Term]]:
+def _said(kind: Claimed, node: str, clauses: Iterable[Clause]) -> list[tuple[Claimed, str, str, Term]]:
     return [(kind, node, clause.name, clause.formula) for clause in clauses]
 
 

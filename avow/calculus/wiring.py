@@ -13,7 +13,7 @@ from avow.calculus.variables import Frame
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.clock import GOES_ON, is_arrival
-from avow.kernel.statements import Kind, Place, Wiring
+from avow.kernel.statements import Claimed, Place, Wiring
 from avow.language.sorts import BOOL, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
@@ -24,31 +24,31 @@ from avow.system.temporal import parse_state
 def wiring(frame: Frame) -> Wiring:
     """Of the frame of every node by itself. Raises Rejected for a formula that is wrong."""
     system, graph = frame.system, frame.graph
-    plan: list[tuple[Kind, str, str, Term]] = []
+    plan: list[tuple[Claimed, str, str, Term]] = []
     initials: dict[tuple[str, str], Term] = {}
     for edge in graph.edges:
         if edge.delayed and (edge.source.node, edge.source.port) not in initials:
             condition = initial_condition(system, edge)
             if condition is not None:
                 initials[edge.source.node, edge.source.port] = condition
-    plan += [(Kind.ENVIRONMENT, a.node, a.port, a.formula) for a in frame.assumed]
-    plan += [(Kind.INITIAL, node, port, term) for (node, port), term in initials.items()]
+    plan += [(Claimed.ENVIRONMENT, a.node, a.port, a.formula) for a in frame.assumed]
+    plan += [(Claimed.INITIAL, node, port, term) for (node, port), term in initials.items()]
     every = dict.fromkeys(each for of in ("", *frame.observed) for each in frame.own_cells(of))
     for name, _, cell in every:
         own = Variable(Role.OUTPUT, cell.name, cell.sort)
-        plan.append((Kind.DEFINITION, name, cell.name, cell.leaves(own)))
+        plan.append((Claimed.DEFINITION, name, cell.name, cell.leaves(own)))
         if cell.initial is not None:
-            plan.append((Kind.INITIAL, name, cell.name, cell.begins(own)))
-    plan += [(Kind.DEFINITION, name, CLOCK.name, GOES_ON) for name in frame.timed[:1]]
+            plan.append((Claimed.INITIAL, name, cell.name, cell.begins(own)))
+    plan += [(Claimed.DEFINITION, name, CLOCK.name, GOES_ON) for name in frame.timed[:1]]
     for r in system.plan.requirements:
         if r.formula is not None:
-            plan.append((Kind.REQUIREMENT, "", r.id, required(frame, r)))
-    plan += [(Kind.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
+            plan.append((Claimed.REQUIREMENT, "", r.id, required(frame, r)))
+    plan += [(Claimed.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
     for group in circles(frame):
         for node, clause in ((name, g.name) for name in group for g in frame.node(name).guarantees):
             for found in situations(frame, group, node, clause):
-                plan.append((Kind.POSSIBLE, "", found.name, found.possible))
-                plan.append((Kind.IMPOSSIBLE, "", found.name, found.excluded))
+                plan.append((Claimed.POSSIBLE, "", found.name, found.possible))
+                plan.append((Claimed.IMPOSSIBLE, "", found.name, found.excluded))
     return Wiring(tuple(frame.node(n.name) for n in system.contract.nodes), _ports(frame), tuple(plan))
 
 

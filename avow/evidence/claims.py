@@ -28,6 +28,17 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
+class Reestablished:
+    """An obligation that the kernel established from its certificate. `solvers`: how many answered each question."""
+
+    obligation: str
+    solvers: int
+    key: str
+    scope: str
+    """Under which its certificate stands among those of the run."""
+
+
+@dataclass(frozen=True, slots=True)
 class Standing:
     """Where a claim stands, all things considered.
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from avow.base.files import digest as sha256
 from avow.kernel.certificate import FORMAT, Certificate, Entry, How, Question, Use
 from avow.kernel.solvers import LOOK, Said, Solvers
-from avow.kernel.statements import Kind, Statement, Statements
+from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable, conjunction, symbol
 from avow.language.terms import And, Quantified, Quantifier
 
@@ -58,9 +58,9 @@ class Answered(NamedTuple):
     vacuous: bool = False
 
 
-KINDS = {How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT, Kind.IMPOSSIBLE), How.GUARANTEE: (Kind.GUARANTEE,)}
-KINDS |= {How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION), How.OPEN: (Kind.ASSUMPTION,)}
-KINDS |= {How.POSSIBLE: (Kind.POSSIBLE, Kind.START), How.DEFINED: (Kind.DEFINITION,)}
+KINDS = {How.SHOWN: (Claimed.ASSUMPTION, Claimed.REQUIREMENT, Claimed.IMPOSSIBLE), How.GUARANTEE: (Claimed.GUARANTEE,)}
+KINDS |= {How.ENVIRONMENT: (Claimed.ENVIRONMENT, Claimed.ASSUMPTION), How.OPEN: (Claimed.ASSUMPTION,)}
+KINDS |= {How.POSSIBLE: (Claimed.POSSIBLE, Claimed.START), How.DEFINED: (Claimed.DEFINITION,)}
 
 
 @dataclass
@@ -80,10 +80,10 @@ class Kernel:
         for i in own:  # which grows
             new = set(entries[i].named()) - part
             part |= new
-            own += [j for j in new if not alone or self._claim(entries[j]).kind is Kind.REQUIREMENT]
+            own += [j for j in new if not alone or self._claim(entries[j]).kind is Claimed.REQUIREMENT]
         given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
         needed = {Needed(e.how, e.node, e.digest, tuple(sorted(entries[c].digest for c in e.conds))) for e in given}
-        if self._claim(entries[goal]).kind is Kind.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
+        if self._claim(entries[goal]).kind is Claimed.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
             raise Refused("a requirement rests on what only a derived contract may assume")
         answered = [answer for i in own for answer in answers[i]]
         needed |= {Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for a in answered if (n := a.together)}
@@ -141,8 +141,8 @@ class Kernel:
             case How.POSSIBLE:
                 body = (text := Text()).formula(claim.term, claim.symbols())
                 yield self._asked(text.script([body]), Said.SAT, f"{claim.called}: no values are shown to be so")
-                if claim.kind is Kind.START:  # an example is not enough where the environment has a say: for all of it
-                    firsts = [s.digest for s in self.known.every if s.kind is Kind.INITIAL and s.node in claim.nodes]
+                if claim.kind is Claimed.START:  # an example is not enough where the environment has a say: all of it
+                    firsts = [s.digest for s in self.known.every if s.kind is Claimed.INITIAL and s.node in claim.nodes]
                     yield from self.begins([use for question in entry.base for use in question.uses], firsts)
 
     def _claim(self, entry: Entry) -> Statement:
@@ -194,14 +194,14 @@ class Kernel:
         return [(self._claim(self.certificate.entries[use.entry]), use.back) for use in uses]
 
     def _initial(self, mark: str) -> Statement:
-        if (found := self.known.find(mark, Kind.INITIAL)) is None or not found.unary:
+        if (found := self.known.find(mark, Claimed.INITIAL)) is None or not found.unary:
             raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
         return found
 
     def begins(self, uses: Sequence[Use], marks: Sequence[str]) -> Iterator[Answered]:
         """`Begins`: initials say nothing of the environment: whatever constants the environment entries used allow,
         there is a first value of each output, its conditions taken together (`Apart`). Raises Refused."""
-        initials = [each for each in self.known.every if each.kind is Kind.INITIAL]
+        initials = [each for each in self.known.every if each.kind is Claimed.INITIAL]
         given = [use for use in uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
         for mark in dict.fromkeys(marks):
             found = [self._initial(mark)]
@@ -232,7 +232,8 @@ class Kernel:
         before = question.initials or any(back or any(p.back for p in each.sources) for each, back in used)
         reads = {(node, each.node) for each, _ in used for node in each.nodes - {each.node}}
         nodes = {node for each, _ in used for node in each.nodes}
-        own = {s.node for s, _ in used if s.kind is Kind.GUARANTEE or (s.kind in KINDS[How.ENVIRONMENT] and s.sources)}
+        said = KINDS[How.ENVIRONMENT]
+        own = {s.node for s, _ in used if s.kind is Claimed.GUARANTEE or (s.kind in said and s.sources)}
         if off := own - nodes - {claim.node}:
             nodes |= off | ({claim.node} - {""})
         joined = any(len(s.nodes - {s.node}) > 1 for s, _ in used) or len(reads) > len(dict(reads))

@@ -19,7 +19,7 @@ from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
 
 
-class Kind(StrEnum):
+class Claimed(StrEnum):
     """What a claim is: a clause of a node; what the plan assumes of the environment; what an output is before the first
     step, where delayed edges deliver it; of every step of the whole system (requirement); that some values are so, or
     none (a situation that a guarantee is about); that a loop has first values; what a step leaves in a memory."""
@@ -59,14 +59,14 @@ class Wiring:
 
     nodes: tuple[Node, ...]
     ports: Mapping[tuple[Role, str, str], Place]
-    formulas: tuple[tuple[Kind, str, str, Term], ...] = ()
+    formulas: tuple[tuple[Claimed, str, str, Term], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
     """A claim. `node` and `name` say where it was found, for people; what it says is `digest`."""
 
-    kind: Kind
+    kind: Claimed
     node: str
     name: str
     term: Term = field(repr=False, compare=False)
@@ -110,40 +110,40 @@ class Statements:
             found.setdefault(statement.digest, []).append(statement)
         return found
 
-    def find(self, digest: str, kind: Kind, node: str | None = None) -> Statement | None:
+    def find(self, digest: str, kind: Claimed, node: str | None = None) -> Statement | None:
         """The claim of this kind (and node) that says so, if there is one."""
         same = self.by_digest.get(digest, ())
         return next((s for s in same if s.kind is kind and node in (None, s.node)), None)
 
 
 def statements(wiring: Wiring) -> Statements:
-    clauses = [(Kind.ASSUMPTION, n.name, clause.name, clause.formula) for n in wiring.nodes for clause in n.assumptions]
-    clauses += [(Kind.GUARANTEE, n.name, clause.name, clause.formula) for n in wiring.nodes for clause in n.guarantees]
+    clauses = [(Claimed.ASSUMPTION, n.name, said.name, said.formula) for n in wiring.nodes for said in n.assumptions]
+    clauses += [(Claimed.GUARANTEE, n.name, said.name, said.formula) for n in wiring.nodes for said in n.guarantees]
     found, untold = list[Statement](), set[str]()
     for kind, node, name, term in (*clauses, *wiring.formulas):
         try:
             found.append(_stated(wiring, kind, node, name, term))
         except Untranslatable:
-            untold |= {node} if kind is Kind.ASSUMPTION else set()
+            untold |= {node} if kind is Claimed.ASSUMPTION else set()
     assumptions: dict[str, set[str]] = {node.name: set() for node in wiring.nodes}
     for claim in found:
-        if claim.kind is Kind.ASSUMPTION:
+        if claim.kind is Claimed.ASSUMPTION:
             assumptions[claim.node].add(claim.digest)
     return Statements(tuple(found), {n: frozenset(marks) for n, marks in assumptions.items() if n not in untold})
 
 
-def _stated(wiring: Wiring, kind: Kind, node: str, name: str, term: Term) -> Statement:
+def _stated(wiring: Wiring, kind: Claimed, node: str, name: str, term: Term) -> Statement:
     places: dict[Variable, Place] = {}
 
     def called(variable: Variable) -> tuple[str, Sort]:
         at, _, port = (node, "", variable.name) if node else variable.name.partition(".")
         if (found := wiring.ports.get((variable.role, at, port))) is None:
             raise Untranslatable(f"{variable.qualified} is no value of the system")
-        first = kind is Kind.INITIAL and variable.role is Role.OUTPUT  # the output before the first step
+        first = kind is Claimed.INITIAL and variable.role is Role.OUTPUT  # the output before the first step
         places[variable] = replace(found, back=1) if first else found
         return places[variable].symbol(), found.sort
 
     body = (text := Text()).formula(term, called)
     # that some values are so is another claim than that all are
-    said = [*text.declarations.values(), *([kind] if kind in (Kind.POSSIBLE, Kind.START) else []), body]
+    said = [*text.declarations.values(), *([kind] if kind in (Claimed.POSSIBLE, Claimed.START) else []), body]
     return Statement(kind, node, name, term, places, sha256("\n".join(said)))

@@ -7,7 +7,7 @@ from pathlib import Path
 from avow.base.diagnostics import Rejected
 from avow.base.workspace import find_workspace
 from avow.evidence.ledger import Ledger
-from avow.lsp.answers import StatusLookup
+from avow.lsp.features import StatusLookup
 
 
 def standing(file: str) -> StatusLookup:

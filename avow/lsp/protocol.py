@@ -10,10 +10,10 @@ from typing import Any
 from lsprotocol import types
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.lsp.answers import Document, Symbol
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
 from avow.lsp.background import Answer
 from avow.lsp.completion import Offer, Signature
+from avow.lsp.features import Document, Symbol
 
 SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,

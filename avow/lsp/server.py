@@ -1,4 +1,4 @@
-"""The language server over pygls: which answer (`avow.lsp.answers` and its neighbours) goes with which question."""
+"""The language server over pygls: which answer (`avow.lsp.features` and its neighbours) goes with which question."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from avow import __version__
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.format import format_text
 from avow.language.load import check_in_part, clean_text
-from avow.lsp import answers, protocol
-from avow.lsp.answers import Document, StatusLookup
+from avow.lsp import features, protocol
 from avow.lsp.appearance import coloured, folds
 from avow.lsp.background import Answer, Asked, askable
 from avow.lsp.completion import offers, signature
+from avow.lsp.features import Document, StatusLookup
 from avow.lsp.names import CLAUSES, Occurrence, What
 from avow.lsp.plan_completion import plan_offers
 from avow.lsp.plan_names import PlanText
@@ -66,7 +66,7 @@ class Server:
         if waiting is not None:
             waiting.cancel()
         texts = {d.file: d.text for u, d in self.documents.items() if u != uri and u in self.open_now}
-        document = self.documents[uri] = answers.analyse(self.text(uri), file, texts)
+        document = self.documents[uri] = features.analyse(self.text(uri), file, texts)
         self.publish(uri)
         plan = (document.project.plan.file,) if document.project.plan is not None else ()
         return (*(source.file for source in document.project.sources), *plan)
@@ -181,23 +181,23 @@ class Server:
     def hover(self, params: types.HoverParams) -> types.Hover | None:
         document = self.current(params.text_document.uri)
         offset = Lines(document.text).offset(params.position)
-        said = answers.hover(document, offset, self.status(document.file), self.asked.of)
+        said = features.hover(document, offset, self.status(document.file), self.asked.of)
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
     def definition(self, params: types.DefinitionParams) -> list[types.Location]:
         document = self.current(params.text_document.uri)
-        found = answers.definition(document, Lines(document.text).offset(params.position))
+        found = features.definition(document, Lines(document.text).offset(params.position))
         return list(self.locations(document, found))
 
     def references(self, params: types.ReferenceParams) -> list[types.Location]:
         document = self.current(params.text_document.uri)
         offset = Lines(document.text).offset(params.position)
-        return list(self.locations(document, answers.references(document, offset, params.context.include_declaration)))
+        return list(self.locations(document, features.references(document, offset, params.context.include_declaration)))
 
     def highlights(self, params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
         document = self.current(params.text_document.uri)
         lines = Lines(document.text)
-        found = answers.references(document, lines.offset(params.position))
+        found = features.references(document, lines.offset(params.position))
         return [types.DocumentHighlight(lines.range(o.start, o.end)) for o in found if o.file == document.file]
 
     def locations(self, document: Document, found: Sequence[Occurrence]) -> Iterator[types.Location]:
@@ -214,14 +214,14 @@ class Server:
     def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
         document = self.current(params.text_document.uri)
         lines = Lines(document.text)
-        name = answers.name_at(document, lines.offset(params.position))
+        name = features.name_at(document, lines.offset(params.position))
         if name is None or not is_renameable(document.project, name.meaning):
             return None
         return types.PrepareRenamePlaceholder(lines.range(name.start, name.end), name.meaning.name)
 
     def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
         document = self.current(params.text_document.uri)
-        name = answers.name_at(document, Lines(document.text).offset(params.position))
+        name = features.name_at(document, Lines(document.text).offset(params.position))
         if name is None:
             return None
         try:
@@ -290,7 +290,7 @@ class Server:
     def outline(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
         document = self.current(params.text_document.uri)
         lines = Lines(document.text)
-        return [protocol.symbol(s, lines) for s in answers.symbols(document)]
+        return [protocol.symbol(s, lines) for s in features.symbols(document)]
 
     def folding(self, params: types.FoldingRangeParams) -> list[types.FoldingRange]:
         document = self.current(params.text_document.uri)

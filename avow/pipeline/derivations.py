@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from avow.assurance.model import Derivation, SideCondition
 from avow.calculus.composition import composed
+from avow.calculus.hypotheses import discharged_by
 from avow.calculus.notation import Written, write_goal
 from avow.calculus.obligations import composition_obligations
-from avow.calculus.resting import discharged_by
 from avow.system.folding import seen
 from avow.system.graph import dataflow
 from avow.system.graph_svg import sheet

@@ -24,7 +24,7 @@ from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION, OBSERVED, to_json
 from avow.pipeline import asking
-from avow.pipeline.answers import earlier
+from avow.pipeline.answers_file import earlier
 from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run

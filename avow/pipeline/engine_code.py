@@ -60,7 +60,7 @@ TRUSTED = {
         "calculus/certificate_json.py",
         "pipeline/recheck.py",
     ),
-    "solvers' processes (avow/solving)": ("solving/apart.py", "solving/answering.py", "solving/cvc5_process.py"),
+    "solvers' processes (avow/solving)": ("solving/apart.py", "solving/question_process.py", "solving/cvc5_process.py"),
     "digests and files (avow/base)": ("base",),
     "kernel (avow/kernel)": ("kernel",),
     "theorem (kernel.dfy)": ("calculus/proofs/kernel.dfy",),

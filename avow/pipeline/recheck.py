@@ -14,14 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from avow.assurance.certification import KernelRun
-from avow.assurance.certification import Reestablished as Told
 from avow.base.codec import Unreadable
 from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
-from avow.calculus.obligations import Reestablished, reestablished
+from avow.calculus.obligations import reestablished
+from avow.evidence.claims import Reestablished
 from avow.evidence.currency import as_of_now, not_established, stands
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
@@ -91,7 +91,7 @@ def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -
 
 
 def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, run: str, asked: Solvers) -> KernelRun:
-    found: dict[str, Told] = {}
+    found: dict[str, Reestablished] = {}
     used: dict[str, object] = {}
     composition = compose(system)
     with Both(KERNEL_SECOND_ALL, asked.known) as solvers:
@@ -100,7 +100,7 @@ def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, r
             certificates = each[texts[_kept(record) or ""]]
             one = reestablished(certificates, record.obligation)
             if one is not None and one.key == record.details["certificate"].get("key"):
-                found[record.obligation] = Told(record.obligation, one.solvers, one.key, one.scope)
+                found[record.obligation] = one
                 used[one.scope] = to_json(certificates.kept[one.scope])
     version = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     parts = (*trusted_parts(), ("Python", version))

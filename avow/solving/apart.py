@@ -1,6 +1,6 @@
 """Solvers in processes of their own: a crash of one, or one that does not keep its time, is an unknown answer.
 
-Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.answering`).
+Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.question_process`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from importlib import metadata, util
 
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
-from avow.solving.answering import Answering, NoAnswer, serve
 from avow.solving.cvc5_process import answer
+from avow.solving.question_process import Answering, NoAnswer, serve
 from avow.tuning.effort import KERNEL_SECOND_STEPS
 
 

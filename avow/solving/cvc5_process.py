@@ -1,4 +1,4 @@
-"""cvc5 in a process of its own (`avow.solving.answering`): questions are ``[script, steps]``.
+"""cvc5 in a process of its own (`avow.solving.question_process`): questions are ``[script, steps]``.
 
 There are scripts on which cvc5 does not keep its own limits (seen: sequences of tuples), and a call into a library
 cannot be ended from Python.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from avow.solving.answering import serve
+from avow.solving.question_process import serve
 
 _PRODUCT = re.compile(r"\(\* (?!\(?[-/]? ?\d)(?!\S+ \(?[-/]? ?\d)")
 """Of what are not numbers."""

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.solving.answering import Answering, NoAnswer
 from avow.solving.limits import net
+from avow.solving.question_process import Answering, NoAnswer
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
 from avow.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT

@@ -11,11 +11,11 @@ from avow.base.graphs import strong_components
 
 from .automaton import Automaton, build, compiled
 from .explore import Graph, System
+from .fixed_beliefs import standing
 from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, conjunction
-from .standing import standing
 from .structure import Fair, Kripke, Lasso, find_lasso, reduce
 from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
 from .tautology import Laws, is_valid

@@ -148,7 +148,7 @@ class Work:
         place = self.folder / "question.json"
         place.write_text(json.dumps({**question, "seconds": self._left()}), encoding="utf-8")
         done, answer = judge.ask(
-            str(Path(__file__).with_name("judge.py").resolve()),
+            str(Path(__file__).with_name("runner.py").resolve()),
             [str(place)],
             cwd=self.folder,
             seconds=self._left() + 20.0,

@@ -79,7 +79,7 @@ class Hoare(Backend):
         return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
 
     def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
-        from .answering import answering
+        from .model import answering
 
         return answering(job)
 

@@ -20,7 +20,6 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import publisher
 
-from .answering import accused, ask, judge_answer, saw
 from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
 from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
@@ -31,6 +30,7 @@ from .parts import came, finish, judge_part, scatter
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
+from .waiting_answers import accused, ask, judge_answer, saw
 from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text, verdict_of
 from .wires import MappingError
 

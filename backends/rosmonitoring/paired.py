@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from .answering import asks, judges_answers_alone, speaks
 from .engine import Monitor
 from .pairing import Asked, ticks_of
 from .plans import Plan, Watch, below, is_seen
 from .rules import Path
 from .shapes import Shape
 from .tuning import TICKS
+from .waiting_answers import asks, judges_answers_alone, speaks
 from .watched import Violation, Watched
 
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))

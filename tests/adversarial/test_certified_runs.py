@@ -17,7 +17,7 @@ from avow.calculus.finder import Hint
 from avow.calculus.obligations import all_obligations, settle_all
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.check import Kernel
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 
 from .drawn import System
 
@@ -41,7 +41,7 @@ def judged(folder: Path, seed: int, *, rich: bool = False) -> int:
         kernel = Kernel(certificates.known_with(certificate.lemmas), certificate, certificates.solvers)
         for k, entry in enumerate(certificate.entries):
             same = certificates.known.by_digest.get(entry.digest, ())
-            claims = [s for s in same if s.node == entry.node and s.kind in (Kind.ASSUMPTION, Kind.REQUIREMENT)]
+            claims = [s for s in same if s.node == entry.node and s.kind in (Claimed.ASSUMPTION, Claimed.REQUIREMENT)]
             if entry.how is not How.SHOWN or not claims or k not in kernel.checked[0] or k in kernel.checked[1]:
                 continue
             needs = {need.kind for need in kernel.establish(k).hypotheses}
@@ -72,7 +72,7 @@ def kept(folder: Path, seed: int) -> int:
             return found
         certificates = Certificates(composition, made)
         for k in range(len(system.required)):
-            claim = certificates.kept_for(requirement_scope(f"R{k}"), Kind.REQUIREMENT, f"R{k}")
+            claim = certificates.kept_for(requirement_scope(f"R{k}"), Claimed.REQUIREMENT, f"R{k}")
             if claim is not None and not any(need.kind is How.ENVIRONMENT for need in claim.hypotheses):
                 found += 1
                 for _, truths, _ in system.steps():

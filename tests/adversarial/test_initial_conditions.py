@@ -12,7 +12,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 
 
 def system(
@@ -29,11 +29,11 @@ def system(
 def by_hand(path: Path) -> Established:
     """The claim, from a certificate that names every initial condition, and the environment. Raises Refused."""
     certificates = compose(path).certificates
-    claim = certificates.claim(Kind.REQUIREMENT, "R")
+    claim = certificates.claim(Claimed.REQUIREMENT, "R")
     assert claim is not None
     every = certificates.known.every
-    given = [s for s in every if s.kind is Kind.ENVIRONMENT]
-    initials = tuple(s.digest for s in every if s.kind is Kind.INITIAL)
+    given = [s for s in every if s.kind is Claimed.ENVIRONMENT]
+    initials = tuple(s.digest for s in every if s.kind is Claimed.INITIAL)
     assert initials
     at = len(given)
     uses = tuple(Use(k) for k in range(at))
@@ -69,8 +69,8 @@ def test_what_the_environment_is_assumed_to_be_makes_room_for_it_and_is_a_hypoth
     assert by_hand(path).hypotheses
     certificates = compose(path).certificates
     # the initial condition alone would show it: it may not, without the hypothesis
-    claim = certificates.claim(Kind.REQUIREMENT, "R")
-    initial = next(s for s in certificates.known.every if s.kind is Kind.INITIAL)
+    claim = certificates.claim(Claimed.REQUIREMENT, "R")
+    initial = next(s for s in certificates.known.every if s.kind is Claimed.INITIAL)
     assert claim is not None
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), (initial.digest,)),), Question((Use(0, 1),)))
     with pytest.raises(Refused, match="first value"):
@@ -88,11 +88,11 @@ def test_two_of_one_output_are_taken_together(tmp_path: Path) -> None:
     certificates = compose(system(tmp_path, "out.y == in.k", "n.k == 1", "REAL", "REAL")).certificates
     other = compose(system(tmp_path / "other", "out.y == 1", "n.k == 1", "REAL", "REAL")).certificates.known
     known = replace(
-        certificates.known, every=(*certificates.known.every, *(s for s in other.every if s.kind is Kind.INITIAL))
+        certificates.known, every=(*certificates.known.every, *(s for s in other.every if s.kind is Claimed.INITIAL))
     )
-    claim = certificates.claim(Kind.REQUIREMENT, "R")
+    claim = certificates.claim(Claimed.REQUIREMENT, "R")
     assert claim is not None
-    marks = tuple(s.digest for s in known.every if s.kind is Kind.INITIAL)
+    marks = tuple(s.digest for s in known.every if s.kind is Claimed.INITIAL)
     assert len(marks) == 2
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), marks),), Question((Use(0, 1),)))
     with pytest.raises(Refused, match="first value"):

@@ -17,11 +17,11 @@ from avow.backends.ajpf.automaton import compiled
 from avow.backends.ajpf.checker import label_states
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.fixed_beliefs import standing
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.society import system
-from avow.backends.ajpf.standing import standing
 from avow.backends.ajpf.syntax import Struct
 from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid
 from avow.backends.ajpf.tuning import TAUTOLOGY_CASES

@@ -18,7 +18,7 @@ from avow.calculus.finder import Hint
 from avow.calculus.invariants import read, write
 from avow.calculus.variables import frame, system_variable
 from avow.calculus.wiring import wiring
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 from avow.language.sorts import INTEGER, REAL
 from avow.language.terms import Compare, Literal
 from avow.solving.invariants import invariant
@@ -145,7 +145,7 @@ def test_a_certificate_has_the_invariant_as_a_claim_of_its_own(tmp_path: Path) -
     assert kept == found.made[scope]
     assert kept.lemmas
     again = Certificates(found.composition, {scope: kept})
-    assert again.kept_for(scope, Kind.REQUIREMENT, "R") is not None
+    assert again.kept_for(scope, Claimed.REQUIREMENT, "R") is not None
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_another_formula_in_its_place_shows_nothing(tmp_path: Path, lemma: tuple
     found = certified(tmp_path)
     scope = requirement_scope("R")
     forged = Certificates(found.composition, {scope: replace(found.made[scope], lemmas=(lemma,))})
-    assert forged.kept_for(scope, Kind.REQUIREMENT, "R") is None
+    assert forged.kept_for(scope, Claimed.REQUIREMENT, "R") is None
     text, plan = adding("0")
     system = make(tmp_path / "new", text, plan + "requirements: {R: {text: t, formula: 'c.x != 7'}}\n")
     assert compose(system).certificates.requirement("R", Hint(()), Bounds(), (lemma,)) is None, "no false help"

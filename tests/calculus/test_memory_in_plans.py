@@ -12,7 +12,7 @@ from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import compose
 from avow.calculus.obligations import all_obligations, settle_all
 from avow.kernel.certificate import How
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 
 from .make import Limits, make, node, outcomes
 
@@ -61,13 +61,13 @@ def test_what_a_requirement_remembers_is_no_hypothesis(tmp_path: Path) -> None:
     made = composition.certificates.made[requirement_scope("R")]
     assert How.DEFINED in {entry.how for entry in made.entries}
     again = Certificates(compose(system), {requirement_scope("R"): made})
-    established = again.kept_for(requirement_scope("R"), Kind.REQUIREMENT, "R")
+    established = again.kept_for(requirement_scope("R"), Claimed.REQUIREMENT, "R")
     assert established is not None
     kinds = {need.kind for need in established.hypotheses}
     assert kinds == {How.GUARANTEE, How.TOGETHER}, "values of several nodes are of one step"
     # under another system the requirement remembers something else: the certificate shows nothing of it
     other = make(tmp_path, RELAY, "requirements: {R: {text: t, formula: 'previous(a.e, TRUE) -> b.y'}}\n")
-    assert Certificates(compose(other), again.kept).kept_for(requirement_scope("R"), Kind.REQUIREMENT, "R") is None
+    assert Certificates(compose(other), again.kept).kept_for(requirement_scope("R"), Claimed.REQUIREMENT, "R") is None
 
 
 SLOPE = node("a", "v : REAL", "w : REAL", "G: out.w == in.v - previous(in.v, in.v)")

@@ -13,7 +13,7 @@ ROOMS = ("avow/sanity", "avow/solving", "avow/calculus", "avow/formulas", "avow/
 
 TOLD = {
     "avow/solving/limits.py",  # ends what hangs
-    "avow/solving/answering.py",  # the nets under other processes
+    "avow/solving/question_process.py",  # the nets under other processes
     "avow/solving/apart.py",
     "avow/solving/checking.py",  # how long an answer took, for people
     "avow/solving/questions.py",

@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip("pygls")
 
-from avow.lsp.answers import analyse, definition, hover, references, symbols
 from avow.lsp.appearance import coloured
 from avow.lsp.completion import offers, signature
+from avow.lsp.features import analyse, definition, hover, references, symbols
 
 TEXT = """\
 context { define far(r : REAL) = r > 9; }

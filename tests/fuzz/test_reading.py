@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from avow.backends.fuzz import BACKEND, building
-from avow.backends.fuzz.judge import _ended
+from avow.backends.fuzz.runner import _ended
 from avow.base.tools import Tool
 from avow.base.verdict import Verdict
 from avow.isolation import judge

@@ -22,7 +22,7 @@ from avow.calculus.finder import Hint
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
 from avow.kernel.solvers import BUDGET, Said, Solvers, ask_z3
-from avow.kernel.statements import Kind
+from avow.kernel.statements import Claimed
 from avow.kernel.text import Text
 from avow.language.load import check_text
 from avow.solving.questions import entails
@@ -49,7 +49,7 @@ def made(folder: Path, text: str = LOOP, plan: str = PLAN) -> tuple[Certificates
 
 def established(certificates: Certificates, certificate: Certificate) -> Established:
     """The requirement, from a certificate. Raises Refused."""
-    claim = certificates.claim(Kind.REQUIREMENT, "R")
+    claim = certificates.claim(Claimed.REQUIREMENT, "R")
     assert claim is not None
     kernel = Kernel(certificates.known, certificate, certificates.solvers)
     wanted = (How.SHOWN, "", claim.digest)
@@ -164,7 +164,7 @@ def test_what_the_clock_has_ended_is_an_error_that_says_so(tmp_path: Path, monke
 
 def test_the_environment_is_what_no_node_provides(tmp_path: Path) -> None:
     certificates, _ = made(tmp_path)
-    claim = certificates.claim(Kind.ASSUMPTION, "a.low")
+    claim = certificates.claim(Claimed.ASSUMPTION, "a.low")
     assert claim is not None
     forged = Certificate("forged", (Entry(How.ENVIRONMENT, "a", claim.digest),))
     with pytest.raises(Refused, match="a node provides"):
@@ -247,7 +247,7 @@ def test_what_is_possible_has_a_certificate_of_its_own(tmp_path: Path) -> None:
     assert found is not None
     (entry,) = certificates.made["existence start.a-b-c"].entries
     assert entry.how is How.POSSIBLE
-    requirement = certificates.claim(Kind.REQUIREMENT, "R")
+    requirement = certificates.claim(Claimed.REQUIREMENT, "R")
     assert requirement is not None
     assert requirement.digest != entry.digest, "c.z == 1, before the first step and at every one"
     for how, digest in ((How.SHOWN, entry.digest), (How.POSSIBLE, requirement.digest)):

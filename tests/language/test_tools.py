@@ -234,7 +234,7 @@ def at(text: str, needle: str, plus: int = 0) -> int:
 
 
 def test_answers() -> None:
-    from avow.lsp.answers import analyse, definition, hover, symbols
+    from avow.lsp.features import analyse, definition, hover, symbols
 
     document = analyse(TEXT, "f")
     said = hover(document, at(TEXT, "stat == red"))
@@ -264,7 +264,7 @@ def test_answers() -> None:
 
 def test_answers_while_typing() -> None:
     """What can be read of a broken text still helps; and no text, and no place in it, brings an exception."""
-    from avow.lsp.answers import analyse, definition, hover, symbols
+    from avow.lsp.features import analyse, definition, hover, symbols
 
     broken = TEXT.replace("stat == red and", "stat == ")
     document = analyse(broken, "f")

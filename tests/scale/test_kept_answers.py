@@ -15,7 +15,7 @@ from avow.calculus.kept_answers import KeptAnswers, keeping
 from avow.calculus.obligations import all_obligations, reestablished, settle_all
 from avow.evidence.ledger import ledger_of
 from avow.kernel.solvers import Said
-from avow.pipeline.answers import earlier, read_answers
+from avow.pipeline.answers_file import earlier, read_answers
 from avow.pipeline.discharge import discharge
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run

@@ -1,6 +1,6 @@
 """Runs what was built, apart from everything: a script that says through its channel what came of it.
 
-``python judge.py CHANNEL FILE``: the file's question is a campaign of libFuzzer, or runs for the plain program.
+``python runner.py CHANNEL FILE``: the file's question is a campaign of libFuzzer, or runs for the plain program.
 """
 
 from __future__ import annotations

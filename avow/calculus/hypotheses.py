@@ -14,7 +14,7 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest
 from avow.kernel.certificate import How
 from avow.kernel.check import Needed
-from avow.kernel.statements import Kind as Claimed
+from avow.kernel.statements import Claimed
 
 
 @dataclass(frozen=True, slots=True)
