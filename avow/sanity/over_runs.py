@@ -20,7 +20,7 @@ from avow.sanity.claims import Claim, Property, triggers
 from avow.sanity.results import Bounds, Finding, listing
 from avow.sanity.viability import Viability, told_apart, viable
 from avow.solving.questions import solve
-from avow.solving.second import CONTRADICTED, doubted
+from avow.solving.second import CONTRADICTED, contradicted, doubted
 from avow.system.formulas import ports_of
 from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
 
@@ -35,6 +35,8 @@ class OverRuns:
     bounds: Bounds
     remembering: Remembering = field(init=False)
     _viable: Viability | None = None
+    _empty: bool | None = None
+    _ends: dict[int, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         asked = tuple(
@@ -53,6 +55,20 @@ class OverRuns:
         return {c.name: c.formula for c in self.remembering.node.guarantees if not c.name.endswith(_TRIGGER)}
 
     def settle(self, claim: Claim) -> Finding:
+        found = self._settled(claim)
+        if claim.about is Property.ASSUMPTIONS_SATISFIABLE:
+            return found
+        return replace(found, because="assumptions-satisfiable") if self._impossible(found) else found
+
+    def _impossible(self, found: Finding) -> bool:
+        """Whether a claim is only false because no run is allowed at all."""
+        if found.verdict is not Verdict.REFUTED:
+            return False
+        if self._empty is None:
+            self._empty = self._possible(self.assumptions, "").verdict is Verdict.REFUTED
+        return self._empty
+
+    def _settled(self, claim: Claim) -> Finding:
         unsaid = self.remembering.unsaid
         if unsaid:
             name, why = next(iter(unsaid.items()))
@@ -195,18 +211,24 @@ class OverRuns:
             if doubted(anywhere, formulas):
                 return Finding(Verdict.ERROR, CONTRADICTED)
             return Finding(Verdict.REFUTED, excluded.format(listing(anywhere.core)), anywhere.core)
-        kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))
-        facts: dict[str, Term] = {}
+        impossible: list[Term] | None = []
+        core = set[str]()
         for length in range(RUN_TO_AN_EXAMPLE):
             here = {label: self._at(f, length) for label, f in formulas.items()}
-            begun = {f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells}
-            if solve({**facts, **begun, **here}, effort=limit, seed=seed, shown=False).status == "sat":
+            together = {**self._run(length), **here}
+            answer = solve(together, effort=limit, seed=seed, shown=False)
+            if answer.status == "sat":
                 return Finding(Verdict.PROVED)
-            facts[f"step {length}"] = self._at(kept, length)
-            for cell in self.remembering.cells:
-                after = Variable(Role.INPUT, f"{cell.name} after", cell.sort)
-                moved = rename(self._at(cell.leaves(after), length), {after: self._named(cell.before, length + 1)})
-                facts[f"{cell.name} {length}"] = moved
+            if answer.status != "unsat":
+                impossible = None
+            if impossible is not None:
+                impossible.append(conjunction(together.values()))
+                core |= {label for label in answer.core if label in here}
+                if self._over(length + 1):
+                    if contradicted([*impossible, conjunction(self._run(length + 1).values())]):
+                        return Finding(Verdict.ERROR, CONTRADICTED)
+                    named = tuple(label for label in formulas if label in core)
+                    return Finding(Verdict.REFUTED, excluded.format(listing(named)), named)
         open_still = f"not at the first {RUN_TO_AN_EXAMPLE} steps of a run; whether later is open"
         if self.viability.reachable is None:
             return Finding(Verdict.UNKNOWN, open_still)
@@ -218,6 +240,25 @@ class OverRuns:
             named = tuple(label for label in ever.core if label != "memory")
             return Finding(Verdict.REFUTED, excluded.format(listing(named)), named)
         return Finding(Verdict.UNKNOWN, open_still)
+
+    def _run(self, length: int) -> Mapping[str, Term]:
+        """That a run of so many steps keeps the contract, and what it leaves."""
+        kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))
+        facts = {f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells}
+        for step in range(length):
+            facts[f"step {step}"] = self._at(kept, step)
+            for cell in self.remembering.cells:
+                after = Variable(Role.INPUT, f"{cell.name} after", cell.sort)
+                moved = rename(self._at(cell.leaves(after), step), {after: self._named(cell.before, step + 1)})
+                facts[f"{cell.name} {step}"] = moved
+        return facts
+
+    def _over(self, length: int) -> bool:
+        """Whether no run of so many steps keeps the contract."""
+        if length not in self._ends:
+            answer = solve(self._run(length), effort=self.bounds.effort, seed=self.bounds.seed, shown=False)
+            self._ends[length] = answer.status == "unsat"
+        return self._ends[length]
 
     def _at(self, formula: Term, step: int) -> Term:
         """The formula at a step of a run."""

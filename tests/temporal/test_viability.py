@@ -212,6 +212,24 @@ def test_what_is_said_of_a_clause_is_so_in_every_run(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
+    ("clauses", "name", "because"),
+    [
+        ("assume a ( previous(x, FALSE) ) guarantee g ( once(x) -> o )", "assumptions-satisfiable", None),
+        ("assume a ( previous(x, FALSE) ) guarantee g ( once(x) -> o )", "consistent", "assumptions-satisfiable"),
+        ("guarantee g ( held[1 steps](o) ) guarantee h ( n < 3 )", "consistent", None),
+    ],
+)
+def test_what_no_run_lasts_for_is_refuted_though_there_are_numbers(
+    clauses: str, name: str, because: str | None
+) -> None:
+    text = f"node n {{ inputs( x : BOOL, n : NATURAL ) outputs( o : BOOL ) topics() {clauses} }}"
+    contract, found = check_text(text, "n.rcl")
+    assert contract is not None, found
+    (result,) = analyse(contract.nodes[0], wanted=frozenset({name}))
+    assert (result.verdict, result.because) == (Verdict.REFUTED, because)
+
+
+@pytest.mark.parametrize(
     ("name", "verdict"),
     [
         ("not-tautological-g1", Verdict.PROVED),
