@@ -6,7 +6,8 @@ The pipeline calls, once a system:
     case = build_case(
         system,
         obligations,                       # every Obligation of the system, of every kind
-        ledger.records(),                  # every Entry, oldest first; current, stale and superseded alike
+        ledger.records(),                  # every Entry, oldest first; current, stale and superseded alike. What the
+                                           # case keeps of them: `avow.assurance.history`
         keys={(obligation.id, method_id): key},   # one item for each attempt that the plan asks for NOW; `key` as
                                            # computed afresh. No item: no method is planned (missing, or withdrawn).
         today=date,                        # handed in: nothing here reads a clock
@@ -104,10 +105,12 @@ def build_case(
     baseline: Baseline | None = None,
     discharging: Mapping[str, tuple[str, ...]] | None = None,
     kernel: KernelRun | None = None,
+    recorded: Sequence[Entry] | None = None,
 ) -> Case:
     """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names;
     `discharging`: of each node the obligations that settle its assumptions; `kernel`: what the
-    kernel established in this run.
+    kernel established in this run; `recorded`: the records as the ledger has them, where `records` are as they count
+    now.
     Raises Rejected for an unusable policy."""
     return conclude(
         facts_of_system(
@@ -128,6 +131,7 @@ def build_case(
             baseline,
             discharging or {},
             kernel,
+            recorded,
         )
     )
 
@@ -261,6 +265,7 @@ def conclude(facts: Facts) -> Case:
         baseline=facts.baseline,
         sources=facts.sources,
         earlier=facts.earlier,
+        history=facts.history,
     )
     return replace(case, answers=with_signature(case))
 

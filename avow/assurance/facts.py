@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 from avow.assurance.answers import EARLIER, Baseline
 from avow.assurance.certification import KernelRun
+from avow.assurance.history import History, history
 from avow.assurance.model import (
     Case,
     Derivation,
@@ -66,6 +67,7 @@ class Facts:
     baseline: Baseline | None = None
     kernel: KernelRun = field(default_factory=KernelRun)
     earlier: bool = False
+    history: History = field(default_factory=History)
 
 
 def facts_of_system(
@@ -86,6 +88,7 @@ def facts_of_system(
     baseline: Baseline | None = None,
     discharging: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
     kernel: KernelRun | None = None,
+    recorded: Sequence[Entry] | None = None,
 ) -> Facts:
     """Raises Rejected for an unusable policy."""
     plan = system.plan
@@ -105,6 +108,7 @@ def facts_of_system(
         for node in system.contract.nodes
         if not node.relay
     )
+    kept, told = history(records if recorded is None else recorded, obligations, keys)
     return Facts(
         system=plan.system,
         title=plan.title,
@@ -129,7 +133,7 @@ def facts_of_system(
         accepted=plan.accepted,
         obligations=tuple({o.id: replace(o, span=_relative(o.span, plan)) for o in obligations}.values()),
         planned=planned,
-        entries=tuple(sorted(records, key=lambda e: (e.number, e.hash))),
+        entries=tuple(sorted((e for e in records if e.hash in kept), key=lambda e: (e.number, e.hash))),
         derivations=tuple(derivations),
         methods=tuple(sorted(methods, key=lambda m: m.name)),
         tools=tuple(sorted(tools, key=lambda t: (t.name, t.version or ""))),
@@ -144,6 +148,7 @@ def facts_of_system(
         statements=tuple(replace(s, span=_relative(s.span, plan)) for s in plan.statements),
         baseline=baseline,
         kernel=kernel or KernelRun(),
+        history=told,
     )
 
 
@@ -219,6 +224,7 @@ def facts_of_case(case: Case) -> Facts:
         baseline=case.baseline,
         kernel=case.kernel,
         earlier=case.earlier,
+        history=case.history,
     )
 
 

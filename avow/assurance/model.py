@@ -15,6 +15,7 @@ from enum import StrEnum
 
 from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition, Tone, Weakening, WeakestEvidence
 from avow.assurance.certification import KernelRun, ProofView, Trusted
+from avow.assurance.history import History
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.base import codec
@@ -402,6 +403,7 @@ class Case:
     """Whether the plan lists the expected findings (strictly: all of these and no others)."""
     orphans: tuple[Entry, ...] = ()
     """Evidence for claims that no longer exist."""
+    history: History = field(default_factory=History, metadata=codec.LATER)
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()

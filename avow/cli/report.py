@@ -70,7 +70,8 @@ def _check(folder: Path, as_json: bool) -> int:
             click.echo(f"  ✘ {line}")
     else:
         records = sum(len(view.evidence) for view in case.obligations)
-        told = f"{records} records, {len(case.obligations)} obligations, {case.grade}"
+        left_out = f" ({case.history.left_out} older ones in the ledger alone)" if case.history.left_out else ""
+        told = f"{records} records{left_out}, {len(case.obligations)} obligations, {case.grade}"
         click.echo(f"{folder}: agrees with the ledger: {told}{', of an earlier state' if old else ''}")
     for name in old if not as_json else ():
         click.echo(f"  · {name} has changed since: `avow verify` asks again what was asked of it")

@@ -171,6 +171,7 @@ def build(assessment: Assessment) -> Case:
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
         baseline=newest_signed(workspace.signed, system.name)[0],
         kernel=kernel_run(entries, workspace.root, system, assessment.run),
+        recorded=ledger.records(),
     )
 
 

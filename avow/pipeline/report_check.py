@@ -1,12 +1,12 @@
 """Does a report on disk say what the ledger says?
 
 Five steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
-the ledger has no other for its claims; every conclusion follows again from those records (statuses, gates, exit code);
-the kernel establishes from the certificates in the report what it says that the kernel established;
-the contracts' texts that it shows have the digests that it names; every other format is, byte for byte, what that case
-renders to. What the report was made *of* (contract, plan) is compared by digest where the files are here; which files
-of its evidence are others now is told (`stale`), and is no difference from the ledger. One thing it cannot know:
-whether the obligations are still those of today's contract; that is what `avow verify` is for.
+the ledger has no other that could count, no other refutation and no newer one; every conclusion follows again from
+those records (statuses, gates, exit code); the kernel establishes from the certificates in the report what it says that
+the kernel established; the contracts' texts that it shows have the digests that it names; every other format is, byte
+for byte, what that case renders to. What the report was made *of* (contract, plan) is compared by digest where the
+files are here; which files of its evidence are others now is told (`stale`), and is no difference from the ledger. One
+thing it cannot know: whether the obligations are still those of today's contract; that is what `avow verify` is for.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import from_json, to_json
+from avow.assurance.history import history
 from avow.assurance.model import Case
 from avow.assurance.signed import KEYS
 from avow.base.codec import Unreadable
@@ -152,13 +153,22 @@ def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
             entry.evidence.verdict.supports and entry in (not_established(known[mark]), changed_since(known[mark]))
         ):
             yield f"the report quotes {where} otherwise than the ledger has it"
-    newer = [entry for mark, entry in known.items() if mark not in quoted]
+    planned = {(view.id, method): key for view in case.obligations for method, key in view.planned}
+    needed, told = history(entries, [view.obligation for view in case.obligations], planned)
+    newer = [entry for mark, entry in known.items() if mark not in quoted and mark in needed]
     if newer:
         first = newer[0].evidence
         what = f"{first.obligation}, {first.method}"
         yield f"the ledger has {len(newer)} record(s) that the report does not show; first: {what}"
-    if not newer and case.ledger_head != ledger.head:
+    if newer:
+        return
+    if case.ledger_head != ledger.head:
         yield "the report names another ledger head than the ledger's"
+    left_out = sum(mark not in quoted for mark in known)
+    if case.history.left_out != left_out:
+        yield f"the report says that it leaves out {case.history.left_out} records of the ledger: it does {left_out}"
+    if case.history.points != told.points:
+        yield "where the claims stood after each run does not follow from the ledger"
 
 
 def _kernel(case: Case, root: Path) -> Iterable[str]:

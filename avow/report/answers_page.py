@@ -15,7 +15,6 @@ from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import kept_apart, word
-from avow.assurance.trend import trend
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
@@ -187,7 +186,7 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
         environment()
         .get_template("systems.html.j2")
         .render(
-            rows=[(case, trend(case)) for case in ranked],
+            rows=[(case, case.history.points) for case in ranked],
             earlier=earlier,
             line=line,
             tone=tone,

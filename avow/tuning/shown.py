@@ -1,4 +1,5 @@
-"""How much of a thing a person is shown. Nothing is lost: `report.json` has everything."""
+"""How much of a thing a person is shown. Nothing is lost: `report.json` has everything but old records, and the ledger
+has those, too."""
 
 FINDING_DAYS = 365
 """How long an accepted finding without an expiry is accepted, from its date: a year, as reviews are mostly repeated."""
@@ -11,6 +12,10 @@ TREND_RUNS = 24
 
 SOURCE_COLUMNS = 100
 """Columns of a source line that are shown around a fault: a terminal's width, less its margin."""
+
+OLDER_RECORDS = 2
+"""Records of an earlier state that a report keeps of each claim and method, the newest: what the method said before the
+claim or its subject changed, and once more where it was asked again for a new version of a tool. The ledger has all."""
 
 STEP_VARIABLES = 12
 """Variables shown of each step of a run: more fit in no line of a table."""

@@ -22,7 +22,6 @@ from avow.assurance.case import as_of_earlier
 from avow.assurance.codec import case_schema
 from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
-from avow.assurance.trend import trend
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
 from avow.report import LeftOut, formats, render_all, wording, write_index
@@ -376,7 +375,8 @@ def test_the_trend_is_what_the_ledger_said_after_each_run() -> None:
         evidence(h, run="b"),
         evidence(g, key="3", run="c"),
     ]
-    points = trend(case(subject, [g, h], records, keys={(g.id, "hoare"): "3", (h.id, "hoare"): records[2].key}))
+    found = case(subject, [g, h], records, keys={(g.id, "hoare"): "3", (h.id, "hoare"): records[2].key})
+    points = found.history.points
     assert [(p.run, p.supported, p.refuted, p.open) for p in points] == [("a", 0, 0, 2), ("b", 1, 1, 0), ("c", 2, 0, 0)]
     assert Status.PROVED.supports
 

@@ -1,0 +1,85 @@
+"""What a report keeps of the ledger: all that can count, every refutation, and of the rest the newest few.
+
+What is left out can change no conclusion: a record with another key than the plan's is of an earlier state. The ledger
+has it, and how the case came about over the runs is computed from the ledger before anything is left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from avow.assurance.naming import is_advice
+from avow.base.records import dataclass
+from avow.base.verdict import Verdict
+from avow.evidence.ledger import Entry
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, roll_up, weigh
+from avow.tuning.shown import OLDER_RECORDS, TREND_RUNS
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """After a run: how many claims were supported, refuted (or contradicted), and neither."""
+
+    run: str
+    started: str
+    supported: int
+    refuted: int
+    open: int
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    left_out: int = 0
+    """Records of earlier states that stand in the ledger alone."""
+    points: tuple[Point, ...] = ()
+    """Where the claims stood after each of the last runs."""
+
+
+def history(
+    records: Sequence[Entry], obligations: Sequence[Obligation], planned: Mapping[tuple[str, str], str]
+) -> tuple[frozenset[str], History]:
+    """The hashes of the records that a report keeps of a ledger, oldest first, and the history of all of them.
+
+    Kept is every record that answers the question as `planned` for (obligation, method), every refutation, and of each
+    claim and method the newest of the others. The records are to be as the ledger has them: whether one of them is of
+    an earlier state for another reason than its key may change without the ledger."""
+    digests = {o.id: o.digest for o in obligations}
+    kept: set[str] = set()
+    others: Counter[tuple[str, str]] = Counter()
+    for entry in reversed(records):
+        record = entry.evidence
+        asked = record.obligation, record.method
+        current = planned.get(asked) == record.key and digests.get(record.obligation) == record.obligation_digest
+        if not (current or record.verdict is Verdict.REFUTED or weigh(record).refuted):
+            others[asked] += 1
+            if others[asked] > OLDER_RECORDS:
+                continue
+        kept.add(entry.hash)
+    claims = {o.id for o in obligations if not is_advice(o)}
+    return frozenset(kept), History(sum(e.hash not in kept for e in records), _trend(records, claims))
+
+
+def _trend(records: Sequence[Entry], claims: set[str]) -> tuple[Point, ...]:
+    """One point a run that left evidence, oldest first. As keys of the past are not kept, a method's newest record of
+    the time is taken as current; for the last run see the case itself."""
+    ours = [entry.evidence for entry in records if entry.evidence.obligation in claims]
+    known: dict[str, dict[str, list[Evidence]]] = {}
+    statuses: dict[str, Status] = {}
+    asked: set[str] = set()
+    points: list[Point] = []
+    for at, record in enumerate(ours):
+        methods = known.setdefault(record.obligation, {})
+        same = [e for e in methods.get(record.method, []) if e.key == record.key]
+        methods[record.method] = [*same, record]
+        asked.add(record.obligation)
+        if at + 1 == len(ours) or ours[at + 1].run != record.run:
+            statuses |= {name: roll_up(e for items in known[name].values() for e in items) for name in asked}
+            asked.clear()
+            counts = Counter(statuses.values())
+            supported = sum(n for status, n in counts.items() if status.supports)
+            refuted = counts[Status.REFUTED] + counts[Status.CONTRADICTORY]
+            points.append(Point(record.run, record.started, supported, refuted, len(claims) - supported - refuted))
+    return tuple(points[-TREND_RUNS:])
