@@ -9,7 +9,7 @@ from avow.assurance.answers import Baseline, ChangeLine, Changes, How, Suppositi
 from avow.assurance.model import Case, ObligationView, RequirementView
 from avow.assurance.relied import word
 from avow.assurance.weakenings import words_of
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
@@ -43,7 +43,7 @@ def content_of(of: Baseline) -> str:
     """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
     from avow.base.codec import canonical
 
-    return digest(
+    return sha256(
         canonical(
             {
                 "verdict": of.verdict,
@@ -83,12 +83,12 @@ def changes(
 
 
 def _meaning(view: RequirementView) -> str:
-    return digest("\n".join((view.text, view.formula, view.temporal, *view.supported_by)))
+    return sha256("\n".join((view.text, view.formula, view.temporal, *view.supported_by)))
 
 
 def _guarantee(view: ObligationView) -> tuple[str, str, str, str, str]:
     counting = sorted(_mark(item.entry.evidence, item.entry.hash) for item in view.counting)
-    return view.id, view.obligation.digest, view.standing.value, view.obligation.formula, digest("\n".join(counting))
+    return view.id, view.obligation.digest, view.standing.value, view.obligation.formula, sha256("\n".join(counting))
 
 
 def _mark(record: Evidence, hash_: str) -> str:

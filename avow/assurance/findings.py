@@ -17,7 +17,7 @@ from datetime import date, timedelta
 
 from avow.assurance.model import Handled
 from avow.base import codec
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
@@ -99,7 +99,7 @@ def mark(counting: Iterable[Entry]) -> str:
         for e in records
         if e.verdict is Verdict.REFUTED or e.vacuous
     ]
-    return digest(json.dumps(sorted(found, key=json.dumps)))[:12]
+    return sha256(json.dumps(sorted(found, key=json.dumps)))[:12]
 
 
 def _is_out(finding: Finding, today: date) -> bool:

@@ -17,7 +17,7 @@ PART = ".part"
 """How the name of a file ends that is still being written; one that stays was left by a killed process."""
 
 
-def digest(data: bytes | str) -> str:
+def sha256(data: bytes | str) -> str:
     """SHA-256, in hexadecimal."""
     return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from avow.base.files import digest
+from avow.base.files import sha256
 
 
 def lark_of(grammar: Path, name: str, **options: Any) -> Any:
@@ -15,7 +15,7 @@ def lark_of(grammar: Path, name: str, **options: Any) -> Any:
     from lark import Lark
 
     text = grammar.read_text("utf-8")
-    cache = _cache_file(f"{name}-{digest(text)[:12]}")  # two versions on one machine keep their own
+    cache = _cache_file(f"{name}-{sha256(text)[:12]}")  # two versions on one machine keep their own
     if cache is not None:
         try:
             return Lark(text, cache=str(cache), **options)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest, digest_file
+from avow.base.files import digest_file, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
@@ -26,11 +26,11 @@ def program_digest(path: str | None) -> str:
     if path is None:
         return ""
     files = program_files(path)
-    mark = digest(json.dumps([[str(file), _mark(file)] for file in files]))
-    note = cache_folder() / f"program-{digest(path)[:16]}.json"
+    mark = sha256(json.dumps([[str(file), _mark(file)] for file in files]))
+    note = cache_folder() / f"program-{sha256(path)[:16]}.json"
     known = read_note(note) or {}
     if known.get("of") != mark:
-        known = {"of": mark, "digest": digest(json.dumps([[str(file), _digest(file)] for file in files]))}
+        known = {"of": mark, "digest": sha256(json.dumps([[str(file), _digest(file)] for file in files]))}
         with contextlib.suppress(OSError):  # a read-only home costs that each time
             write_note(note, known)
     return str(known["digest"])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest, digest_file, write
+from avow.base.files import digest_file, sha256, write
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 
@@ -65,12 +65,12 @@ def package_digest(name: str) -> str:
     try:
         told = [(str(file.relative_to(place)), file.stat()) for file in files]
         marks = [[file, i.st_ino, i.st_size, i.st_mtime_ns, i.st_ctime_ns] for file, i in told]
-        note = cache_folder() / f"package-{name}-{digest(str(place))[:12]}.json"  # one for each environment
-        mark = digest(json.dumps([str(place), marks]))
+        note = cache_folder() / f"package-{name}-{sha256(str(place))[:12]}.json"  # one for each environment
+        mark = sha256(json.dumps([str(place), marks]))
         known = read_note(note) or {}
         if known.get("of") != mark:
             said = [[str(file.relative_to(place)), digest_file(file)] for file in files]
-            known = {"of": mark, "digest": digest(json.dumps(said))}
+            known = {"of": mark, "digest": sha256(json.dumps(said))}
             with contextlib.suppress(OSError):  # a read-only home costs that each time
                 write_note(note, known)
         return str(known["digest"])

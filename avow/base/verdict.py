@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import field
 from enum import StrEnum
 
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.records import dataclass
 
 
@@ -144,7 +144,7 @@ class Hypothesis:
 
 def bound(name: str, text: str) -> Hypothesis:
     """A limit of a bounded answer, in words that say what lies within."""
-    return Hypothesis(HypothesisKind.BOUND, name, digest(f"{name}\n{text}"), text)
+    return Hypothesis(HypothesisKind.BOUND, name, sha256(f"{name}\n{text}"), text)
 
 
 def in_words(rests_on: Iterable[Hypothesis], hypotheses: Iterable[str]) -> tuple[str, ...]:

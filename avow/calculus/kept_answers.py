@@ -15,7 +15,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest
 from avow.kernel.solvers import Said, ask_z3

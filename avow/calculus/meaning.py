@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.graphs import components
 from avow.calculus.variables import Frame
 from avow.formulas.formula import digest, sort_digest

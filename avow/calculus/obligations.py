@@ -12,7 +12,7 @@ from itertools import chain
 from typing import Protocol
 
 from avow.base.diagnostics import Span
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.verdict import Outcome
 from avow.calculus import questions
@@ -34,7 +34,7 @@ from avow.kernel.statements import Claimed
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
-from avow.solving.limits import from_seconds, told
+from avow.solving.limits import effort_told, from_seconds
 from avow.system.plan import Endpoint, Requirement, System
 
 
@@ -93,12 +93,12 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], lim
         task = tasks.get(obligation.id)
         if task is None:
             outcome = questions.vanished(obligation.id)
-            yield replace(outcome, details={**outcome.details, **told(bounds.effort)})
+            yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
             continue
         answer = task.ask(composition, bounds)
         goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
         outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
-        yield replace(outcome, details={**outcome.details, **told(bounds.effort)})
+        yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
 
 
 def reestablished(certificates: Certificates, obligation: str) -> Reestablished | None:

@@ -13,9 +13,8 @@ from itertools import product
 from typing import Any
 
 from avow.evaluation.evaluate import Domains, NotEvaluable, finite_values
-from avow.formulas import values as values_
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Data, FunctionValue, Opaque, Value
+from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import FunctionSort, SequenceSort
 from avow.language.terms import Term
 from avow.tuning.bounds import POINTS_OF_ARGUMENTS
@@ -52,7 +51,7 @@ def is_open(value: Value) -> bool:
     match value:
         case FunctionValue(default=default):
             return default is ANY
-        case values_.SequenceValue(items=items):
+        case SequenceValue(items=items):
             return any(item is ANY for item in items)
         case _:  # other values are known as a whole
             return False
@@ -84,10 +83,10 @@ def decided(value: Value, point: Point, result: Value) -> Value:
     match value:
         case FunctionValue(table=table, default=default):
             return FunctionValue(dict(sorted({**table, point: result}.items(), key=_order)), default)
-        case values_.SequenceValue(items=items):
+        case SequenceValue(items=items):
             [at] = point
             assert isinstance(at, int)
-            return values_.SequenceValue((*items[:at], result, *items[at + 1 :]))
+            return SequenceValue((*items[:at], result, *items[at + 1 :]))
     raise AssertionError("only functions and sequences are open")
 
 
@@ -96,8 +95,8 @@ def closed(value: Value, result: Value) -> Value:
     match value:
         case FunctionValue(table=table):
             return FunctionValue(table, result)
-        case values_.SequenceValue(items=items):
-            return values_.SequenceValue(tuple(result if item is ANY else item for item in items))
+        case SequenceValue(items=items):
+            return SequenceValue(tuple(result if item is ANY else item for item in items))
     raise AssertionError("only functions and sequences are open")
 
 
@@ -116,9 +115,9 @@ def opened(found: Mapping[str, Value], names: Lazy) -> tuple[Mapping[str, Value]
         match value:
             case FunctionValue(table=table, default=default):
                 asking[name] = FunctionValue(_OpenTable(name, table, wanted, points), default)
-            case values_.SequenceValue(items=items):
+            case SequenceValue(items=items):
                 asks: Any = _OpenItems(name, items, wanted)
-                asking[name] = values_.SequenceValue(asks)
+                asking[name] = SequenceValue(asks)
     return ({**found, **asking} if asking else found), wanted
 
 
@@ -220,7 +219,7 @@ class _OpenItems(Sequence[Value]):
 def asking(value: Value) -> bool:
     """Whether a value that was computed holds on to an open sequence."""
     match value:
-        case values_.SequenceValue(items=items):
+        case SequenceValue(items=items):
             return isinstance(items, _OpenItems) or any(map(asking, items))
         case Data(arguments=items) | tuple(items):
             return any(map(asking, items))

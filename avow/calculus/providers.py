@@ -14,7 +14,7 @@ from itertools import chain
 from typing import assert_never
 
 from avow.base.diagnostics import Severity
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.remembered import by_identity
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.variables import Frame, indexed

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import field, replace
 from typing import Protocol, assert_never
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition

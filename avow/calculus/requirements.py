@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.formulas.formula import digest, free_variables, rename, substitute
 from avow.formulas.temporal.ages import CLOCK

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
 from avow.isolation.level import Isolation, wanted
@@ -53,12 +53,12 @@ def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
 def changed_since(entry: Entry) -> Entry:
     """The entry of a record whose inputs are others now, or that a later refutation outlived: with a key that is
     nobody's."""
-    return replace(entry, evidence=replace(entry.evidence, key=digest(f"changed since: {entry.hash}")))
+    return replace(entry, evidence=replace(entry.evidence, key=sha256(f"changed since: {entry.hash}")))
 
 
 def not_established(entry: Entry) -> Entry:
     """The entry of a proof that the kernel does not establish any more: with a key that is nobody's."""
-    return replace(entry, evidence=replace(entry.evidence, key=digest(f"not established: {entry.hash}")))
+    return replace(entry, evidence=replace(entry.evidence, key=sha256(f"not established: {entry.hash}")))
 
 
 def refutations(ledger: Ledger, entry: Entry) -> tuple[Entry, ...]:

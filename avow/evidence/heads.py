@@ -26,7 +26,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from avow.base.codec import canonical
-from avow.base.files import digest, read_regular
+from avow.base.files import read_regular, sha256
 from avow.base.records import dataclass
 from avow.evidence.appending import append, locked
 
@@ -126,7 +126,7 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
             "time": datetime.now(UTC).isoformat(timespec="seconds"),
             **more,
         }
-        append(file, canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n")
+        append(file, canonical({**body, "hash": sha256(canonical(body))}).encode() + b"\n")
 
 
 def _is_newest(index: Index, event: Event, system: str, records: int, head: str) -> bool:
@@ -139,7 +139,7 @@ def _read(line: bytes) -> tuple[Statement, int, str, str] | None:
     try:
         data = json.loads(line)
         body = {key: value for key, value in data.items() if key != "hash"}
-        written = canonical({**body, "hash": digest(canonical(body))}).encode()
+        written = canonical({**body, "hash": sha256(canonical(body))}).encode()
         statement = Statement(
             Event(data["event"]),
             str(data["system"]),

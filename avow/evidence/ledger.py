@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.codec import Unreadable, canonical
-from avow.base.files import digest, read_regular, write
+from avow.base.files import read_regular, sha256, write
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
@@ -292,7 +292,7 @@ def ledger_of(path: Path) -> Ledger:
 def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     """A line's hash and the line itself; `evidence` is the record's canonical text."""
     tail = f'"n":{number},"prev":{canonical(previous)}}}'
-    mark = digest(f'{{"evidence":{evidence},{tail}')
+    mark = sha256(f'{{"evidence":{evidence},{tail}')
     return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
 
 

@@ -36,8 +36,8 @@ from .sentence import (
     Unreadable,
     is_assumption,
     parse,
+    parse_expression,
 )
-from .sentence import parse_expression as parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -405,7 +405,7 @@ class _Node:
         before = self.within
         self.within = (*before, name)
         try:
-            expression = parsed(said)
+            expression = parse_expression(said)
             self._truth(expression)
             text = f"({self._say(expression)})"
             if len(text) > _LONGEST:

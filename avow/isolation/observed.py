@@ -17,7 +17,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from avow.base.files import digest, digest_file
+from avow.base.files import digest_file, sha256
 from avow.base.module_path import absolute_only
 
 
@@ -54,9 +54,9 @@ class Observed:
 def look(kind: Seen, path: str) -> str:
     """The digest as of now. A thing that has changed its kind has another digest."""
     if kind is Seen.VARIABLE:
-        return digest(variables().get(os.path.basename(path), ""))  # noqa: PTH119
+        return sha256(variables().get(os.path.basename(path), ""))  # noqa: PTH119
     if kind is Seen.PLACE:
-        return digest(os.path.realpath(path))
+        return sha256(os.path.realpath(path))
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
         match kind:
@@ -66,12 +66,12 @@ def look(kind: Seen, path: str) -> str:
                 return "there"
             case Seen.LISTING:
                 # what Python and we leave behind is nobody's input
-                return digest(json.dumps(sorted(n for n in os.listdir(path) if n != "__pycache__")))  # noqa: PTH208
+                return sha256(json.dumps(sorted(n for n in os.listdir(path) if n != "__pycache__")))  # noqa: PTH208
             case Seen.STATE:
                 size = "" if stat.S_ISDIR(info.st_mode) else str(info.st_size)
-                return digest(f"{info.st_mode} {size} {_link(path)}")
+                return sha256(f"{info.st_mode} {size} {_link(path)}")
             case Seen.KIND:
-                return digest(f"{stat.S_IFMT(info.st_mode)} {_link(path)}")
+                return sha256(f"{stat.S_IFMT(info.st_mode)} {_link(path)}")
             case Seen.OUTSIDE:
                 return ""
     except (OSError, ValueError):
@@ -86,7 +86,7 @@ def variables() -> dict[str, str]:
 def _link(path: str) -> str:
     """Where a link points to; empty: it is none."""
     try:
-        return digest(os.fsencode(os.readlink(path)).hex())  # noqa: PTH115
+        return sha256(os.fsencode(os.readlink(path)).hex())  # noqa: PTH115
     except (OSError, ValueError):
         return ""
 

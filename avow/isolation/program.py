@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from avow.isolation.subject import Subject
+from avow.isolation.subject import SubjectProcess
 
 CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGTRAP))
 """How a program ends whose own code went wrong."""
 
 
-class Program(Subject):
+class Program(SubjectProcess):
     """Each case is ``{"command": text}``; the text holds neither ``|`` nor the end of a line."""
 
     def __init__(self, path: Path, patience: float, root: Path) -> None:

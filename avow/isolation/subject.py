@@ -28,7 +28,7 @@ class SubjectFailed(Exception):  # noqa: N818 - it names what happened
     type."""
 
 
-class Subject:
+class SubjectProcess:
     """The process that holds a function of a Python file. Started at the first question.
 
     `root` is the system's folder. Once `fault` says something, no answer of this subject counts: it started processes,

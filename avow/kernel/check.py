@@ -14,7 +14,7 @@ from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.kernel.certificate import FORMAT, Certificate, Entry, How, Question, Use
 from avow.kernel.solvers import LOOK, Said, Solvers
 from avow.kernel.statements import Claimed, Statement, Statements

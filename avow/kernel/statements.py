@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 
-from avow.base.files import digest as sha256
+from avow.base.files import sha256
 from avow.kernel.text import Symbols, Text, Untranslatable, symbol
 from avow.language.contract import Node
 from avow.language.sorts import Sort

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.language.chains import arithmetic as chained
+from avow.language.chains import arithmetic
 from avow.language.check_applications import Applications
 from avow.language.check_base import count
 from avow.language.conversions import NUMERIC, alike, common, convert, joined
@@ -74,7 +74,7 @@ class Relations(Applications):
             operands.append(term)
         if len(operands) < len(trees):
             return None
-        made = chained(operators, operands, self.places(trees))
+        made = arithmetic(operators, operands, self.places(trees))
         if made is None:
             message = f"a chain of {len(operators)} operators, with a `/` between most of them, is too long"
             self.error("RCL110", message, tree.operators[0], hint="put parentheses around its parts")

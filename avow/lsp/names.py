@@ -25,6 +25,7 @@ from avow.language.syntax import (
     Define,
     Element,
     FieldOf,
+    Name,
     NamedType,
     NodePort,
     PortName,
@@ -37,7 +38,6 @@ from avow.language.syntax import (
     unparenthesised,
     walk,
 )
-from avow.language.syntax import Name as NameSyntax
 from avow.language.terms import Role
 
 
@@ -258,7 +258,7 @@ class _Reader:
         while stack:
             part, scope = stack.pop()
             match part:
-                case NameSyntax(text=name):
+                case Name(text=name):
                     yield from self.at(scope.get(name) or self.meaning(name), part.start, part.end)
                 case PortName(role=role, name=name):
                     ports = self.nodes.get(self.node, Ports())

@@ -14,7 +14,7 @@ from avow.evidence.ledger import ledger_of
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, Work, engine_identity
 
-FILE = "answers.json"
+ANSWERS = "answers.json"
 
 
 def earlier(workspace: Workspace, work: Work, run: Run) -> str:
@@ -23,7 +23,7 @@ def earlier(workspace: Workspace, work: Work, run: Run) -> str:
         return ""
     for entry in reversed(ledger_of(workspace.ledger(work.system.name)).records()):
         record = entry.evidence
-        path = next((path for path in record.outputs if path.endswith(f"/{FILE}")), None)
+        path = next((path for path in record.outputs if path.endswith(f"/{ANSWERS}")), None)
         if record.method == COMPOSE and path is not None:
             try:
                 whole = is_intact(workspace.root / path, record.outputs[path])

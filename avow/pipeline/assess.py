@@ -19,7 +19,7 @@ from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
 from avow.base import codec
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest, digest_file, is_intact
+from avow.base.files import digest_file, is_intact, sha256
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
@@ -165,7 +165,7 @@ def build(assessment: Assessment) -> Case:
         methods=_methods(assessment),
         tools=_tools(assessment),
         discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
-        digests={path: digest(data) for path, data in texts.items()},
+        digests={path: sha256(data) for path, data in texts.items()},
         ledger_head=ledger.head,
         graph_svg=graph_svg(system),
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
@@ -240,7 +240,7 @@ def _key(assessment: Assessment) -> str:
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
     kernel = kernel_run(entries, root, surveyed.system, assessment.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
-    return digest(
+    return sha256(
         json.dumps(
             [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
         )

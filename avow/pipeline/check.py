@@ -64,15 +64,15 @@ def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
     what each backend says of its options; without the warnings that the plan switches off. `clean`: as for
     `diagnostics`."""
+    from avow.system import launched
     from avow.system.graph import dataflow
-    from avow.system.launched import told as launched
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
     from avow.system.topics import turned, unknown_types
 
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
-        *launched(system),
+        *launched.told(system),
         *unknown_types(system.plan, system.contract),
         *turned(system.plan, system.contract),
         *_model(system),

@@ -14,7 +14,7 @@ from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
-from avow.base.files import digest, digest_file, is_intact, write
+from avow.base.files import digest_file, is_intact, sha256, write
 from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
@@ -178,10 +178,10 @@ def _keep_logs(workspace: Workspace, work: Work, todo: tuple[Obligation, ...], r
     """Logs stand under a name of their own for every attempt, so that later attempts leave older evidence intact."""
     if not report.logs:
         return {}
-    stamp = digest("".join(sorted(work.keys[o.id] for o in todo)) + "".join(report.logs.values()))[:12]
+    stamp = sha256("".join(sorted(work.keys[o.id] for o in todo)) + "".join(report.logs.values()))[:12]
     kept = {}
     for name, text in report.logs.items():
         path = folder(workspace, work) / "logs" / stamp / name.replace("/", "_")
         write(path, text)
-        kept[workspace.relative(path)] = digest(text)
+        kept[workspace.relative(path)] = sha256(text)
     return kept

@@ -14,7 +14,7 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
     from avow.sanity.analysis import Bounds, outcomes
-    from avow.solving.limits import from_seconds, told
+    from avow.solving.limits import effort_told, from_seconds
     from avow.solving.questions import z3_version
 
     bounds = Bounds(seed=limits.seed)
@@ -24,5 +24,5 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
     own = {o.id: o.name for o in obligations if o.name not in linked}
     found = outcomes(cut.node, own, scenario=cut.given, ranges=cut.ranges, bounds=bounds)
     found += providers.outcomes(cut.node, {o.id: linked[o.name] for o in obligations if o.name in linked}, bounds)
-    found = tuple(replace(o, details={**o.details, **told(bounds.effort)}) for o in found)
+    found = tuple(replace(o, details={**o.details, **effort_told(bounds.effort)}) for o in found)
     return Report(found, "z3", z3_version())

@@ -98,7 +98,7 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
         parts.append(scenario.digest if tool.uses_scenario and tool.uses_steps else scenario.content)
     if connected(tool, job):
         parts.append(_wiring(job.system, job.node, told_too(tool, job)))
-    parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream(tool, job))]
+    parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream_of(tool, job))]
     if tool.uses_source and job.source is not None:
         declared = job.source
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
@@ -145,7 +145,7 @@ def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
     return found
 
 
-def upstream(tool: Backend, job: Job) -> frozenset[str]:
+def upstream_of(tool: Backend, job: Job) -> frozenset[str]:
     """The nodes whose contracts the method may look at, since their data reaches its node: none where that assumes
     nothing."""
     if not tool.uses_upstream or not job.node.assumptions:

@@ -9,7 +9,7 @@ from typing import Any
 
 from avow.backend_kit import one_step
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import digest, is_intact, write
+from avow.base.files import is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
@@ -39,7 +39,7 @@ def key(work: Work) -> str:
 
     assert work.shown is not None
     cut = encode(work.shown(), work.system.plan.root.absolute())
-    return digest(json.dumps([cut.decode("utf-8", "surrogatepass"), sorted(work.keys.items())]))
+    return sha256(json.dumps([cut.decode("utf-8", "surrogatepass"), sorted(work.keys.items())]))
 
 
 def generated(work: Work) -> Mapping[str, str]:
@@ -64,7 +64,7 @@ def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
             (place / name).unlink(missing_ok=True)
     for name, text in files.items():
         write(place / name, text)
-    digests = {name: digest(text) for name, text in sorted(files.items())}
+    digests = {name: sha256(text) for name, text in sorted(files.items())}
     write_note(place / STAMP, {"key": key, "files": digests})
     return tuple(sorted(files))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from avow.backend_kit.registry import backend, names
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.workspace import Workspace
 from avow.evidence.audit import Discrepancy, Fault, audit
 from avow.evidence.continuity import acknowledged, began, continuity
@@ -58,7 +58,7 @@ def _known_damage(ledger: Ledger, index: Index) -> frozenset[str]:
 
 
 def _state(damage: Sequence[Damage]) -> str:
-    return digest(json.dumps([[d.line, d.reason] for d in damage]))
+    return sha256(json.dumps([[d.line, d.reason] for d in damage]))
 
 
 def settle_losses(workspace: Workspace, system: str, who: str, why: str) -> tuple[Discrepancy, ...]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from avow.assurance.certification import KernelRun
 from avow.base.codec import Unreadable
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
@@ -81,7 +81,7 @@ def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -
     records = [e.evidence for e in entries if e.evidence.method == COMPOSE and e.evidence.verdict is Verdict.PROVED]
     records = [r for r in records if isinstance(r.details.get("certificate"), dict)]
     texts = {path: _kept_text(r, root) for r in records if (path := _kept(r)) is not None}
-    asked = digest(json.dumps([run.id, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
+    asked = sha256(json.dumps([run.id, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
     checked = _checked(system, run)
     if asked not in checked.runs:
         # Z3's answers first: what cvc5 is asked is only what holds already
@@ -137,7 +137,7 @@ def _established(record: Evidence, root: Path, system: System, run: Run) -> bool
 def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablished | None:
     """What the kernel establishes of a record with a certificate, if with the key that the record tells."""
     told, text, checked = record.details["certificate"], _kept_text(record, root), _checked(system, run)
-    question = (record.obligation, str(told.get("key")), digest(text))
+    question = (record.obligation, str(told.get("key")), sha256(text))
     if question not in checked.answers:
         certificates = checked.kernels.get(question[2])
         if certificates is None:

@@ -22,8 +22,8 @@ from avow.assurance.model import Case
 from avow.assurance.signed import KEYS
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest, digest_file
-from avow.calculus.certificate_json import from_json as certificate
+from avow.base.files import digest_file, sha256
+from avow.calculus import certificate_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
@@ -91,7 +91,7 @@ def _texts(case: Case) -> Iterable[str]:
     for source in case.sources:
         if source.path not in named:
             yield f"report.json: the text of {source.path} is shown, but no digest of it is named"
-        elif named[source.path] != digest(source.text.encode("utf-8", "surrogatepass")):
+        elif named[source.path] != sha256(source.text.encode("utf-8", "surrogatepass")):
             yield f"report.json: the text of {source.path} is not the one whose digest is named"
 
 
@@ -181,7 +181,7 @@ def _kernel(case: Case, root: Path) -> Iterable[str]:
         if composition.frame.system.name != case.system:
             yield f"report.json: it names the contract of another system than {case.system}"
             return
-        kept = {scope: certificate(data) for scope, data in case.kernel.certificates.items()}
+        kept = {scope: certificate_json.from_json(data) for scope, data in case.kernel.certificates.items()}
     except (OSError, Rejected, Unreadable) as error:
         yield f"what the kernel established cannot be established again: {error}"
         return

@@ -20,8 +20,7 @@ from avow.formulas.finite import Ranges
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable
-from avow.pipeline.evidence_keys import Named, method_options
-from avow.pipeline.evidence_keys import upstream as upstream_of
+from avow.pipeline.evidence_keys import Named, method_options, upstream_of
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import Connection, Located, NodePlan, Plan, Ros, System

@@ -18,14 +18,13 @@ from avow.backend_kit.linked import beside, models, unrun
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.files import digest, digest_file
+from avow.base.files import digest_file, sha256
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
-from avow.formulas.formula import digest as formula_digest
-from avow.formulas.formula import node_digest, sort_digest
+from avow.formulas.formula import digest, node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.definitions import show_clause
 from avow.pipeline.engine_code import backend_digest, engine_digest
@@ -277,8 +276,8 @@ _CLAIMED = {
 def program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
     """Something of the node's program: its meaning hangs on the node's ports and assumptions."""
     ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
-    assumed = sorted(formula_digest(clause.formula) for clause in node.assumptions)
-    meaning = digest(json.dumps([name, ports, assumed]))
+    assumed = sorted(digest(clause.formula) for clause in node.assumptions)
+    meaning = sha256(json.dumps([name, ports, assumed]))
     claim = f"The program of {node.name} {_CLAIMED[name]}"
     return Obligation(system.name, node.name, Kind.PROGRAM, name, claim, "", meaning, (), node.span)
 
@@ -360,7 +359,7 @@ def _work(
 
 
 def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[str, str]:
-    return {o.id: digest(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
+    return {o.id: sha256(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
 
 
 def _files(tool: Backend, job: Job) -> str:
@@ -370,7 +369,7 @@ def _files(tool: Backend, job: Job) -> str:
 def texts_digest(system: System) -> str:
     """Of the files that contract and plan were read from: comments count."""
     plan = system.plan
-    return digest(json.dumps(list(map(_digest, (plan.path, *plan.contract_files, *plan.included)))))
+    return sha256(json.dumps(list(map(_digest, (plan.path, *plan.contract_files, *plan.included)))))
 
 
 def _contract_digest(contract: Contract) -> str:
@@ -378,7 +377,7 @@ def _contract_digest(contract: Contract) -> str:
     for node in contract.nodes:
         parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
         parts += [[node.name, c.kind, c.name, node_digest(node, c)] for c in node.clauses]
-    return digest(json.dumps(sorted(parts)))  # the order of declarations means nothing
+    return sha256(json.dumps(sorted(parts)))  # the order of declarations means nothing
 
 
 def _digest(path: Path) -> str:

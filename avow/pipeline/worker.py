@@ -31,8 +31,7 @@ from avow.calculus.obligations import settle_all
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.pipeline import recheck
-from avow.pipeline.answers_file import FILE as ANSWERS
-from avow.pipeline.answers_file import read_answers, write_answers
+from avow.pipeline.answers_file import ANSWERS, read_answers, write_answers
 from avow.pipeline.asking import CHANGED
 from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.engines import discharge_sanity

@@ -11,7 +11,7 @@ from typing import Any
 
 from avow import __version__
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest, digest_file, write
+from avow.base.files import digest_file, sha256, write
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
@@ -54,7 +54,7 @@ def survey(folder: Path, offered: Offered = None) -> Survey | Rejected:
         return Rejected(*in_order((*rejected.diagnostics, *of_rest(folder))))
     files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
     texts = [__version__, *map(digest_file, files)]
-    return Survey(system, listed, digest(json.dumps(texts)))
+    return Survey(system, listed, sha256(json.dumps(texts)))
 
 
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from avow.assurance.answers import EARLIER
 from avow.assurance.model import Case
-from avow.base.files import digest, write
+from avow.base.files import sha256, write
 from avow.base.records import dataclass
 from avow.evidence.envelope import seal_lines
 
@@ -68,8 +68,8 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     told = (Row(remark=f"{EARLIER}: the system cannot be read as it stands now"),) if case.earlier else ()
     as_json = exchange.render_json(case)
     yield "report.json", as_json
-    yield "index.html", answers_page.render_answers(case, digest(as_json))
-    yield "claims.html", page.render_page(case, digest(as_json))
+    yield "index.html", answers_page.render_answers(case, sha256(as_json))
+    yield "claims.html", page.render_page(case, sha256(as_json))
     yield "report.md", markdown.render_markdown(case)
     yield "comment.md", short.comment(case)
     yield "report.sarif", exchange.render_sarif(case)

@@ -11,7 +11,7 @@ from pathlib import Path
 from jinja2 import __version__
 from jinja2.bccache import Bucket, BytecodeCache
 
-from avow.base.files import digest, write
+from avow.base.files import sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 
 
@@ -33,4 +33,4 @@ class Compiled(BytecodeCache):
 
 
 def _place(bucket: Bucket) -> Path:
-    return cache_folder() / "templates" / digest(f"{__version__} {bucket.key}")
+    return cache_folder() / "templates" / sha256(f"{__version__} {bucket.key}")

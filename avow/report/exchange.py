@@ -12,7 +12,7 @@ from avow.assurance.answers import EARLIER
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report.layout import json_text
@@ -169,7 +169,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "kind": kind,
         "level": level,
         "message": {"text": f"{short(o.id)} is {view.standing.word}. {o.claim.rstrip('.')}. {headline(view)}"},
-        "partialFingerprints": {"avowObligation/v1": digest(o.id)},
+        "partialFingerprints": {"avowObligation/v1": sha256(o.id)},
         "properties": {
             "obligation": o.id,
             "digest": o.digest,

@@ -9,7 +9,7 @@ from avow.assurance.argument import build_argument
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
 from avow.assurance.naming import short
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.report.exchange import render_json
@@ -65,7 +65,7 @@ def _of_digest(case: Case, name: str) -> Iterator[Told]:
     for part in case.trusted:
         if part.which.startswith(name):
             yield f"trusted: {part.what}", ["the digest of this part, on which proofs by certificate rest"]
-    if len(name) == 64 and digest(render_json(case)) == name:
+    if len(name) == 64 and sha256(render_json(case)) == name:
         yield "report.json", ["the digest of this report's data, from which every other format is rendered"]
     if case.ledger_head.startswith(name):
         yield "the head of the ledger", ["the digest of its last record, which is chained to all before it"]

@@ -26,7 +26,7 @@ from dataclasses import field
 from enum import StrEnum
 
 from avow.base.diagnostics import Severity, Span
-from avow.base.files import digest as text_digest
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
@@ -125,7 +125,7 @@ def node_key(node: Node) -> str:
     """SHA-256 of all that the answers depend on: clauses by name and meaning, ports by name and sort."""
     clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order means nothing
     ports = [[p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
-    return text_digest(json.dumps([clauses, ports]))
+    return sha256(json.dumps([clauses, ports]))
 
 
 def triggers(formula: Term) -> tuple[Term, ...]:

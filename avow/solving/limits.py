@@ -68,7 +68,7 @@ def steps(effort: float) -> int:
     return max(1, min(int(effort * STEPS), MOST_STEPS))
 
 
-def told(effort: float) -> dict[str, object]:
+def effort_told(effort: float) -> dict[str, object]:
     """For the details of evidence: the steps that a question was allowed, and whose they are."""
     return {"budget": {"steps": steps(effort), "of": "Z3's rlimit"}}
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from avow.base import process
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.tuning.sizes import ANSWERED_BY_ONE
 
 
@@ -51,7 +51,7 @@ class Answering:
                 if isinstance(error, TimeoutError):
                     raise
                 raise NoAnswer from error
-        if about != digest(line):
+        if about != sha256(line):
             self.close()
             raise NoAnswer
         return found
@@ -104,4 +104,4 @@ def serve(answer: Callable[[Any], Any]) -> None:
     """The far end, until there are no more questions."""
     process.die_with(int(sys.argv[1]))
     for line in sys.stdin:
-        print(json.dumps([answer(json.loads(line)), digest(line)]), flush=True)
+        print(json.dumps([answer(json.loads(line)), sha256(line)]), flush=True)

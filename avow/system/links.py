@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_sort, show_term
 from avow.system.folding import leaves
@@ -30,7 +30,7 @@ def with_links(plan: Plan, contract: Contract) -> Plan:
                     yield from _said(known[node])
 
     requirements = tuple(
-        replace(r, linked=digest(repr(sorted({text for name in r.supported_by for text in said(name)}))))
+        replace(r, linked=sha256(repr(sorted({text for name in r.supported_by for text in said(name)}))))
         for r in plan.requirements
     )
     return replace(plan, requirements=requirements)

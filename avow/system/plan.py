@@ -14,7 +14,7 @@ from typing import Any
 
 from avow.base import codec
 from avow.base.diagnostics import Span
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.language.contract import Contract
 from avow.ros.launch import Launched
@@ -249,7 +249,7 @@ class Requirement:
         """Of the sentence, without regard to white space, and of what is linked to it: names, and what they say."""
         names = sorted(self.supported_by)
         parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *names, self.linked)
-        return digest(repr(parts))[:16]
+        return sha256(repr(parts))[:16]
 
     @property
     def suspect(self) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import digest, read_regular
+from avow.base.files import read_regular, sha256
 from avow.base.verdict import unsaid
 from avow.ros.launch import Launched
 from avow.system.launched import read_launched
@@ -312,8 +312,8 @@ class _PlanReader:
             interpret,
             domains,
             deepest,
-            digest("\n".join([*parts, f"steps {deepest!r}"])),
-            digest("\n".join(parts)),
+            sha256("\n".join([*parts, f"steps {deepest!r}"])),
+            sha256("\n".join(parts)),
         )
 
     def table(self, name: str, piece: Piece) -> Table | None:

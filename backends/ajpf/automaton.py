@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import assert_never
 
 from avow.formulas import ltl
-from avow.formulas.ltl import Automaton as Automaton
-from avow.formulas.ltl import TooLarge as TooLarge
+from avow.formulas.ltl import Automaton
 
 from .psl import (
     Always,

@@ -8,15 +8,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from avow.base.graphs import strong_components
+from avow.formulas.lasso import Fair, Lasso
+from avow.formulas.ltl import Automaton
 
-from .automaton import Automaton, build, compiled
+from .automaton import build, compiled
 from .explore import Graph, System
 from .fixed_beliefs import standing
 from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, conjunction
-from .structure import Fair, Kripke, Lasso, find_lasso, reduce
+from .structure import Kripke, find_lasso, reduce
 from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
 from .tautology import Laws, is_valid
 

@@ -37,7 +37,7 @@ def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: 
     from .builtin import Crash
     from .environment import Environment, read_environment
     from .interpreter import Semantics
-    from .narrate import run as told
+    from .narrate import narrated
     from .parser import read_system
     from .society import system
 
@@ -47,7 +47,7 @@ def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: 
     )
     agents = system(programs, draws, Semantics(semantics))
     try:
-        for number, step in enumerate(told(agents, seed, steps), start=1):
+        for number, step in enumerate(narrated(agents, seed, steps), start=1):
             if as_json:
                 click.echo(json.dumps({"step": number, **asdict(step)}, ensure_ascii=False))
                 continue

@@ -13,14 +13,13 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth, subterms
 from avow.language.contract import Clause
-from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
-from avow.language.terms import Implies as RclImplies
+from avow.language.terms import TRUE, And, Implies, Quantified, Quantifier, Term, Variable
 
 from . import psl
 from .checker import Property
 from .mapping import Mapper, NotCovered, substituted
 from .options import Extra, Setup, is_index
-from .psl import Always, Eventually, Formula, Implies
+from .psl import Always, Eventually, Formula
 from .psl_parser import instantiate
 from .reading import Left, read_properties
 from .scenario import Decider, domain_of, range_of
@@ -209,7 +208,7 @@ def _implications(term: Term) -> Iterator[tuple[tuple[Variable, ...], Term, Term
         case And(items=items):
             for item in items:
                 yield from _implications(item)
-        case RclImplies(left=left, right=right):
+        case Implies(left=left, right=right):
             for variables, more, final in _implications(right):
                 yield variables, left if more == TRUE else And((left, more)), final
         case _:  # demanded without condition
@@ -229,7 +228,7 @@ def _extra(extra: Extra, keys: set[str]) -> tuple[Property, ...]:
 
 def _response(formula: Formula) -> tuple[Formula | None, Formula | None]:
     """Trigger (and goal) of ``[] (H -> …)``, where H has no temporal operator."""
-    if isinstance(formula, Always) and isinstance(formula.body, Implies) and not psl.is_temporal(formula.body.left):
+    if isinstance(formula, Always) and isinstance(formula.body, psl.Implies) and not psl.is_temporal(formula.body.left):
         right = formula.body.right
         goal = right.body if isinstance(right, Eventually) and not psl.is_temporal(right.body) else None
         return formula.body.left, goal

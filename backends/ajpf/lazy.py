@@ -7,7 +7,9 @@ import time
 from array import array
 from typing import Any
 
-from .automaton import Automaton, build, compiled
+from avow.formulas.ltl import Automaton
+
+from .automaton import build, compiled
 from .builtin import Crash
 from .checker import Property, label_states
 from .explore import Graph, System

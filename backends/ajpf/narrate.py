@@ -40,7 +40,7 @@ class Told:
             yield f"  there is to perceive: {', '.join(self.offered) or 'nothing'}"
 
 
-def run(system: System, seed: int, steps: int) -> Iterator[Told]:
+def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
     """At most so many steps of one run; where the environment has a choice, the seed decides. Raises Crash, TooDeep."""
     rng = Random(seed)
     state = system.start()[0]

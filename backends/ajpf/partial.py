@@ -20,6 +20,8 @@ from array import array
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
+from avow.formulas.lasso import Lasso
+
 from .beliefs import TooDeep
 from .builtin import Crash
 from .checker import Labels, Property, asked
@@ -28,7 +30,6 @@ from .interpreter import PRINT, Semantics
 from .mind import NONE
 from .psl import Atom, Modality
 from .society import Common, Society
-from .structure import Lasso
 from .syntax import Deed, DeedKind, Struct, is_ground
 from .tuning import TURN
 

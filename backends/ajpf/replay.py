@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.process import ToolMissing, run
+from avow.formulas.lasso import Lasso
 
 from . import kept
 from .ajpf_tool import BRIEF, Installation, prepare
@@ -22,7 +23,6 @@ from .interpreter import PRINT
 from .java import CLASS, MARK, SCRIPT, Script, environment_class
 from .options import Setup
 from .printer import program_text
-from .structure import Lasso
 from .syntax import DeedKind, plain
 from .tuning import REPLAY_SECONDS
 

@@ -13,11 +13,12 @@ from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
+from avow.formulas.lasso import Lasso
+from avow.formulas.ltl import TooLarge
 
 from . import ajpf_tool, spin, spin_tool
 from .ajpf_tool import Installation, Said
 from .asking import ask
-from .automaton import TooLarge
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
 from .explore import Graph, System, explore
@@ -28,7 +29,6 @@ from .partial import Reduction, reduction, unfolded
 from .replay import Unable, replay
 from .settle import Frame, Settled, outcome
 from .society import system
-from .structure import Lasso
 from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SPIN_SECONDS, SPIN_SHARE
 from .words import Wording, explain
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
+from avow.formulas.ltl import TooLarge
 
 from . import psl
-from .automaton import TooLarge
 from .checker import Property
 from .instances import Claim, Instantiation
 from .options import Extra, Setup

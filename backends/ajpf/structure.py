@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avow.base.graphs import strong_components
-from avow.formulas.lasso import Fair as Fair
-from avow.formulas.lasso import Lasso as Lasso
-from avow.formulas.lasso import accepted_run
+from avow.formulas.lasso import Fair, Lasso, accepted_run
+from avow.formulas.ltl import Automaton
 
-from .automaton import Automaton
 from .psl import Formula
 
 

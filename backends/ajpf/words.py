@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any, assert_never
 
 from avow.base.verdict import Counterexample
+from avow.formulas.lasso import Lasso
 
 from . import psl
 from .automaton import compiled
@@ -21,7 +22,6 @@ from .explore import Graph, System
 from .mapping import Row
 from .psl import Always, Atom, Eventually, Formula, Implies, Release, Until
 from .psl_parser import Malformed, index_names, instantiate
-from .structure import Lasso
 from .syntax import Struct, Term, show
 from .tuning import INDICES_TRIED
 

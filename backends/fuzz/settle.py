@@ -17,7 +17,7 @@ from avow.backend_kit.given import told
 from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import ToolMissing
 from avow.base.verdict import Object, Outcome, Verdict
@@ -167,7 +167,7 @@ class Work:
         chance = random.Random(self.limits.seed)
         seeds = [chance.randbytes(SEED_BYTES[k % len(SEED_BYTES)]) for k in range(SEEDS)]
         for seed in seeds:
-            (corpus / digest(seed.hex())[:40]).write_bytes(seed)
+            (corpus / sha256(seed.hex())[:40]).write_bytes(seed)
         return seeds
 
     def _campaign(self, kept: Path) -> dict[str, Any]:

@@ -16,10 +16,9 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
-from avow.formulas.values import show as show_value
+from avow.formulas.values import show
 from avow.language.terms import FALSE, TRUE, Not, Role, Term, Variable
-from avow.solving.limits import from_seconds, spent, until
-from avow.solving.limits import told as told_effort
+from avow.solving.limits import effort_told, from_seconds, spent, until
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
@@ -29,7 +28,7 @@ from avow.solving.translation import Unsupported
 from .endless import endless_run
 from .memory import knowing, remembered
 from .numbers import other_numbers
-from .outline import outline, show
+from .outline import one_line, outline
 from .program import While, has_loops, statements
 from .triples import Triple
 from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
@@ -106,7 +105,7 @@ def _stem(triple: Triple) -> str:
 
 def _triple_text(triple: Triple, work: Work) -> str:
     body = work.text.rstrip("\n")
-    return f"{{{show(triple.full_pre)}}}\n{body}\n{{{show(triple.post)}}}\n"
+    return f"{{{one_line(triple.full_pre)}}}\n{body}\n{{{one_line(triple.post)}}}\n"
 
 
 def _script(triple: Triple, condition: Condition) -> str:
@@ -149,7 +148,7 @@ def settle(job: Job, limits: Limits) -> Report:
         else:
             worse = set(GIVEN) if running.verdict is not Verdict.PROVED else set()
         outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else _total(o) for o in outcomes)
-    allowed = told_effort(from_seconds(limits.seconds))
+    allowed = effort_told(from_seconds(limits.seconds))
     outcomes = tuple(replace(o, details={**o.details, **allowed}) for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
@@ -161,7 +160,7 @@ def _remembered(
     deadline = until(from_seconds(limits.seconds))
     clauses = [work.job.clause(o) for o in work.job.obligations]
     seen, found = remembered(steps, work.checked, clauses, lambda c: _holds(c, work.settler, deadline))
-    told = [show(each.formula) for each in found.invariants]
+    told = [one_line(each.formula) for each in found.invariants]
     logs["invariants.log"] = "\n".join((*(f"holds: {text}" for text in told), *found.lacking)) + "\n"
     known = replace(work, job=knowing(work.job, steps, found.invariants), lacking=found.lacking)
     link = Link.MAPPED if work.checked.reading.mapped else Link.GENERATED
@@ -203,8 +202,8 @@ def _obligation(
         "triples": [
             {
                 "name": s.triple.name,
-                "pre": show(s.triple.full_pre),
-                "post": show(s.triple.post),
+                "pre": one_line(s.triple.full_pre),
+                "post": one_line(s.triple.post),
                 "verdict": str(s.verdict),
                 "vacuous": s.vacuous,
             }
@@ -392,7 +391,7 @@ def _vacuous(triple: Triple, work: Work, deadline: float) -> tuple[str, Term]:
     if settler.settles([triple.pre], triple.post, effort=min(2000, _left(deadline))) == "sat":
         return "", FALSE  # and then some input meets the precondition too
     if settler.proves([triple.pre], FALSE, effort=min(2000, _left(deadline))):
-        return f"no input meets the precondition {show(triple.pre)}", triple.pre
+        return f"no input meets the precondition {one_line(triple.pre)}", triple.pre
     denied = conjunction((triple.pre, negation(triple.post)))
     if alone is not None and not settler.proves([alone.pre], alone.post, effort=min(2000, _left(deadline))):
         return "", FALSE
@@ -430,7 +429,7 @@ def _counterexample(settled: Settled, work: Work) -> Counterexample:
             if term is None or state is None:
                 continue
             try:
-                values.append((f"{role}.{port.name}", show_value(evaluate(term, state))))
+                values.append((f"{role}.{port.name}", show(evaluate(term, state))))
             except NotEvaluable:
                 continue
             if isinstance(term, Variable):
@@ -438,5 +437,5 @@ def _counterexample(settled: Settled, work: Work) -> Counterexample:
     spoken = free_variables(conjunction((settled.triple.pre, settled.triple.post)))
     for variable in sorted(spoken - told - frozenset(work.checked.program.assigned), key=lambda v: v.name):
         if variable.name in shown.start and variable not in work.checked.program.ghosts.values():
-            values.append((variable.name, show_value(shown.start[variable.name])))
+            values.append((variable.name, show(shown.start[variable.name])))
     return Counterexample(tuple(values), settled.breach.why)

@@ -9,8 +9,7 @@ from typing import TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Contract, Node, Port
-from avow.language.printer import show_sort as show
-from avow.language.printer import show_term
+from avow.language.printer import show_sort, show_term
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -50,9 +49,9 @@ from .syntax import (
     Name,
     SkipStatement,
     Source,
+    StatementSyntax,
     WhileStatement,
 )
-from .syntax import Statement as SurfaceStatement
 from .typing import Scope, fit, formula, rejected, suggest, term
 
 T = TypeVar("T")
@@ -202,7 +201,9 @@ class _Checker:
             names = [a.name for a in pattern.arguments if isinstance(a, Name)]
             sort = port.sort
             if not isinstance(sort, FunctionSort) or sort.result != BOOL:
-                raise rejected("HOARE400", f"`{key}`: {port.role}.{port.name} is {show(port.sort)}, no relation", span)
+                raise rejected(
+                    "HOARE400", f"`{key}`: {port.role}.{port.name} is {show_sort(port.sort)}, no relation", span
+                )
             if len(names) != len(sort.parameters) or len(set(names)) != len(names):
                 message = f"`{key}` needs {len(sort.parameters)} different names for its arguments"
                 raise rejected("HOARE400", message, span)
@@ -317,7 +318,7 @@ class _Checker:
             sort = self.node.input(name).sort
             if _covers(found, sort, used):
                 continue
-            kind = "" if found.sort == sort else f", {show(found.sort)}"
+            kind = "" if found.sort == sort else f", {show_sort(found.sort)}"
             said.append(f"in.{name} is {show_term(found, 'unicode')}{kind}: the plan covers no other value of it")
         said += [
             f"in.{name}(…) is {show_term(p.meaning, 'unicode')}: the plan covers no other relation"
@@ -328,11 +329,11 @@ class _Checker:
 
     # -- statements ----------------------------------------------------------------------------------------------------
 
-    def _block(self, body: tuple[SurfaceStatement, ...], scope: Scope) -> Block:
+    def _block(self, body: tuple[StatementSyntax, ...], scope: Scope) -> Block:
         made = (self._attempt(lambda s=s: self._statement(s, scope)) for s in body)  # type: ignore[misc]
         return tuple(statement for statement in made if statement is not None)
 
-    def _statement(self, statement: SurfaceStatement, scope: Scope) -> Statement:
+    def _statement(self, statement: StatementSyntax, scope: Scope) -> Statement:
         match statement:
             case SkipStatement(span=span):
                 return Skip(span)
@@ -355,7 +356,7 @@ class _Checker:
     def _measure(self, variant: Expression, scope: Scope) -> Term:
         measure = term(variant, scope)
         if measure.sort not in (INTEGER, NATURAL):
-            raise rejected("HOARE300", f"a variant is an integer; this is {show(measure.sort)}", variant.span)
+            raise rejected("HOARE300", f"a variant is an integer; this is {show_sort(measure.sort)}", variant.span)
         return measure
 
     def _assign(self, statement: AssignStatement, scope: Scope) -> Statement:
@@ -372,7 +373,7 @@ class _Checker:
                     suggest(name.name, known) or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
                 )
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
-            raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show(value.sort)}?)", name.span)
+            raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show_sort(value.sort)}?)", name.span)
         if UNKNOWN in components(sort):
             wanted = f"declare it: VAR {name.name} : T; with a type T of the contract"
             raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, wanted)
@@ -384,7 +385,7 @@ class _Checker:
             return Assign(target, value, statement.span)
         if not isinstance(sort, FunctionSort):
             whole = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, SequenceSort) else None
-            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span, whole)
+            raise rejected("HOARE300", f"`{name.name}` is {show_sort(sort)}, no map", name.span, whole)
         if len(statement.arguments) != len(sort.parameters):
             message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
             raise rejected("HOARE300", message, statement.span)
@@ -401,7 +402,7 @@ class _Checker:
         name = statement.constructor
         if name.name not in words.constructors or words.constructors[name.name][0] != subject.sort:
             known = [c for c, (data, _) in words.constructors.items() if data == subject.sort]
-            message = f"`{name.name}` does not make values of {show(subject.sort)}"
+            message = f"`{name.name}` does not make values of {show_sort(subject.sort)}"
             if isinstance(subject.sort, EnumSort) or (isinstance(subject.sort, DataSort) and not known):
                 hint = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
                 raise rejected("HOARE300", message, name.span, hint)

@@ -43,7 +43,7 @@ from .syntax import (
     Quantification,
     Sequence,
     SkipStatement,
-    Statement,
+    StatementSyntax,
     Text,
     Truth,
     Tuple,
@@ -182,7 +182,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
             pass
 
 
-def spread(body: tuple[Statement, ...], names: Names) -> None:
+def spread(body: tuple[StatementSyntax, ...], names: Names) -> None:
     """Sorts of assigned variables, from what is assigned to them, until nothing more is learnt."""
     fixed = frozenset(names.sorts) - names.inferred
     learnt = True
@@ -199,9 +199,11 @@ def spread(body: tuple[Statement, ...], names: Names) -> None:
                 learnt = True
 
 
-def assignments(body: tuple[Statement, ...], names: Names) -> Iterator[tuple[AssignStatement, Mapping[str, Sort]]]:
+def assignments(
+    body: tuple[StatementSyntax, ...], names: Names
+) -> Iterator[tuple[AssignStatement, Mapping[str, Sort]]]:
     """Every assignment, with the sorts of the MATCH variables around it."""
-    stack: list[tuple[Statement, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
+    stack: list[tuple[StatementSyntax, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
     while stack:
         statement, local = stack.pop()
         match statement:

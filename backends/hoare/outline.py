@@ -22,14 +22,14 @@ class _Writer:
     lines: list[str] = field(default_factory=list)
 
     def assertion(self, depth: int, term: Term, rule: str = "") -> None:
-        text = f"{STEP * depth}{{{show(term)}}}"
+        text = f"{STEP * depth}{{{one_line(term)}}}"
         self.lines.append(f"{text} - {rule}" if rule else text)
 
     def code(self, depth: int, text: str) -> None:
         self.lines.append(f"{STEP * depth}{text}")
 
 
-def show(term: Term) -> str:
+def one_line(term: Term) -> str:
     """A term on one line, in mathematical notation."""
     return show_term(term, "unicode").replace("\n", " ")
 
@@ -65,14 +65,14 @@ def _statement(writer: _Writer, depth: int, statement: Statement, post: Term) ->
             writer.code(depth, "SKIP")
             writer.assertion(depth, post, "skip axiom")
         case Assign(target=target, value=value):
-            writer.code(depth, f"{target.name} := {show(value)}")
+            writer.code(depth, f"{target.name} := {one_line(value)}")
             writer.assertion(depth, post, "assignment axiom")
         case Update(target=target, arguments=arguments, value=value):
-            writer.code(depth, f"{target.name}[{', '.join(map(show, arguments))}] := {show(value)}")
+            writer.code(depth, f"{target.name}[{', '.join(map(one_line, arguments))}] := {one_line(value)}")
             writer.assertion(depth, post, "assignment axiom")
         case If(condition=condition, then=then, otherwise=otherwise):
             before = _weakest((statement,), post, writer)
-            writer.code(depth, f"IF ({show(condition)}) THEN")
+            writer.code(depth, f"IF ({one_line(condition)}) THEN")
             _branch(writer, depth, (before, condition), then, post)
             if otherwise:
                 writer.code(depth, "ELSE")
@@ -81,14 +81,14 @@ def _statement(writer: _Writer, depth: int, statement: Statement, post: Term) ->
         case Match(subject=subject, constructor=constructor, variables=variables):
             before = _weakest((statement,), post, writer)
             pattern = f"{constructor}({', '.join(v.name for v in variables)})" if variables else constructor
-            writer.code(depth, f"MATCH {show(subject)} WITH {pattern} THEN")
+            writer.code(depth, f"MATCH {one_line(subject)} WITH {pattern} THEN")
             _branch(writer, depth, (before, fits(statement, variables)), statement.then, post)
             if statement.otherwise:
                 writer.code(depth, "ELSE")
             _branch(writer, depth, (before, simplify(misfits(statement))), statement.otherwise, post)
             writer.assertion(depth, post, "conditional rule")
         case While(condition=condition, invariant=invariant, body=body):
-            writer.code(depth, f"WHILE ({show(condition)}) DO")
+            writer.code(depth, f"WHILE ({one_line(condition)}) DO")
             _branch(writer, depth, (invariant, condition), body, invariant)
             writer.assertion(depth, conjunction((invariant, simplify(negation(condition)))), "while rule")
             writer.assertion(depth, post, "weakening")

@@ -15,8 +15,7 @@ from avow.backend_kit.stepping import Stepping
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term, evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Value
-from avow.formulas.values import show as show_value
+from avow.formulas.values import Value, show
 from avow.language.contract import Clause, Node
 from avow.language.terms import Role, Term, Variable
 from avow.solving.models import default_value
@@ -41,7 +40,7 @@ class Run:
     def shown(self, node: Node) -> list[tuple[tuple[str, str], ...]]:
         """The steps in the contract's words."""
         ports = [p.variable.qualified for p in (*node.inputs, *node.outputs)]
-        return [tuple((name, show_value(step[name])) for name in ports if name in step) for step in self.steps]
+        return [tuple((name, show(step[name])) for name in ports if name in step) for step in self.steps]
 
 
 @dataclass(slots=True)

@@ -170,8 +170,8 @@ class AssignStatement:
 @dataclass(frozen=True, slots=True)
 class IfStatement:
     condition: Expression
-    then: tuple[Statement, ...]
-    otherwise: tuple[Statement, ...]
+    then: tuple[StatementSyntax, ...]
+    otherwise: tuple[StatementSyntax, ...]
     span: Span = field(compare=False, repr=False)
 
 
@@ -182,8 +182,8 @@ class MatchStatement:
     subject: Expression
     constructor: Name
     variables: tuple[Name, ...]
-    then: tuple[Statement, ...]
-    otherwise: tuple[Statement, ...]
+    then: tuple[StatementSyntax, ...]
+    otherwise: tuple[StatementSyntax, ...]
     span: Span = field(compare=False, repr=False)
 
 
@@ -192,11 +192,11 @@ class WhileStatement:
     condition: Expression
     invariant: Expression
     variant: Expression | None
-    body: tuple[Statement, ...]
+    body: tuple[StatementSyntax, ...]
     span: Span = field(compare=False, repr=False)
 
 
-Statement = SkipStatement | AssignStatement | IfStatement | MatchStatement | WhileStatement
+StatementSyntax = SkipStatement | AssignStatement | IfStatement | MatchStatement | WhileStatement
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,5 +205,5 @@ class Source:
 
     declarations: tuple[Declaration, ...]
     memory: tuple[Memory, ...]
-    body: tuple[Statement, ...]
+    body: tuple[StatementSyntax, ...]
     span: Span = field(compare=False, repr=False)

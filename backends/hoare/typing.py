@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.operators import OPERATORS, Why
-from avow.language.printer import show_sort as show
+from avow.language.printer import show_sort
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -137,7 +137,7 @@ def fit(given: Term, sort: Sort, span: Span | None) -> Term:
             return TupleTerm(tuple(fit(i, s, i.span or span) for i, s in zip(items, sorts, strict=True)), sort, span)
         case SequenceTerm(items=items), SequenceSort(item=item):
             return SequenceTerm(tuple(fit(i, item, i.span or span) for i in items), sort, span)
-    raise rejected("HOARE300", f"this is {show(given.sort)}, but {show(sort)} is wanted here", span)
+    raise rejected("HOARE300", f"this is {show_sort(given.sort)}, but {show_sort(sort)} is wanted here", span)
 
 
 def real(given: Term) -> Term:
@@ -155,7 +155,7 @@ def compare(operator: str, left: Term, right: Term, span: Span | None) -> Term:
         raise rejected("HOARE300", "nothing says of what these sequences are", span)
     left, right = fit(left, sort, left.span or span), fit(right, sort, right.span or span)
     if operator in {"<", "<=", ">", ">="} and sort not in _NUMERIC:
-        raise rejected("HOARE300", f"{operator} compares numbers; these are {show(sort)}", span)
+        raise rejected("HOARE300", f"{operator} compares numbers; these are {show_sort(sort)}", span)
     if isinstance(sort, FunctionSort):
         raise rejected("HOARE300", "whole functions cannot be compared", span)
     if sort == BOOL:
@@ -173,7 +173,7 @@ def _sequence(items: tuple[Term, ...], span: Span | None) -> Term:
 def _inside(item: Term, collection: Term, span: Span | None) -> Term:
     """In a sequence, or in a set that the contract names."""
     if not isinstance(collection.sort, SequenceSort | SetSort):
-        raise rejected("HOARE300", f"`in` wants a set or a sequence; this is {show(collection.sort)}", span)
+        raise rejected("HOARE300", f"`in` wants a set or a sequence; this is {show_sort(collection.sort)}", span)
     wanted = collection.sort.item
     if isinstance(collection, SequenceTerm):
         wanted = join(item.sort, wanted) or wanted
@@ -241,7 +241,7 @@ def _call(call: Call, scope: Scope) -> Term:
     if isinstance(function.sort, SequenceSort):
         return Index(function, _fitted(call, arguments, (NATURAL,))[0], function.sort.item, call.span)
     if not isinstance(function.sort, FunctionSort):
-        raise rejected("HOARE300", f"`{name}` is {show(function.sort)}, not a function", call.span)
+        raise rejected("HOARE300", f"`{name}` is {show_sort(function.sort)}, not a function", call.span)
     if not isinstance(function, Variable):
         raise rejected("HOARE300", f"`{name}` cannot be applied here: it is not one function of the program", call.span)
     return Apply(function, _fitted(call, arguments, function.sort.parameters), function.sort.result, call.span)
@@ -288,7 +288,7 @@ def _binary(operator: str, left: Expression, right: Expression, span: Span, scop
 
 def _number(given: Term, span: Span | None) -> Term:
     if given.sort not in _NUMERIC:
-        raise rejected("HOARE300", f"a number is wanted here; this is {show(given.sort)}", span)
+        raise rejected("HOARE300", f"a number is wanted here; this is {show_sort(given.sort)}", span)
     return given
 
 

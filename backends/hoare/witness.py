@@ -12,8 +12,7 @@ from fractions import Fraction
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.traversal import subterms
-from avow.formulas.values import Value
-from avow.formulas.values import show as show_value
+from avow.formulas.values import Value, show
 from avow.language.sorts import REAL, Sort
 from avow.language.terms import (
     Apply,
@@ -31,7 +30,7 @@ from avow.solving.questions import replay, solve
 
 from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State
-from .outline import show
+from .outline import one_line
 from .program import Assign, Program, Update, has_loops, statements
 from .triples import Triple
 from .tuning import ENDLESS_RUNS
@@ -84,10 +83,9 @@ def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[V
         return None
     last = {s.target for s in statements(program.body) if isinstance(s, Assign | Update)}
     outcome = ", ".join(
-        f"{v.name} = {show_value(end[v.name])}"
-        for v in sorted(last & free_variables(triple.post), key=lambda v: v.name)
+        f"{v.name} = {show(end[v.name])}" for v in sorted(last & free_variables(triple.post), key=lambda v: v.name)
     )
-    return Breach(start, end, f"{show(triple.post)} is demanded; the program ends with {outcome or 'it false'}")
+    return Breach(start, end, f"{one_line(triple.post)} is demanded; the program ends with {outcome or 'it false'}")
 
 
 def first_state(triple: Triple, program: Program, values: Mapping[Variable, Value]) -> State | None:

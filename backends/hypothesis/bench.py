@@ -29,7 +29,7 @@ from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.observed import to_json
-from avow.isolation.subject import Subject, SubjectFailed
+from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
 from avow.language.terms import Term
 from avow.tuning.running import SUBJECT_PATIENCE
@@ -81,7 +81,9 @@ class Bench:
         self.generator = Generator(
             self.inputs_sorts, pools(formulas, table_rows(data["scenario"], self.inputs_sorts), written)
         )
-        self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], SUBJECT_PATIENCE, root)
+        self.subject = SubjectProcess(
+            root / data["subject"]["file"], data["subject"]["function"], SUBJECT_PATIENCE, root
+        )
         self._aims = tuple(self._aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = kept_inputs(folder / KEPT, self.inputs_sorts)
         self.replayed = 0
@@ -262,7 +264,7 @@ class Bench:
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process, asked the same from its start, gives another answer: what comes of
         clock, chance or place in memory is no function of what was recorded. The first cases only."""
-        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         try:
             for at in range(0, len(self._said), BATCH):
                 if self.end is not None and time.monotonic() > self.end:
@@ -278,13 +280,13 @@ class Bench:
             self._end(twin)
         return None
 
-    def _end(self, twin: Subject) -> None:
+    def _end(self, twin: SubjectProcess) -> None:
         twin.close()
         self.silent = self.silent or twin.silent
 
     def _asked_apart(self) -> list[Apart]:
         """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
-        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         found: dict[str, Apart] = {}
         try:
             for inputs, _ in self._said[:: max(1, len(self._said) // APART)][:APART]:
@@ -298,7 +300,7 @@ class Bench:
             self._end(twin)
         return [one for why, one in found.items() if why]
 
-    def _wrong_apart(self, twin: Subject, asked: Inputs, name: str, text: str) -> str:
+    def _wrong_apart(self, twin: SubjectProcess, asked: Inputs, name: str, text: str) -> str:
         """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
         try:
             values = self._values(asked, self._outputs(twin.ask({**self._sent(asked), name: {"r": text}})))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from avow.formulas.values import Value
-from avow.isolation.subject import Subject
+from avow.isolation.subject import SubjectProcess
 from avow.language.sorts import Sort
 
 from .convention import received, sent
@@ -17,11 +17,11 @@ class FunctionBench(SequenceBench):
     """As `SequenceBench`, of a plain function. What it keeps all the same from one run to another shows where another
     process is asked again."""
 
-    def begin(self, subject: Subject) -> dict[str, Value]:
+    def begin(self, subject: SubjectProcess) -> dict[str, Value]:
         self.keeper.restart()
         return {}
 
-    def advance(self, subject: Subject, inputs: Inputs) -> dict[str, Value]:
+    def advance(self, subject: SubjectProcess, inputs: Inputs) -> dict[str, Value]:
         return self._outputs(subject.ask(self._sent(inputs)))
 
     def coded(self, value: Value) -> Any:

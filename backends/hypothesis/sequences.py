@@ -18,7 +18,7 @@ from typing import Any
 
 from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import Data, Element, SequenceValue, Value
-from avow.isolation.subject import Subject, SubjectFailed
+from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
 from . import wire
@@ -67,13 +67,13 @@ class SequenceBench(Bench):
 
     # -- the class ---------------------------------------------------------------------------------------
 
-    def begin(self, subject: Subject) -> dict[str, Value]:
+    def begin(self, subject: SubjectProcess) -> dict[str, Value]:
         """A new run of a new object; its memory."""
         self.keeper.restart()
         reply = self._asked(subject, {"steps": []})
         return self._held(reply["held"])
 
-    def advance(self, subject: Subject, inputs: Inputs) -> dict[str, Value]:
+    def advance(self, subject: SubjectProcess, inputs: Inputs) -> dict[str, Value]:
         """One step; the outputs, with memory among them. Raises SubjectFailed."""
         given = {name: self.coded(value) for name, value in inputs.items() if name not in self.memory}
         (answer,) = self._asked(subject, {"on": True, "steps": [given]})["steps"]
@@ -89,7 +89,7 @@ class SequenceBench(Bench):
     def memory_of(self, inputs: Inputs) -> dict[str, Value]:
         return {name: value for name, value in inputs.items() if name in self.memory}
 
-    def _asked(self, subject: Subject, case: Mapping[str, Any]) -> Any:
+    def _asked(self, subject: SubjectProcess, case: Mapping[str, Any]) -> Any:
         reply = subject.ask({"case": json.dumps(case)})
         if not isinstance(reply, str):
             raise SubjectFailed("the class cannot be driven")
@@ -194,7 +194,7 @@ class SequenceBench(Bench):
         unheld = [n for n in self.memory if n not in found]
         return {n: found[n] for n in self.memory if n in found} | self._looked(unheld, self.subject)
 
-    def _looked(self, names: list[str], subject: Subject) -> dict[str, Value]:
+    def _looked(self, names: list[str], subject: SubjectProcess) -> dict[str, Value]:
         if not names:
             return {}
         held = self._held(self._asked(subject, {"on": True, "steps": []})["held"])
@@ -298,7 +298,7 @@ class SequenceBench(Bench):
 
     def _afresh(self, trace: Trace, name: str) -> Trace | None:
         """The run in a process that had no other before, if it breaks the guarantee there as well."""
-        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         try:
             return self._again([inputs for inputs, _ in trace], name, twin)
         finally:
@@ -333,7 +333,7 @@ class SequenceBench(Bench):
                         break
         return best
 
-    def _again(self, steps: list[Inputs], name: str, subject: Subject | None = None) -> Trace | None:
+    def _again(self, steps: list[Inputs], name: str, subject: SubjectProcess | None = None) -> Trace | None:
         """The run of these steps up to one that breaks the guarantee, if one does and all before it are allowed."""
         trace: Trace = []
         subject = subject or self.subject
@@ -359,7 +359,7 @@ class SequenceBench(Bench):
 
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process answers otherwise."""
-        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         try:
             for run in self._first:
                 self.begin(self.subject)
@@ -373,7 +373,7 @@ class SequenceBench(Bench):
             self._end(twin)
         return None
 
-    def _said_by(self, subject: Subject, inputs: Inputs) -> Any:
+    def _said_by(self, subject: SubjectProcess, inputs: Inputs) -> Any:
         try:
             return self.advance(subject, inputs)
         except SubjectFailed as error:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .program import (
     Binary,
     Choice,
-    Compare,
+    Comparison,
     Const,
     Convert,
     Expr,
@@ -259,7 +259,7 @@ class Expressions:
         alike = one.kind is other.kind and operator in ("==", "!=")
         if not numbers and not alike:
             raise Refusal(line, f"{_a(one)} {operator} {_a(other)} is not in the subset")
-        return Compare(operator, one, other)
+        return Comparison(operator, one, other)
 
     def alike(self, items: Sequence[Expr], line: int, what: str) -> list[Expr]:
         if len({item.kind for item in items}) > 1:

@@ -11,7 +11,7 @@ from .program import (
     Assign,
     Binary,
     Choice,
-    Compare,
+    Comparison,
     Const,
     Convert,
     Expr,
@@ -138,7 +138,7 @@ def _value(expression: Expr, values: MutableMapping[str, Any]) -> Any:
                     return one % other
                 case _:  # a quotient
                     return Fraction(one) / other if _EXACT in values else one / other
-        case Compare(operator=operator, left=left, right=right):
+        case Comparison(operator=operator, left=left, right=right):
             return _compared(operator, _value(left, values), _value(right, values))
         case Junction(operator="and", items=items):
             return all(_value(item, values) for item in items)

@@ -68,7 +68,7 @@ class Binary:
 
 
 @dataclass(frozen=True, slots=True)
-class Compare:
+class Comparison:
     operator: str
     left: Expr
     right: Expr
@@ -136,7 +136,7 @@ class Inlined:
     kind: Kind
 
 
-Expr = Const | Name | Convert | Unary | Binary | Compare | Junction | Choice | Extreme | Length | Item | Inlined
+Expr = Const | Name | Convert | Unary | Binary | Comparison | Junction | Choice | Extreme | Length | Item | Inlined
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +234,7 @@ def parts(expression: Expr) -> Iterator[Expr]:
         match current:
             case Convert(body=body) | Unary(body=body):
                 stack.append(body)
-            case Binary(left=left, right=right) | Compare(left=left, right=right):
+            case Binary(left=left, right=right) | Comparison(left=left, right=right):
                 stack += [left, right]
             case Junction(items=items) | Extreme(items=items):
                 stack += items

@@ -18,6 +18,7 @@ from avow.language.terms import (
     TRUE,
     Apply,
     Arithmetic,
+    Compare,
     Conditional,
     EnumValue,
     Iff,
@@ -30,13 +31,12 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.language.terms import Compare as Comparison
 
 from .program import (
     Assign,
     Binary,
     Choice,
-    Compare,
+    Comparison,
     Const,
     Convert,
     Expr,
@@ -255,7 +255,7 @@ class Run:
             head[name] = self.fresh(name, widest(head[name].sort))
         done = self.fresh("done", INTEGER)
         at = Turn(head, done, entry, loop, carried)
-        assumed: list[Term] = [Comparison("<=", ZERO, done), Comparison("<=", done, count)]
+        assumed: list[Term] = [Compare("<=", ZERO, done), Compare("<=", done, count)]
         before = len(self.facts)
         for name in carried:
             if head[name].sort == REAL:
@@ -264,9 +264,9 @@ class Run:
         doubles, self.facts[before:] = self.facts[before:], []
         self.facts += [Implies(state.path, fact) for fact in (*assumed, *doubles)]
         # where no turn is left to be done
-        over = self.split(State(state.path, head), Comparison("==", done, count))
+        over = self.split(State(state.path, head), Compare("==", done, count))
         over.values = {name: over.values[name] for name in state.values}
-        turn = self.split(State(state.path, head), Comparison("<", done, count))
+        turn = self.split(State(state.path, head), Compare("<", done, count))
         turn.values[loop.counter] = done
         self._left.append([])
         end = self.block(loop.body, turn, top)
@@ -331,12 +331,12 @@ class Run:
                 return Negative(term, INTEGER if term.sort == NATURAL else term.sort)
             case Unary(operator="abs", body=body):
                 term = self.named("value", self.value(body, state))
-                return Conditional(Comparison("<", term, zero(term)), Negative(term, term.sort), term, term.sort)
+                return Conditional(Compare("<", term, zero(term)), Negative(term, term.sort), term, term.sort)
             case Unary(body=body):
                 return negation(self.value(body, state))
             case Binary():
                 return self.arithmetic(expression, state)
-            case Compare(operator=operator, left=left, right=right):
+            case Comparison(operator=operator, left=left, right=right):
                 one, other = self.value(left, state), self.value(right, state)
                 return self.compared(operator, one, other)
             case Junction(operator=operator, items=items):
@@ -350,22 +350,22 @@ class Run:
                 found = [self.named("value", self.value(item, state)) for item in items]
                 best = found[0]
                 for item in found[1:]:
-                    nearer = Comparison("<" if operator == "min" else ">", item, best)
+                    nearer = Compare("<" if operator == "min" else ">", item, best)
                     best = self.named(operator, Conditional(nearer, item, best, wider(item.sort, best.sort)))
                 return best
             case Length(view=view):
                 whole = state.values[f"in.{view.sequence}#"]
                 if view.stop is not None:
                     stop = Literal(view.stop, INTEGER)
-                    whole = Conditional(Comparison("<", whole, stop), whole, stop, INTEGER)
+                    whole = Conditional(Compare("<", whole, stop), whole, stop, INTEGER)
                 if not view.start:
                     return whole
                 rest = self.named("rest", Arithmetic("-", whole, Literal(view.start, INTEGER), INTEGER))
-                return Conditional(Comparison("<", rest, ZERO), ZERO, rest, INTEGER)
+                return Conditional(Compare("<", rest, ZERO), ZERO, rest, INTEGER)
             case Item(view=view, index=index, line=line):
                 at = self.named("index", self.value(index, state))
                 size = self.value(Length(view), state)
-                inside = conjunction((Comparison("<=", ZERO, at), Comparison("<", at, size)))
+                inside = conjunction((Compare("<=", ZERO, at), Compare("<", at, size)))
                 self.check(state, inside, "the index lies in the sequence", line)
                 place = Arithmetic("+", Literal(view.start, INTEGER), at, INTEGER) if view.start else at
                 elements = state.values[f"in.{view.sequence}"]
@@ -375,7 +375,7 @@ class Run:
                 if item.sort == REAL:
                     self.double(item)
                 if elements.sort.result == NATURAL:
-                    self.facts.append(Comparison(">=", item, ZERO))
+                    self.facts.append(Compare(">=", item, ZERO))
                 self.facts[before:] = [Implies(inside, fact) for fact in self.facts[before:]]
                 return item
             case Inlined(body=body):
@@ -418,7 +418,7 @@ class Run:
             return alike if operator == "==" else Not(alike)
         if one.sort != other.sort and REAL in (one.sort, other.sort):
             one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
-        return Comparison(operator, one, other)
+        return Compare(operator, one, other)
 
     def arithmetic(self, expression: Binary, state: State) -> Term:
         one = self.named("left", self.value(expression.left, state))
@@ -427,7 +427,7 @@ class Run:
         if operator in ("//", "%"):
             return self.floored(operator, one, other, state, line)
         if operator == "/":
-            self.check(state, Comparison("!=", other, zero(other)), "the divisor is not zero", line)
+            self.check(state, Compare("!=", other, zero(other)), "the divisor is not zero", line)
             doubles = (one, other) if one.sort == REAL else ()
             one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
             if isinstance(other, Literal) and other.value:
@@ -436,7 +436,7 @@ class Run:
             else:
                 quotient = self.fresh("quotient", REAL)
                 product = Arithmetic("*", quotient, other, REAL)
-                self.facts.append(Implies(Comparison("!=", other, zero(other)), Comparison("==", product, one)))
+                self.facts.append(Implies(Compare("!=", other, zero(other)), Compare("==", product, one)))
             return self.rounded(quotient, doubles, True, state, line)
         whole = one.sort != REAL
         exact = Arithmetic(operator, one, other, INTEGER if whole else REAL)
@@ -445,15 +445,15 @@ class Run:
     def floored(self, operator: str, one: Term, other: Term, state: State, line: int) -> Term:
         """``//`` and ``%`` of ints: the quotient is rounded down, the remainder has the divisor's sign
         (https://docs.python.org/3/reference/expressions.html#binary-arithmetic-operations)."""
-        self.check(state, Comparison("!=", other, ZERO), "the divisor is not zero", line)
+        self.check(state, Compare("!=", other, ZERO), "the divisor is not zero", line)
         quotient, rest = self.fresh("floored", INTEGER), self.fresh("remainder", INTEGER)
         whole = Arithmetic("+", Arithmetic("*", quotient, other, INTEGER), rest, INTEGER)
-        above = conjunction((Comparison("<=", ZERO, rest), Comparison("<", rest, other)))
-        below = conjunction((Comparison("<", other, rest), Comparison("<=", rest, ZERO)))
+        above = conjunction((Compare("<=", ZERO, rest), Compare("<", rest, other)))
+        below = conjunction((Compare("<", other, rest), Compare("<=", rest, ZERO)))
         self.facts += [
-            Implies(Comparison("!=", other, ZERO), Comparison("==", one, whole)),
-            Implies(Comparison("<", ZERO, other), above),
-            Implies(Comparison("<", other, ZERO), below),
+            Implies(Compare("!=", other, ZERO), Compare("==", one, whole)),
+            Implies(Compare("<", ZERO, other), above),
+            Implies(Compare("<", other, ZERO), below),
         ]
         return quotient if operator == "//" else rest
 
@@ -472,7 +472,7 @@ class Run:
 
 
 def same(one: Term, other: Term) -> Term:
-    return Iff(one, other) if one.sort == BOOL else Comparison("==", one, other)
+    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
 
 
 def zero(term: Term) -> Literal:

@@ -12,19 +12,19 @@ def command() -> None:
     """Review records: stamped with digests, signed with a key."""
 
 
-@command.command()
+@command.command("stamp")
 @click.argument("system")
 @click.argument("node")
 @click.option("--method", help="The review's id, where the node has several.")
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--renewed", metavar="DATE", help="Everything that changed was read again on this date.")
-def stamp(system: str, node: str, method: str | None, as_json: bool, renewed: str | None) -> int:
+def stamp_command(system: str, node: str, method: str | None, as_json: bool, renewed: str | None) -> int:
     """Fill the digests in that the review of NODE in SYSTEM lacks. Never refreshes one by habit: see --renewed."""
     from avow.base.workspace import system_folder
 
-    from .stamp import stamp as fill
+    from .stamp import stamp
 
-    said = fill(system_folder(system), node, method=method, renewed=renewed)
+    said = stamp(system_folder(system), node, method=method, renewed=renewed)
     if as_json:
         click.echo(json.dumps({"stamped": list(said)}, indent=1, ensure_ascii=False))
         return 0

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest, digest_file, read_regular, write
+from avow.base.files import digest_file, read_regular, sha256, write
 from avow.evidence.envelope import Opened, seal, unseal
 
 from .record import Record, read_record
@@ -44,7 +44,7 @@ def signed(path: Path, record: Record, trusted: Sequence[Path]) -> Opened | str 
         return f"no key of the plan has signed it ({place.name} is not there)" if trusted else None
     try:
         opened = unseal(read_regular(place).decode("utf-8"), trusted)
-        text = digest(read_regular(path))
+        text = sha256(read_regular(path))
     except Rejected as error:
         return error.diagnostics[0].message
     except (OSError, ValueError) as error:

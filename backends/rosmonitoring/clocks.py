@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from .reading import at
-from .rules import Path
+from .rules import FieldPath
 from .tuning import EVENTS_WITHOUT_CLOCK
 from .wires import MappingError, seconds
 
@@ -58,7 +58,7 @@ class Clock:
         return f"{what}, by which the plan goes (`time: {self._by}`)" if self._waiting or self._dropped else ""
 
     def _read(self, event: Event) -> Fraction | None:
-        way: Path = ("clock",) if self._by is By.SIM else ("header", "stamp")
+        way: FieldPath = ("clock",) if self._by is By.SIM else ("header", "stamp")
         if self._by is By.SIM and str(event.get("topic", "")).lstrip("/") != SIMULATED:
             return None
         try:

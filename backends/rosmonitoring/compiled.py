@@ -17,7 +17,7 @@ import re
 from bisect import bisect
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path as File
+from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -29,7 +29,7 @@ from .options import same_topic
 from .pace import SEQUENCE
 from .paired import Paired
 from .plans import Plan, Token, Watch, below, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
-from .rules import Path, Previous
+from .rules import FieldPath, Previous
 from .shapes import Shape, scanner, shape
 from .timed import Timed
 from .traces import event_of, not_text
@@ -89,7 +89,7 @@ class Compiled:
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
-    def run(self, path: File) -> Iterator[tuple[int, list[Violation]]]:
+    def run(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """Judge the lines of a file, as `lines` does. Raises Rejected."""
         try:
             with path.open("rb") as stream:
@@ -320,7 +320,7 @@ class Compiled:
         """Whether the engine has to see every event of the topic."""
         return watch.monitor.listens(topic) and self._plan(watch, topic) is None
 
-    def _leads(self, watch: Watch, topic: str) -> Iterator[Callable[[Path], bool]]:
+    def _leads(self, watch: Watch, topic: str) -> Iterator[Callable[[FieldPath], bool]]:
         plan = self._plan(watch, topic)
         for name in plan.names if plan else ():
             yield leads(watch.monitor.setup.rules[name])

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
-from .rules import Path
+from .rules import FieldPath
 from .tuning import CANDIDATES_SHOWN
 from .wires import fits
 
@@ -32,7 +32,7 @@ def parts_of(sort: Sort) -> tuple[Sort, ...]:
     return (sort,)
 
 
-def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str, str]) -> tuple[Path, ...]:
+def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str, str]) -> tuple[FieldPath, ...]:
     """The fields of the message that a variable of the sort means. Raises Undecided."""
     missing = known.missing(message)
     if missing:
@@ -59,7 +59,10 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
 
 
 def _hint(
-    wanted: Sequence[Sort], places: Sequence[tuple[Path, Wire, Message]], known: Definitions, values: Mapping[str, str]
+    wanted: Sequence[Sort],
+    places: Sequence[tuple[FieldPath, Wire, Message]],
+    known: Definitions,
+    values: Mapping[str, str],
 ) -> str | None:
     """What the plan may write of arrays, whose items no variable means by itself, and of numbers that may be elements
     of an enumeration; None where there is nothing of the kind."""
@@ -105,10 +108,10 @@ def words(sort: EnumSort, wire: Scalar, holder: Message, values: Mapping[str, st
     return {text: members[name.lower()] for name, text in constants.items() if name.lower() in members}
 
 
-def _places(message: Message, known: Definitions) -> list[tuple[Path, Wire, Message]]:
+def _places(message: Message, known: Definitions) -> list[tuple[FieldPath, Wire, Message]]:
     """What may be meant: the leaves, and each message within the message (for tuples), the message itself first."""
-    found: list[tuple[Path, Wire, Message]] = [((), Nested(message.name), message)]
-    seen: set[Path] = set()
+    found: list[tuple[FieldPath, Wire, Message]] = [((), Nested(message.name), message)]
+    seen: set[FieldPath] = set()
     for path, wire, holder in known.leaves(message):
         for depth in range(1, len(path)):
             if path[:depth] not in seen:

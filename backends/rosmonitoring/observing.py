@@ -31,7 +31,7 @@ from avow.system.schema import suggest
 
 from .fitting import SOURCES, Undecided, decide, parts_of, words
 from .reading import convert, shown
-from .rules import NOTHING_KNOWN, Argument, Choice, Fields, Gap, Hold, Lookup, Path, Rule, Take
+from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
 from .wires import MappingError, fits
 
 
@@ -98,7 +98,7 @@ def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
     return rule
 
 
-def _paths(entry: Mapping[str, Any], sort: Sort) -> tuple[Path, ...]:
+def _paths(entry: Mapping[str, Any], sort: Sort) -> tuple[FieldPath, ...]:
     """The fields that the plan names. Raises Wrong."""
     key = "field" if "field" in entry else "fields"
     paths = tuple(map(path, [entry["field"]] if key == "field" else entry["fields"]))
@@ -110,7 +110,7 @@ def _paths(entry: Mapping[str, Any], sort: Sort) -> tuple[Path, ...]:
     return paths
 
 
-def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[Path, ...]:
+def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[FieldPath, ...]:
     if isinstance(at.message, str):
         about = f"nothing defines the messages {at.message}" if at.message else "the topic's type is not said"
         raise Undecided(f"{about} of the topic {at.topic}, and the plan does not name the field", SOURCES)
@@ -120,7 +120,7 @@ def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[Path, ...]:
 
 
 def _wires(
-    at: Observed, paths: tuple[Path, ...], each: Path | None, entry: Mapping[str, Any], take: Take | None
+    at: Observed, paths: tuple[FieldPath, ...], each: FieldPath | None, entry: Mapping[str, Any], take: Take | None
 ) -> tuple[tuple[Wire | None, ...], Mapping[str, str]]:
     """What each field is, by the definition, and what the message's words and numbers mean. Raises Wrong."""
     names: dict[str, str] = dict(entry.get("values", {}))
@@ -153,7 +153,7 @@ def _wires(
 
 
 def _check_words(
-    way: Path, wire: Scalar, sort: EnumSort, holder: Message, names: Mapping[str, str], said: bool
+    way: FieldPath, wire: Scalar, sort: EnumSort, holder: Message, names: Mapping[str, str], said: bool
 ) -> None:
     if wire.name not in INTEGERS:
         return
@@ -171,7 +171,7 @@ def _check_words(
         )
 
 
-def _check_take(way: Path, wire: Wire, sort: Sort, take: Take, known: Definitions) -> None:
+def _check_take(way: FieldPath, wire: Wire, sort: Sort, take: Take, known: Definitions) -> None:
     if not isinstance(wire, Array):
         raise Wrong(f"{shown(way)} is {wire}, and no array", "take")
     if take is Take.COUNT:
@@ -217,7 +217,7 @@ def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Val
         if key not in known and key not in _CHOICE_KEYS:
             raise Wrong(f"{sort.name} has no constructor {key!r}", key, hint=suggest(key, known))
     arguments: dict[str, tuple[Argument, ...]] = {}
-    wires: dict[Path, Wire] = {}
+    wires: dict[FieldPath, Wire] = {}
     tag = path(entry["constructor"])
     _field(at, tag, sort, "constructor")
     for name, constructor in known.items():
@@ -237,7 +237,7 @@ def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Val
     return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, kind_of(at))
 
 
-def _field(at: Observed, way: Path, sort: Sort, *place: str | int) -> Wire | None:
+def _field(at: Observed, way: FieldPath, sort: Sort, *place: str | int) -> Wire | None:
     """The type of a field that is to be read as a value of the sort. Raises Wrong."""
     if isinstance(at.message, str):
         return None
@@ -311,7 +311,7 @@ def check_keys(entry: Mapping[str, Any], sort: Sort) -> None:
 _INDEX = re.compile(r"\[(-?\d{1,6})\]")
 
 
-def path(text: str) -> Path:
+def path(text: str) -> FieldPath:
     """``pose.x`` and ``ranges[0]`` as paths; an empty text is the whole message (or list item)."""
     found: list[str | int] = []
     for step in text.split(".") if text else ():

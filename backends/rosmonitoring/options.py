@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from pathlib import Path as File
+from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -35,7 +35,7 @@ from .observing import Observed, Wrong, check_keys, literal, observe, table_of
 from .pace import NO_TIME, RATE, Leeway, Rate, duration
 from .pairing import Answers
 from .reading import from_text, shown
-from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule, otherwise
+from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise
 from .tuning import DECIDED_SHARE
 from .wires import MappingError
 
@@ -142,7 +142,7 @@ def origin(system: System) -> Origin:
     return Origin(system.plan.ros.distro, system.plan.messages)
 
 
-def known_types(system: System, traces: Iterable[File]) -> tuple[Definitions, tuple[Diagnostic, ...]]:
+def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tuple[Diagnostic, ...]]:
     """The message types that the plan's files, its distribution and the bags among some traces define. What cannot be
     read is left to who judges the trace."""
     known, wrong = definitions(system.plan.messages, system.plan.ros.distro)
@@ -155,7 +155,7 @@ def known_types(system: System, traces: Iterable[File]) -> tuple[Definitions, tu
     return known, wrong
 
 
-def traces_of(system: System, options: Located | None) -> tuple[File, ...]:
+def traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
     """The traces that a method names and that are there."""
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
     named = data.get("traces")
@@ -305,7 +305,7 @@ class _Work:
 
     def shared_fields(self) -> None:
         """Refuses two inputs (or outputs) that are read from one field: what one of them means is then not said."""
-        taken: dict[tuple[str, Path, Role], str] = {}
+        taken: dict[tuple[str, FieldPath, Role], str] = {}
         for name, rule in self.rules.items():
             if not isinstance(rule, Fields) or name in self.mapping():
                 continue

@@ -11,7 +11,7 @@ from typing import Any
 from .engine import Monitor
 from .pairing import Asked, ticks_of
 from .plans import Plan, Watch, below, is_seen
-from .rules import Path
+from .rules import FieldPath
 from .shapes import Shape
 from .tuning import TICKS
 from .waiting_answers import asks, judges_answers_alone, speaks
@@ -113,7 +113,7 @@ def _settling(monitor: Monitor) -> Any:
     return settle
 
 
-def _key(made: Shape, path: Path) -> tuple[str, tuple[int, ...]] | None:
+def _key(made: Shape, path: FieldPath) -> tuple[str, tuple[int, ...]] | None:
     """Code for the key of a message, as `Pairing.key` gives it, and the groups that it needs; None where the line has
     none, or not just one."""
     groups = made.groups(below([path]))

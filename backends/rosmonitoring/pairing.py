@@ -24,7 +24,7 @@ from avow.formulas.values import Value, show
 
 from .numbers import Decimal, NotANumber, exact
 from .reading import Reader, at
-from .rules import Path
+from .rules import FieldPath
 from .traces import parse_event
 from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS
 from .wires import MappingError, seconds
@@ -39,8 +39,8 @@ class Answers:
 
     by: str
     because: str = ""
-    input: Path = ()
-    output: Path = ()
+    input: FieldPath = ()
+    output: FieldPath = ()
     latency: Fraction = Fraction(0)
     jitter: Fraction = Fraction(0)
 
@@ -336,7 +336,7 @@ class Pairing:
         asked.messages[name] = tuple(said.place for said in alike)
         return [*alike]
 
-    def key(self, event: Mapping[str, Any], path: Path) -> object:
+    def key(self, event: Mapping[str, Any], path: FieldPath) -> object:
         """By what a message is paired; None of one that does not say it."""
         if not path:
             return None

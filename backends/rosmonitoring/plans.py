@@ -13,7 +13,7 @@ from avow.ros.bags import ENVELOPE, WHOLE
 from .coverage import Tally
 from .engine import Monitor
 from .regions import regions
-from .rules import Choice, Fields, Hold, Lookup, Path, Previous, heard_through
+from .rules import Choice, FieldPath, Fields, Hold, Lookup, Previous, heard_through
 from .shapes import Shape
 from .tuning import REMEMBERED
 from .watched import Violation, Watched
@@ -149,9 +149,9 @@ def is_seen(rule: object) -> bool:
     return isinstance(rule, Fields) and rule.hold is Hold.SEEN
 
 
-def leads(rule: object) -> Callable[[Path], bool]:
+def leads(rule: object) -> Callable[[FieldPath], bool]:
     """Whether what lies at a path is read by a rule."""
-    wanted: list[Path] = []
+    wanted: list[FieldPath] = []
     match rule:
         case Fields(each=None, paths=paths):
             wanted += paths
@@ -166,7 +166,7 @@ def leads(rule: object) -> Callable[[Path], bool]:
     return below(wanted)
 
 
-def below(wanted: Iterable[Path]) -> Callable[[Path], bool]:
+def below(wanted: Iterable[FieldPath]) -> Callable[[FieldPath], bool]:
     """Whether something lies at one of these paths of a message, or within it."""
     # which item `ranges[-1]` is depends on how many there are: all of them count
     wanted = [tuple(itertools.takewhile(lambda step: isinstance(step, str) or step >= 0, path)) for path in wanted]

@@ -28,7 +28,7 @@ from avow.ros.bags import ENVELOPE, message_of
 from avow.ros.definitions import Array, Wire
 
 from .numbers import Decimal, NotANumber, exact, whole
-from .rules import NOTHING_KNOWN, Argument, Choice, Fields, Hold, Lookup, Path
+from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Hold, Lookup
 from .wires import Convert, MappingError, NoReading, converter, element, fits, of_type, show, taken
 
 Message = Mapping[str, Any]
@@ -47,12 +47,12 @@ def reader(rule: Fields | Choice) -> Reader:
             return _scalar(rule, sort)
 
 
-def at(event: Message, path: Path) -> Any:
+def at(event: Message, path: FieldPath) -> Any:
     """The part of an event's message that a path leads to. Raises MappingError."""
     return _within(message_of(event, str(path[0])) if path else event, path)
 
 
-def _within(message: Any, path: Path) -> Any:
+def _within(message: Any, path: FieldPath) -> Any:
     place = message
     for depth, name in enumerate(path):
         if isinstance(name, int):
@@ -68,7 +68,7 @@ def _within(message: Any, path: Path) -> Any:
     return place
 
 
-def shown(path: Path) -> str:
+def shown(path: FieldPath) -> str:
     """``pose.position.x``, ``ranges[0]``."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")
@@ -188,7 +188,7 @@ def _scalar(rule: Fields, sort: Sort) -> Reader:
     return _with_default(rule, lambda message, old: read(at(message, path)))
 
 
-def _one_field(path: Path, name: str, read: Convert) -> Reader:
+def _one_field(path: FieldPath, name: str, read: Convert) -> Reader:
     """The most frequent reader of all."""
 
     def of_field(message: Message, old: Value | None) -> Value:
@@ -236,7 +236,7 @@ def _points(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[t
     """The tuples that a message brings; a tuple with no reading among its parts is not brought."""
     each, pairs = rule.each, tuple(zip(rule.paths, _converters(rule, sorts), strict=True))
 
-    def one(message: Message, part: Callable[[Any, Path], Any]) -> tuple[Value, ...] | None:
+    def one(message: Message, part: Callable[[Any, FieldPath], Any]) -> tuple[Value, ...] | None:
         try:
             return tuple([read(part(message, p)) for p, read in pairs])
         except NoReading:

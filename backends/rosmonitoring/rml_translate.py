@@ -50,7 +50,7 @@ from .rml import (
     substitute,
     write,
 )
-from .rules import Choice, Constant, Fields, Lookup, Path, Previous, Rule
+from .rules import Choice, Constant, FieldPath, Fields, Lookup, Previous, Rule
 from .symbols import (
     Points,
     Scalar,
@@ -120,7 +120,7 @@ class _Mode:
 class _Case:
     """One shape that a rule's message can have: fields with constants or variables, and the parts' new values."""
 
-    fields: tuple[tuple[Path, str], ...]
+    fields: tuple[tuple[FieldPath, str], ...]
     values: tuple[Numeric, ...]
     binds: tuple[str, ...]
     guard: Condition = TRUE
@@ -347,7 +347,7 @@ class _Machine:
                 continue
             tag = (rule.tag, " | ".join(words))
             places = rule.arguments[constructor.name]
-            paths: list[Path] = []
+            paths: list[FieldPath] = []
             for place in places:
                 if isinstance(place, Lookup):
                     raise NotRml(f"an argument of {constructor.name} is looked up in a table")
@@ -399,7 +399,7 @@ def _seen_at_start(symbol: Tracked, first: Value, sort: Sort) -> dict[str, Numer
     return {flag: Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
 
 
-def _field_cases(path: Path, sort: Sort, name: str, names: dict[str, str] | object) -> list[_Case]:
+def _field_cases(path: FieldPath, sort: Sort, name: str, names: dict[str, str] | object) -> list[_Case]:
     """A field's content: a constant for each element of an enumeration, else a variable."""
     match sort:
         case EnumSort(members=members):
@@ -432,7 +432,7 @@ def _words(member: str, names: dict[str, str] | object, known: set[str]) -> list
     return found
 
 
-def _pattern(topic: str, fields: Sequence[tuple[Path, str]], inside: bool) -> str:
+def _pattern(topic: str, fields: Sequence[tuple[FieldPath, str]], inside: bool) -> str:
     """The event's pattern; `inside`: the message's fields lie under ``data``."""
     tree: dict[str, object] = {}
     for path, text in fields:

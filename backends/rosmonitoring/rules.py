@@ -16,7 +16,7 @@ from avow.formulas.values import Value
 from avow.language.terms import Variable
 from avow.ros.definitions import Definitions, Wire
 
-Path = tuple[str | int, ...]
+FieldPath = tuple[str | int, ...]
 """``("pose", "x")``: a field, and the fields within it; ``("ranges", 0)``: an item of an array."""
 
 NOTHING_KNOWN = Definitions({})
@@ -51,14 +51,14 @@ class Lookup:
     """The cell of a table in the row that a field names: the coordinates of the place with this id."""
 
     table: str
-    key: Path
+    key: FieldPath
     rows: Mapping[str, str] = field(hash=False)
     """Text of the key → text of the cell."""
     held: Wire | None = None
     """The type in which the node holds the cell."""
 
 
-Argument = Path | Lookup
+Argument = FieldPath | Lookup
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +69,10 @@ class Fields:
 
     variable: Variable
     topic: str
-    paths: tuple[Path, ...]
+    paths: tuple[FieldPath, ...]
     names: Mapping[str, str] = field(default_factory=dict, hash=False)
     hold: Hold = Hold.LATEST
-    each: Path | None = None
+    each: FieldPath | None = None
     elsewhere: Value | None = None
     """Of any other variable: its value where there is no reading."""
     initial: Value | None = None
@@ -96,13 +96,13 @@ class Choice:
 
     variable: Variable
     topic: str
-    tag: Path
+    tag: FieldPath
     arguments: Mapping[str, tuple[Argument, ...]] = field(hash=False)
     """Constructor → where its arguments come from."""
     names: Mapping[str, str] = field(default_factory=dict, hash=False)
     """The message's word → constructor."""
     initial: Value | None = None
-    wires: Mapping[Path, Wire] = field(default_factory=dict, hash=False)
+    wires: Mapping[FieldPath, Wire] = field(default_factory=dict, hash=False)
     """Of the fields whose types are known."""
     kind: str = ""
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .rules import Path
+from .rules import FieldPath
 from .tuning import SHAPE_VALUES
 
 _TOKEN = re.compile(
@@ -30,20 +30,20 @@ class Shape:
     pattern: bytes
     time: int
     """The group of the event's time, counted from 1."""
-    paths: tuple[Path, ...]
+    paths: tuple[FieldPath, ...]
     """What each group leads to."""
     numbers: frozenset[int]
     """The groups that hold numbers."""
 
-    def groups(self, leads: Callable[[Path], bool]) -> tuple[int, ...]:
+    def groups(self, leads: Callable[[FieldPath], bool]) -> tuple[int, ...]:
         """The groups of the values that are wanted."""
         return tuple(at for at, path in enumerate(self.paths, start=1) if leads(path))
 
 
-def shape(line: bytes, topic: str, wanted: Callable[[Path], bool]) -> Shape | None:
+def shape(line: bytes, topic: str, wanted: Callable[[FieldPath], bool]) -> Shape | None:
     """The shape of a line that is known to be an event of this topic; None where it has none."""
     pieces: list[bytes] = []
-    paths: list[Path] = []
+    paths: list[FieldPath] = []
     numbers: set[int] = set()
     place: list[str | int] = []
     keyed = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
-from pathlib import Path as File
+from pathlib import Path
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
@@ -24,7 +24,7 @@ from .rules import Choice, Constant, Fields, Previous, Rule
 from .wires import of_type
 
 
-def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
+def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
     """Why a bag's messages are not what the rules take them for. Raises Rejected for what is no bag."""
     if not is_bag(path):
         return ()

@@ -20,7 +20,7 @@ from calculus.make import Limits
 from avow.assurance.case import build_case
 from avow.assurance.model import Case
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.obligations import settle_all
@@ -97,7 +97,7 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
     todo = [o for o in work.obligations if o.id not in {r.obligation for r in good}]
     outcomes = settle_all(composition, todo, Limits())
     text = recheck.written(composition.certificates)
-    path = f"artifacts/s/{digest(text)[:12]}/{recheck.FILE}"
+    path = f"artifacts/s/{sha256(text)[:12]}/{recheck.FILE}"
     (root / path).parent.mkdir(parents=True, exist_ok=True)
     (root / path).write_text(text)
     records = list(good)
@@ -107,7 +107,7 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
         )
         details = json.loads(json.dumps(outcome.details, default=str))
         about = replace(about, details=details, rests_on=outcome.rests_on, vacuous=outcome.vacuous)
-        records.append(replace(about, outputs={path: digest(text)}))
+        records.append(replace(about, outputs={path: sha256(text)}))
     calculus = list(records)
     numbers = {name: k for k, name in enumerate(made.names)}
     for o in catalogue(system).obligations:

@@ -29,8 +29,9 @@ from avow.backends.ajpf.psl import (
     Until,
     parts,
 )
-from avow.backends.ajpf.structure import Fair, Kripke, find_lasso, reduce
+from avow.backends.ajpf.structure import Kripke, find_lasso, reduce
 from avow.backends.ajpf.syntax import Struct
+from avow.formulas.lasso import Fair
 
 P, Q = (Atom(Modality.BELIEVES, "ag", Struct(name)) for name in "pq")
 PLACES = {P: 0, Q: 1}

@@ -12,7 +12,7 @@ from avow.assurance.case import build_case
 from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
 from avow.base.codec import canonical
 from avow.base.diagnostics import Span
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Link, Verdict
 from avow.evidence.encoding import encode
 from avow.evidence.ledger import GENESIS, Entry
@@ -134,7 +134,7 @@ def obligation(
 ) -> Obligation:
     span = Span(f"contracts/{of}/system.rcl", line, 3, line + 1, 40)
     return Obligation(
-        of, node, kind, name, claim or f"{node} meets {name}", formula, digest(f"{node}{kind}{name}"), clauses, span
+        of, node, kind, name, claim or f"{node} meets {name}", formula, sha256(f"{node}{kind}{name}"), clauses, span
     )
 
 
@@ -178,14 +178,14 @@ def evidence(
 
 
 def key_of(target: Obligation, method: str) -> str:
-    return digest(f"{target.id} {target.digest} {method}")
+    return sha256(f"{target.id} {target.digest} {method}")
 
 
 def chain(records: Sequence[Evidence]) -> tuple[Entry, ...]:
     """Entries as a ledger would make them."""
     entries, previous = [], GENESIS
     for number, record in enumerate(records):
-        mark = digest(canonical({"evidence": encode(record), "n": number, "prev": previous}))
+        mark = sha256(canonical({"evidence": encode(record), "n": number, "prev": previous}))
         entries.append(Entry(number, previous, mark, record))
         previous = mark
     return tuple(entries)
@@ -512,7 +512,7 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
                 ("in.wayP is provided by the environment",),
             ),
         ),
-        "digests": {"contracts/rover/plan.yaml": digest(PLAN_TEXT), "contracts/rover/system.rcl": digest(RCL_TEXT)},
+        "digests": {"contracts/rover/plan.yaml": sha256(PLAN_TEXT), "contracts/rover/system.rcl": sha256(RCL_TEXT)},
         "sources": {"contracts/rover/plan.yaml": PLAN_TEXT, "contracts/rover/system.rcl": RCL_TEXT},
     }
     return rover_system(), obligations, records, keys, extras

@@ -29,7 +29,7 @@ from avow.assurance.codec import case_schema, evidence_schema, from_json, to_jso
 from avow.assurance.model import Case, Currency, Derivation, SideCondition
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
@@ -50,7 +50,7 @@ def status_of(found: Case, name: str = "rover/n/guarantee/g") -> Status:
 
 
 def test_evidence_of_another_meaning_is_stale_and_kept_as_history() -> None:
-    changed = replace(G, digest=digest("another threshold"))
+    changed = replace(G, digest=sha256("another threshold"))
     record = evidence(G)
     found = case(SYSTEM, [changed], [record], keys={(G.id, "hoare"): key_of(changed, "hoare")})
     assert status_of(found) is Status.STALE
@@ -61,7 +61,7 @@ def test_evidence_of_another_meaning_is_stale_and_kept_as_history() -> None:
 
 
 def test_the_same_key_but_another_digest_does_not_count() -> None:
-    found = case(SYSTEM, [replace(G, digest=digest("other"))], [evidence(G)], keys=keys_of([evidence(G)]))
+    found = case(SYSTEM, [replace(G, digest=sha256("other"))], [evidence(G)], keys=keys_of([evidence(G)]))
     assert status_of(found) is Status.STALE
 
 

@@ -42,4 +42,4 @@ def test_a_failed_write_leaves_the_old_content(tmp_path: Path, monkeypatch: pyte
 
 def test_digest_of_text_and_file_agree(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("grün", encoding="utf-8")
-    assert files.digest("grün") == files.digest_file(tmp_path / "a") == files.digest("grün".encode())
+    assert files.sha256("grün") == files.digest_file(tmp_path / "a") == files.sha256("grün".encode())

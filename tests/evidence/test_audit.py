@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence, guarantee, key_of
 
-from avow.base.files import digest, digest_file
+from avow.base.files import digest_file, sha256
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Fault, audit
 from avow.evidence.ledger import Ledger
@@ -74,7 +74,7 @@ def test_a_record_that_points_at_another_obligation(ledger: Ledger, tmp_path: Pa
 def test_a_poisoned_cache_entry(ledger: Ledger, tmp_path: Path) -> None:
     """A record with today's key, so that it would be taken from the cache, but of a claim with another meaning."""
     claim = guarantee("node", "c")
-    ledger.append(evidence(claim, obligation_digest=digest("another claim")))
+    ledger.append(evidence(claim, obligation_digest=sha256("another claim")))
     known = {"obligations": {claim.id: claim.digest}, "keys": {(claim.id, "hoare"): key_of(claim, "hoare")}}
     assert (Fault.MISPLACED, claim.id, True) in faults(ledger, tmp_path, **known)
 
@@ -92,7 +92,7 @@ def test_a_record_of_another_system(ledger: Ledger, tmp_path: Path) -> None:
 
 def test_files_of_superseded_attempts_are_history(ledger: Ledger, tmp_path: Path) -> None:
     (tmp_path / "a.log").write_text("second run")
-    ledger.append(evidence("node.a", key="newer", outputs={"a.log": digest("second run")}))
+    ledger.append(evidence("node.a", key="newer", outputs={"a.log": sha256("second run")}))
     assert faults(ledger, tmp_path) == []
     (tmp_path / "b.log").unlink()
     assert faults(ledger, tmp_path, keys={}) == [(Fault.GONE, "b.log", False)]

@@ -21,7 +21,7 @@ from assurance.sample import case, evidence, guarantee, key_of, system
 from helpers import some
 
 from avow.base.codec import canonical
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, audit
 from avow.evidence.continuity import continuity
@@ -43,7 +43,7 @@ def records(root: Path) -> list[Evidence]:
         log.parent.mkdir(exist_ok=True)
         log.write_text(f"{name}: verified, {at} goals\n")
         verdict = Verdict.REFUTED if at % 4 == 3 else Verdict.TESTED if method == "hypothesis" else Verdict.PROVED
-        found.append(evidence(claim, verdict, method, outputs={f"logs/{name}.log": digest(log.read_text())}))
+        found.append(evidence(claim, verdict, method, outputs={f"logs/{name}.log": sha256(log.read_text())}))
     return found
 
 
@@ -105,7 +105,7 @@ class Place:
         lines, previous = [], GENESIS
         for number, data in enumerate(evidences):
             body = {"evidence": data, "n": number, "prev": previous}
-            previous = digest(canonical(body))
+            previous = sha256(canonical(body))
             lines.append(canonical({**body, "hash": previous}).encode() + b"\n")
         self.write(lines)
         self.head.write_text(canonical({"hash": previous, "records": len(lines)}) + "\n")
@@ -143,7 +143,7 @@ def change_a_record_and_its_hash(place: Place, rng: random.Random) -> None:
     data = json.loads(lines[at])
     data["evidence"]["summary"] += " (surely)"
     body = {name: data[name] for name in ("evidence", "n", "prev")}
-    lines[at] = canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n"
+    lines[at] = canonical({**body, "hash": sha256(canonical(body))}).encode() + b"\n"
     place.write(lines)
 
 
@@ -176,7 +176,7 @@ def insert_a_forgery(place: Place, rng: random.Random) -> None:
     data = json.loads(lines[at])
     data["evidence"]["verdict"], data["evidence"]["run"] = "proved", "forged"
     body = {"evidence": data["evidence"], "n": at, "prev": data["prev"]}
-    lines.insert(at, canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n")
+    lines.insert(at, canonical({**body, "hash": sha256(canonical(body))}).encode() + b"\n")
     place.write(lines)
 
 
@@ -206,7 +206,7 @@ def poison_the_cache(place: Place, rng: random.Random) -> None:
     """Through the front door: a whole record with today's key, for a claim with another meaning."""
     at = rng.randrange(len(NAMES))
     claim, method = CLAIMS[NAMES[at]], METHODS[at % 3]
-    Ledger(place.ledger).append(evidence(claim, method=method, obligation_digest=digest(str(rng.random()))))
+    Ledger(place.ledger).append(evidence(claim, method=method, obligation_digest=sha256(str(rng.random()))))
 
 
 def point_at_another_claim(place: Place, rng: random.Random) -> None:

@@ -13,7 +13,7 @@ from helpers import some
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.hoare import BACKEND
 from avow.backends.hoare import backend as settling
-from avow.backends.hoare.outline import show
+from avow.backends.hoare.outline import one_line
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.terms import Term
@@ -193,7 +193,7 @@ def test_that_a_proof_is_vacuous_is_asked_of_a_second_solver(tmp_path: Path, mon
     assert isinstance(details, list)
     vacuous = [triple["pre"] for triple in details if triple["vacuous"]]
     assert vacuous
-    assert set(vacuous) <= {show(formula) for formula in asked}
+    assert set(vacuous) <= {one_line(formula) for formula in asked}
 
 
 ONE = """

@@ -25,7 +25,7 @@ from avow.backends.hypothesis.generate import Inputs
 from avow.base.verdict import Outcome, Verdict
 from avow.formulas.formula import substitute
 from avow.formulas.values import Value
-from avow.isolation.subject import Subject
+from avow.isolation.subject import SubjectProcess
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
 from avow.language.terms import RESPONSES, History, Implies, Literal, Term
@@ -183,11 +183,11 @@ class Machine(FunctionBench):
     table: Mapping[tuple[int, bool], tuple[bool, int]]
     state = 0
 
-    def begin(self, subject: Subject) -> dict[str, Value]:
+    def begin(self, subject: SubjectProcess) -> dict[str, Value]:
         self.state = 0
         return super().begin(subject)
 
-    def advance(self, subject: Subject, inputs: Inputs) -> dict[str, Value]:
+    def advance(self, subject: SubjectProcess, inputs: Inputs) -> dict[str, Value]:
         output, self.state = self.table[self.state, bool(inputs["a"])]
         return {"b": output}
 

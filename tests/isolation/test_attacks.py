@@ -19,7 +19,7 @@ from avow.base.verdict import Verdict
 from avow.isolation import judge
 from avow.isolation.level import SANDBOX, Isolation, seals
 from avow.isolation.observed import Seen
-from avow.isolation.subject import Subject, SubjectFailed
+from avow.isolation.subject import SubjectFailed, SubjectProcess
 
 LEVELS = [
     pytest.param("off", id="processes"),
@@ -247,7 +247,7 @@ def test_a_subject_that_somebody_else_ends_is_asked_again(
     monkeypatch.setenv(SANDBOX, level)
     monkeypatch.setattr(process, "_ended_by_others", threading.Event())
     (tmp_path / "s.py").write_text("import time\ndef step():\n    time.sleep(60)\n")
-    subject = Subject(tmp_path / "s.py", "step", 30.0)
+    subject = SubjectProcess(tmp_path / "s.py", "step", 30.0)
 
     def kill() -> None:
         time.sleep(1.5)
@@ -284,7 +284,7 @@ def test_what_was_killed_from_outside_says_so_and_what_ended_itself_does_not(
     for killed, text in ((True, "def step(x): return {}"), (False, "raise SystemExit")):
         monkeypatch.setattr(process, "_ended_by_others", threading.Event())
         path.write_text(text)
-        subject = Subject(path, "step", 60.0)
+        subject = SubjectProcess(path, "step", 60.0)
         try:
             if killed:
                 subject.ask({"x": 1})

@@ -15,7 +15,7 @@ from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
 from avow.isolation.level import SANDBOX, seals
 from avow.isolation.observed import Seen, look
-from avow.isolation.subject import Subject
+from avow.isolation.subject import SubjectProcess
 from avow.isolation.tracing import traces
 from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
@@ -362,7 +362,7 @@ def test_where_a_subject_runs_is_an_input_where_it_asks(
     text, kind = WHERE[name]
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "m.py").write_text(text + "def step(): return top\n")
-    subject = Subject(tmp_path / "a" / "m.py", "step", 10.0)
+    subject = SubjectProcess(tmp_path / "a" / "m.py", "step", 10.0)
     subject.ask({})
     assert not subject.close()
     seen = [o for o in subject.observed() if o.kind in (Seen.PLACE, Seen.VARIABLE)]
@@ -382,7 +382,7 @@ def test_what_is_the_same_at_every_run_is_no_undeclared_input(tmp_path: Path, na
 def outside(folder: Path, text: str) -> list[str]:
     """What a subject whose module begins with a text uses that cannot be recorded."""
     (folder / "m.py").write_text(text + "def step(): return top\n")
-    subject = Subject(folder / "m.py", "step", 10.0)
+    subject = SubjectProcess(folder / "m.py", "step", 10.0)
     assert subject.ask({}) == {"q": ["10", "1"], "w": True}
     assert not subject.close()
     return [o.path for o in subject.observed() if o.kind is Seen.OUTSIDE]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from assurance.sample import RUN, case, evidence, guarantee, node_plan, obligation, system
 
 from avow.assurance.model import Case, Derivation, SideCondition
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.system.plan import EnvironmentInput, Finding, Requirement
@@ -61,7 +61,7 @@ def hostile_case() -> Case:
         [record, evidence(side, method="compose")],
         run=replace(RUN, command=NAME, limits={NAME: NAME}),
         derivations=[derivation],
-        digests={NAME: "0" * 64, SOURCE_PATH: digest(SOURCE)},
+        digests={NAME: "0" * 64, SOURCE_PATH: sha256(SOURCE)},
         sources={SOURCE_PATH: SOURCE, "plan\"'><b>.yaml": NAME},
         graph_svg="<svg xmlns='http://www.w3.org/2000/svg'><script>alert(4)</script></svg>",
     )

@@ -12,7 +12,7 @@ from assurance.sample import case, evidence, rover_parts
 from helpers import some
 
 from avow.assurance.codec import from_json
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since, not_established
 from avow.evidence.ledger import Entry, Ledger
@@ -170,7 +170,7 @@ def test_files_that_are_others_now_are_named_and_are_no_difference(tmp_path: Pat
     subject, obligations, records, keys, extras = rover_parts()
     for name in ("same.py", "other.py", "gone.py"):
         (tmp_path / name).write_text(name)
-    marks = {name: digest((tmp_path / name).read_bytes()) for name in ("same.py", "other.py", "gone.py")}
+    marks = {name: sha256((tmp_path / name).read_bytes()) for name in ("same.py", "other.py", "gone.py")}
     records = [replace(record, inputs=marks) for record in records]
     made_of = case(subject, obligations, records, keys=keys, **extras)
     assert stale(made_of, tmp_path) == ()

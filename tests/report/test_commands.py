@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from avow.assurance.compare import compare, of_case, of_ledger
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.cli.audit import command as audit
 from avow.cli.diff import command as diff
@@ -32,7 +32,7 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "contracts/rover/system.rcl").write_text(RCL_TEXT)
     (root / "a.log").write_text("log")
     subject, obligations, records, keys, extras = rover_parts()
-    logged = evidence("radiationSensor.low", outputs={"a.log": digest("log")}, run="later")
+    logged = evidence("radiationSensor.low", outputs={"a.log": sha256("log")}, run="later")
     records.append(logged)
     ledger = Ledger(root / "artifacts/ledger/rover.jsonl")
     ledger.append_all(records)
@@ -157,7 +157,7 @@ def test_comparison_tells_new_gone_and_changed_claims() -> None:
     assert compare(old, old) == ()
     from dataclasses import replace
 
-    changed = [replace(obligations[1], digest=digest("other")), *obligations[2:]]
+    changed = [replace(obligations[1], digest=sha256("other")), *obligations[2:]]
     new = of_case(case(subject, changed, records, keys=keys, **extras))
     kinds = {(c.kind, c.subject) for c in compare(old, new)}
     assert ("removed", obligations[0].id) in kinds

@@ -12,7 +12,7 @@ from assurance.sample import case, guarantee, rover_case, system
 
 from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case, SourceView
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.pipeline import report_check as check
 from avow.report import source
 from avow.report.markdown import render_markdown
@@ -25,7 +25,7 @@ PATH = "contracts/rover/system.rcl"
 
 def with_text(text: str, path: str = PATH) -> Case:
     return case(
-        system({"n": ["g"]}), [guarantee("n", "g", line=2)], [], digests={path: digest(text)}, sources={path: text}
+        system({"n": ["g"]}), [guarantee("n", "g", line=2)], [], digests={path: sha256(text)}, sources={path: text}
     )
 
 

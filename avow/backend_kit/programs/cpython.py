@@ -104,15 +104,14 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
 
 def main() -> None:
     from avow.base.process import adopt_orphans
-    from avow.isolation.subject import Subject as Process
-    from avow.isolation.subject import SubjectFailed
+    from avow.isolation.subject import SubjectFailed, SubjectProcess
     from avow.tuning.running import SUBJECT_PATIENCE
 
     channel = int(sys.argv[1])
     os.set_inheritable(channel, False)
     adopt_orphans()
     question = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
-    process = Process(
+    process = SubjectProcess(
         Path(question["file"]),
         question["spec"],
         max(1.0, min(SUBJECT_PATIENCE, question["seconds"] / 3)),
