@@ -23,7 +23,6 @@ from avow.language.terms import Role
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
 from avow.system.formulas import ports_of
 from avow.system.plan import ComposeGoal, Endpoint, Subsystem, System
-from avow.system.temporal import parse_state
 
 
 @dataclass(slots=True)
@@ -144,7 +143,12 @@ def composed(system: System) -> Composition:
 
 def compose(system: System) -> Composition:
     """The derivations of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
-    flat = frame(system)
+    return composed_over(frame(system))
+
+
+def composed_over(flat: Frame) -> Composition:
+    """The derivations of the system of a frame."""
+    system = flat.system
     nodes = outermost(system)
     inside = leaves(system.plan)
     faces = {name: face(system, flat.graph, name, held) for name, held in inside.items()}
@@ -192,13 +196,11 @@ def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
         return True
     if len(nodes) > 1 and flat.remembering(nodes):
         return True  # what was remembered is of one step
-    contract = flat.system.contract
     if nodes != frozenset(flat.graph.nodes):
         return False
     if len(nodes) > 1 and flat.observed:
         return True
-    formulas = (r for r in flat.system.plan.requirements if r.formula is not None)
-    spoken = (ports_of(parse_state(r.formula or "", contract, r.formula_span)) for r in formulas)
+    spoken = (ports_of(formula) for formula in flat.required.values())
     return any(len({v.name.partition(".")[0] for v in ports}) > 1 for ports in spoken)
 
 

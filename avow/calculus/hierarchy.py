@@ -109,6 +109,7 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
         flat.constants,
         flat.cells,
         flat.shared,
+        flat.required,
         flat.observed,
         nodes,
         flat=flat,

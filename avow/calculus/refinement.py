@@ -3,6 +3,7 @@
 A refines B if whatever B's environment provides is enough for A, and whatever A then guarantees is what B promises:
 assumptions of B imply those of A; these and A's guarantees imply B's guarantees. Of a contract that nothing can keep
 all this is true and says nothing: whether A has an output for every input that B allows is asked as well.
+Of clauses that speak of other steps it is asked of every run: as long as B's assumptions have held.
 """
 
 from __future__ import annotations
@@ -15,8 +16,13 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
+from avow.calculus.questions import Answer
 from avow.calculus.refinement_certificate import established
+from avow.calculus.refinement_runs import answered
 from avow.formulas.formula import rename, sort_digest, transform
+from avow.formulas.temporal.cell import CELL
+from avow.formulas.temporal.cells import remembers
+from avow.formulas.temporal.clock import one_step
 from avow.kernel.certificate import Certificate
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Node, Port
@@ -55,7 +61,7 @@ class Refinement:
     demands: tuple[Demand, ...]
     unrealizable: Counterexample | None = None
     doubt: str = ""
-    certificate: Certificate | None = None
+    certificates: tuple[Certificate, ...] = ()
     """What the kernel established it from."""
 
     @property
@@ -98,6 +104,8 @@ def refines(
     if faults:
         return Refinement(concrete.name, abstract.name, faults, ())
     recast = _recasting(concrete, abstract)
+    if remembers(concrete) or remembers(abstract):
+        return _over_runs(_recast(concrete, recast), abstract, bounds)
     given = {f"{abstract.name}.{a.name} (assumed)": a.formula for a in abstract.assumptions}
     given |= _narrower(abstract.inputs, concrete.inputs)
     demands: list[Demand] = []
@@ -125,17 +133,7 @@ def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callab
     if found.verdict is not Verdict.PROVED:
         return found
 
-    def changed(clauses: tuple[Clause, ...]) -> tuple[Clause, ...]:
-        return tuple(replace(clause, formula=recast(clause.formula)) for clause in clauses)
-
-    outputs = tuple(replace(port, sort=recast(port.variable).sort) for port in concrete.outputs)
-    same = replace(
-        concrete,
-        outputs=outputs,
-        assumptions=changed(concrete.assumptions),
-        guarantees=changed(concrete.guarantees),
-    )
-    certificate, shown = established(same, abstract)
+    certificate, shown = established(_recast(concrete, recast), abstract)
     demands = []
     for at, demand in enumerate(found.demands):
         kind = Claimed.ASSUMPTION if at < len(concrete.assumptions) else Claimed.REQUIREMENT
@@ -144,7 +142,53 @@ def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callab
             why = "the engine finds that it follows; the kernel could not establish it"
             demand = replace(demand, verdict=Verdict.UNKNOWN, reason=why)
         demands.append(demand)
-    return replace(found, demands=tuple(demands), certificate=certificate)
+    return replace(found, demands=tuple(demands), certificates=(certificate,))
+
+
+def _recast(concrete: Node, recast: Callable[[Term], Term]) -> Node:
+    """The node in the other's types."""
+
+    def changed(clauses: tuple[Clause, ...]) -> tuple[Clause, ...]:
+        return tuple(replace(clause, formula=recast(clause.formula)) for clause in clauses)
+
+    return replace(
+        concrete,
+        outputs=tuple(replace(port, sort=recast(port.variable).sort) for port in concrete.outputs),
+        assumptions=changed(concrete.assumptions),
+        guarantees=changed(concrete.guarantees),
+    )
+
+
+def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
+    """Where clauses speak of other steps, of every run; `concrete` in the types of `abstract`."""
+    from avow.sanity.viability import viable
+
+    answers, certificates = answered(concrete, abstract, bounds)
+
+    def demand(node: str, clause: Clause, answer: Answer) -> Demand:
+        needed = tuple(map(str, answer.details.get("needed", ())))  # type: ignore[call-overload]
+        vacuous = answer.vacuous or (answer.established is not None and answer.established.vacuous)
+        shown = answer.counterexample
+        if shown is not None:  # what is remembered follows from the ports
+            values = tuple((name, value) for name, value in shown.values if CELL not in name)
+            shown = replace(shown, values=values)
+        return Demand(node, clause, answer.verdict, needed, shown, answer.summary, vacuous)
+
+    clauses = [(concrete.name, c) for c in concrete.assumptions] + [(abstract.name, c) for c in abstract.guarantees]
+    demands = tuple(demand(node, clause, answer) for (node, clause), answer in zip(clauses, answers, strict=True))
+    found = Refinement(concrete.name, abstract.name, (), demands, certificates=certificates)
+    if found.verdict is not Verdict.PROVED:
+        return found
+    asked = replace(concrete, inputs=abstract.inputs, assumptions=abstract.assumptions)
+    lasting = viable(one_step(asked), effort=2 * bounds.effort, seed=bounds.seed)
+    match lasting.verdict:
+        case Verdict.REFUTED:
+            what = f"a run after which no output of {concrete.name} meets what it guarantees"
+            return replace(found, unrealizable=lasting.run or Counterexample((), what))
+        case Verdict.PROVED:
+            return found
+        case _:  # no answer: a doubt, never a proof
+            return replace(found, doubt=lasting.reason or NO_ANSWER)
 
 
 def _kept_by_something(

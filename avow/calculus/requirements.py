@@ -30,7 +30,7 @@ from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
-from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
+from avow.system.temporal import Property, State, Temporal, parse_property, show_property
 from avow.tuning.effort import QUICK_EFFORT
 
 
@@ -89,7 +89,7 @@ class FormulaQuestion:
         delayed = bool(remembered) or any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
         for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
-            if not clauses or (patient and delayed):
+            if (everything and not clauses) or (patient and delayed):
                 continue
             last = self.ask(contracts(frame, clauses) | frame.environment() | remembered, goal, bounds)
             if last.verdict is Verdict.PROVED:
@@ -243,16 +243,20 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
     """The question behind a requirement; None where it is prose. Raises Rejected for a formula that is wrong."""
     contract = frame.system.contract
     if requirement.formula is not None:
-        term = parse_state(requirement.formula, contract, requirement.formula_span)
         support = tuple(name for entry in requirement.supported_by for name in _expand(frame, entry))
-        shown = show_term(system_term(frame, term))
-        known = frame.observed.get(requirement.id, Observed(term))
-        named = tuple(dict.fromkeys(support))
-        return FormulaQuestion(requirement.id, known.formula, shown, digest(term), named, known.unsaid)
+        return formula_question(frame, requirement.id, tuple(dict.fromkeys(support)))
     if requirement.temporal is not None:
         formula = parse_property(requirement.temporal, contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
     return None
+
+
+def formula_question(frame: Frame, name: str, support: tuple[str, ...]) -> FormulaQuestion:
+    """The question behind a formula that is required; `support`: guarantees from which it should follow."""
+    term = frame.required[name]
+    known = frame.observed.get(name, Observed(term))
+    text = show_term(system_term(frame, term))
+    return FormulaQuestion(name, known.formula, text, digest(term), support, known.unsaid)
 
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:

@@ -124,6 +124,9 @@ class Frame:
     """A cell (``log.earliest#…``) that keeps what another does → that one: where time matters, several nodes may look
     at the age of the same; and what a requirement remembers, a node may remember as well."""
 
+    required: Mapping[str, Term] = field(default_factory=dict)
+    """The formulas of requirements, over ``node.port``."""
+
     observed: Mapping[str, Observed] = field(default_factory=dict)
     """The requirements that speak of other steps."""
 
@@ -328,14 +331,19 @@ class Frame:
 def frame(system: System) -> Frame:
     """Raises Rejected where the plan's formulas are wrong."""
     graph = dataflow(system)
-    assumed = environment_assumptions(system, graph)
     required = {
-        r.id: term
+        r.id: parse_state(r.formula, system.contract, r.formula_span)
         for r in system.plan.requirements
-        if r.formula is not None and histories(term := parse_state(r.formula, system.contract, r.formula_span))
+        if r.formula is not None
     }
+    return framed(system, graph, environment_assumptions(system, graph), required)
+
+
+def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: Mapping[str, Term]) -> Frame:
+    """The frame of a system of whose environment something is assumed, and of which something is required."""
+    speaking = {name: term for name, term in required.items() if histories(term)}
     clauses = (c.formula for n in system.contract.nodes for c in n.clauses)
-    longest = longest_limit((*clauses, *(a.formula for a in assumed), *required.values()))
+    longest = longest_limit((*clauses, *(a.formula for a in assumed), *speaking.values()))
     together = one_pace(system.contract.nodes)
     nodes: dict[str, Node] = {}
     cells: dict[str, tuple[Cell, ...]] = {}
@@ -346,10 +354,10 @@ def frame(system: System) -> Frame:
         given += said
     given.sort(key=lambda a: [each.port for each in assumed].index(a.port))
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
-    observed = {name: observing(name, term, longest, together=together) for name, term in required.items()}
+    observed = {name: observing(name, term, longest, together=together) for name, term in speaking.items()}
     remembering = {name: kept for name, kept in cells.items() if kept}
     own_names = own_inputs(system, graph)
-    made = Frame(system, graph, tuple(given), own_names, constants, remembering, {}, observed, nodes)
+    made = Frame(system, graph, tuple(given), own_names, constants, remembering, {}, required, observed, nodes)
     if made.timed or observed:
         made.share()
     return made

@@ -17,8 +17,6 @@ from avow.kernel.statements import Claimed, Place, Wiring
 from avow.language.sorts import BOOL, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
-from avow.system.plan import Requirement
-from avow.system.temporal import parse_state
 
 
 def wiring(frame: Frame) -> Wiring:
@@ -40,9 +38,9 @@ def wiring(frame: Frame) -> Wiring:
         if cell.initial is not None:
             plan.append((Claimed.INITIAL, name, cell.name, cell.begins(own)))
     plan += [(Claimed.DEFINITION, name, CLOCK.name, GOES_ON) for name in frame.timed[:1]]
-    for r in system.plan.requirements:
-        if r.formula is not None:
-            plan.append((Claimed.REQUIREMENT, "", r.id, required(frame, r)))
+    for name, term in frame.required.items():
+        known = frame.observed.get(name)
+        plan.append((Claimed.REQUIREMENT, "", name, term if known is None else known.formula))
     plan += [(Claimed.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
     for group in circles(frame):
         for node, clause in ((name, g.name) for name in group for g in frame.node(name).guarantees):
@@ -90,11 +88,3 @@ def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
             owner, _, name = cell.name.partition(".")
             keep((owner, name), cell.name, nodes.pop() if len(nodes) == 1 else owner, cell.sort)
     return found
-
-
-def required(frame: Frame, requirement: Requirement) -> Term:
-    """A requirement's formula, of one step, over ``node.port`` and what is remembered for it."""
-    known = frame.observed.get(requirement.id)
-    if known is not None:
-        return known.formula
-    return parse_state(requirement.formula or "", frame.system.contract, requirement.formula_span)

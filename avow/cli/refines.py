@@ -153,7 +153,7 @@ def _data(result: Refinement) -> dict[str, object]:
             }
             for demand in result.demands
         ],
-        "certificate": to_json(result.certificate) if result.certificate is not None else None,
+        "certificates": [to_json(certificate) for certificate in result.certificates],
     }
 
 

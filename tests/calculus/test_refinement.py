@@ -257,10 +257,10 @@ def test_what_is_proved_the_kernel_has_established(monkeypatch: pytest.MonkeyPat
     stronger = BASE.replace("out.x >= in.r", "out.x >= in.r + 1")
     found = refines(only(stronger), only(BASE))
     assert found.verdict is Verdict.PROVED
-    assert found.certificate is not None
-    hows = {entry.how for entry in found.certificate.entries}
+    (certificate,) = found.certificates
+    hows = {entry.how for entry in certificate.entries}
     assert hows <= {How.SHOWN, How.GUARANTEE, How.ENVIRONMENT}
-    monkeypatch.setattr(refinement, "established", lambda *_: (found.certificate, {}))
+    monkeypatch.setattr(refinement, "established", lambda *_: (certificate, {}))
     assert refines(only(stronger), only(BASE)).verdict is Verdict.UNKNOWN
 
 
