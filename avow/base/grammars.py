@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 from pathlib import Path
 from typing import Any
 
-from avow.base.files import sha256
+from avow.base.files import digest_file, sha256
+from avow.base.notes import cache_folder, read_note, write_note
 
 
 def lark_of(grammar: Path, name: str, **options: Any) -> Any:
@@ -16,19 +18,33 @@ def lark_of(grammar: Path, name: str, **options: Any) -> Any:
 
     text = grammar.read_text("utf-8")
     cache = _cache_file(f"{name}-{sha256(text)[:12]}")  # two versions on one machine keep their own
-    if cache is not None:
-        try:
-            return Lark(text, cache=str(cache), **options)
-        except (OSError, ValueError, EOFError, AttributeError, KeyError):
-            pass
-    return Lark(text, **options)
+    if cache is None:
+        return Lark(text, **options)
+    note = cache.with_suffix(".json")
+    try:
+        written = digest_file(cache)
+        known = (read_note(note) or {}).get("digest") == written
+        if not known:
+            cache.unlink()
+    except FileNotFoundError:
+        known = False
+    except OSError:
+        return Lark(text, **options)
+    try:
+        parser = Lark(text, cache=str(cache), **options)
+    except (OSError, ValueError, EOFError, AttributeError, KeyError):
+        return Lark(text, **options)
+    if not known:
+        with contextlib.suppress(OSError):
+            write_note(note, {"digest": digest_file(cache)})
+    return parser
 
 
 def _cache_file(name: str) -> Path | None:
-    """A file in a folder of the user's own, since Lark's cache is a pickle."""
+    """A file in a folder of the user's own, since Lark's cache is a pickle: it is read only where this user's Avow
+    wrote it, byte for byte. Tables that somebody else put there would execute, or make `<=` of `<`."""
     try:
-        base = os.environ.get("XDG_CACHE_HOME")
-        folder = (Path(base) if base else Path.home() / ".cache") / "avow"
+        folder = cache_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK):
             return None

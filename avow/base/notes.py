@@ -13,6 +13,7 @@ import hashlib
 import hmac
 import json
 import os
+import pwd
 import secrets
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +22,7 @@ from typing import Any
 from avow.base.files import PART, read_regular, write
 
 _MARK = "mark"
+_KEY_BYTES = 32
 
 
 def write_note(path: Path, data: Mapping[str, Any]) -> None:
@@ -56,9 +58,10 @@ def unsealed(path: Path) -> bytes | None:
 
 
 def cache_folder() -> Path:
-    """Where this user's caches lie."""
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "avow"
+    """Where this user's caches lie: never in the folder that Avow is started in, which may be somebody else's."""
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    base = named if named.is_absolute() else Path.home() / ".cache"
+    return (base if base.is_absolute() else Path(pwd.getpwuid(os.getuid()).pw_dir) / ".cache") / "avow"
 
 
 def _seal(path: Path, data: bytes) -> bytes:
@@ -78,11 +81,10 @@ def _mark(path: Path, body: Mapping[str, Any]) -> str:
 def _key(folder: str) -> bytes:
     """Made when it is first needed; where it cannot be kept, one for this process alone."""
     path = Path(folder) / "notes.key"
-    try:
-        return bytes.fromhex(path.read_text())
-    except (OSError, ValueError):
-        pass
-    key = secrets.token_bytes(32)
+    kept = _kept_key(path)
+    if kept is not None:
+        return kept
+    key = secrets.token_bytes(_KEY_BYTES)
     part = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,12 +92,20 @@ def _key(folder: str) -> bytes:
         with os.fdopen(handle, "w") as file:
             file.write(key.hex())
         try:
+            if path.is_file() and path.stat().st_size != 2 * _KEY_BYTES:
+                path.unlink()
             os.link(part, path)  # of two that make one at once, the first
         finally:
             part.unlink()
     except OSError:
         pass
+    return _kept_key(path) or key
+
+
+def _kept_key(path: Path) -> bytes | None:
+    """None where there is none, or less than one: an empty file would be a key that everybody knows."""
     try:
-        return bytes.fromhex(path.read_text())
+        key = bytes.fromhex(path.read_text())
     except (OSError, ValueError):
-        return key
+        return None
+    return key if len(key) == _KEY_BYTES else None

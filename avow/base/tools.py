@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest_file, sha256, write
+from avow.base.files import digest_file, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 
@@ -103,15 +103,9 @@ def _file() -> Path:
 
 
 def _read() -> dict[str, str]:
-    try:
-        data = json.loads(_file().read_text())
-    except (OSError, ValueError):
-        return {}
-    return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}
+    return {str(k): str(v) for k, v in (read_note(_file()) or {}).items()}
 
 
 def _remember(key: str, version: str) -> None:
-    try:
-        write(_file(), json.dumps({**_read(), key: version}))
-    except OSError:  # a read-only home costs a second each time, no more
-        return
+    with contextlib.suppress(OSError):  # a read-only home costs a second each time, no more
+        write_note(_file(), {**_read(), key: version})

@@ -1,0 +1,115 @@
+"""What lies in the user's cache folder is believed only where this user's Avow wrote it."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+
+from avow.base import tools
+from avow.base.grammars import lark_of
+from avow.base.notes import cache_folder, read_note, write_note
+
+ORDERED = 'start: "a" ORDER "b"\nORDER: "<" | "<="\n'
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "avow"
+
+
+def tables(tmp_path: Path, cache: Path) -> Path:
+    """Of the grammar, which is read once and again."""
+    (tmp_path / "g.lark").write_text(ORDERED)
+    for _ in range(2):
+        parser = lark_of(tmp_path / "g.lark", "g", parser="lalr")
+        assert str(parser.parse("a<=b").children[0]) == "<="
+    (made,) = cache.glob("g-*.lark")
+    return made
+
+
+class Executed:
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self) -> object:
+        return Path.touch, (self.mark,)
+
+
+def test_tables_that_somebody_else_wrote_are_not_even_loaded(tmp_path: Path, cache: Path) -> None:
+    made = tables(tmp_path, cache)
+    kept = made.read_bytes()
+    mark = tmp_path / "executed"
+    first = kept.partition(b"\n")[0]
+    made.write_bytes(first + b"\n" + pickle.dumps(set()) + pickle.dumps(Executed(mark)))
+    tables(tmp_path, cache)
+    assert not mark.exists()
+
+
+def test_tables_of_another_grammar_do_not_stand_in(tmp_path: Path, cache: Path) -> None:
+    made = tables(tmp_path, cache)
+    (tmp_path / "other.lark").write_text(ORDERED.replace('"<="', '"<=" "b"?'))
+    first = made.read_bytes().partition(b"\n")[0]
+    lark_of(tmp_path / "other.lark", "other", parser="lalr")
+    (other,) = cache.glob("other-*.lark")
+    made.write_bytes(first + b"\n" + other.read_bytes().partition(b"\n")[2])
+    tables(tmp_path, cache)
+
+
+def test_kept_tables_are_used(tmp_path: Path, cache: Path) -> None:
+    made = tables(tmp_path, cache)
+    before = made.stat().st_mtime_ns
+    tables(tmp_path, cache)
+    assert made.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "HOME"])
+@pytest.mark.parametrize("value", [".", "cache", ""])
+def test_the_cache_is_never_in_the_folder_of_the_workspace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+) -> None:
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv(variable, value)
+    monkeypatch.chdir(tmp_path)
+    assert cache_folder().is_absolute()
+    assert not cache_folder().is_relative_to(tmp_path)
+
+
+def test_an_edited_version_of_a_tool_is_asked_again(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "bin" / "madetool"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\necho madetool 2.3.0\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(program.parent), prepend=":")
+
+    def version() -> str | None:
+        tools.find_tool.cache_clear()
+        return tools.find_tool("madetool", install="").version
+
+    assert version() == version() == "2.3.0"
+    kept = cache / "tools.json"
+    assert "2.3.0" in kept.read_text()
+    kept.write_text(kept.read_text().replace("2.3.0", "4.9.0"))
+    assert version() == "2.3.0"
+
+
+@pytest.mark.parametrize("bad", ["", "00", "no key"])
+def test_what_is_no_whole_key_marks_nothing(tmp_path: Path, cache: Path, bad: str) -> None:
+    note = tmp_path / "note.json"
+    cache.mkdir(parents=True)
+    (cache / "notes.key").write_text(bad)
+    write_note(note, {"a": 1})
+    assert read_note(note) == {"a": 1}
+    body = json.dumps([note.parts, {"a": 2}], sort_keys=True)
+    key = bytes.fromhex(bad) if bad != "no key" else b""
+    made_up = {"a": 2, "mark": hmac.new(key, body.encode(), hashlib.sha256).hexdigest()}
+    note.write_text(json.dumps(made_up))
+    assert read_note(note) is None
+    assert len(bytes.fromhex((cache / "notes.key").read_text())) == 32
