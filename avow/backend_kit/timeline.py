@@ -2,6 +2,9 @@
 
 A method leaves it in its evidence's details, under `timeline`; the report draws it. However long the run was, a lane
 has a bounded number of columns. Signals lose detail by that; marks are counted, and none is lost.
+
+Its JSON is written here and not by `avow.base.codec`: a stretch and a mark are rows without names, of which a record
+has thousands, and what another's record holds must lie within its events.
 """
 
 from __future__ import annotations

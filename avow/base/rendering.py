@@ -1,7 +1,8 @@
 """Diagnostics for people (with the source line and a caret under the place), as JSON, and as SARIF 2.1.0.
 
 Everything shown comes from files that nobody vouches for: what is not printable is made visible, never passed on to the
-terminal, and long lines are cut to what surrounds the place.
+terminal, and long lines are cut to what surrounds the place. The JSON follows `avow/language/check.schema.json`, flat
+and with every key, and is never read back: `avow.base.codec` would nest the place.
 """
 
 from __future__ import annotations

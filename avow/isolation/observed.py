@@ -2,6 +2,8 @@
 
 Who declares nothing reads all the same. So what was seen becomes part of what an answer depends on: a record is current
 only while every one of these is as it was.
+
+In a record each is a row of three texts, not the object that `avow.base.codec` makes: there may be thousands.
 """
 
 from __future__ import annotations

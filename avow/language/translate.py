@@ -1,7 +1,8 @@
 """A contract in other notations: RCL again, plain words, Unicode mathematics, LaTeX, JSON.
 
 Further notations that need more than the language floor (SMT-LIB, a backend's own) are added by the caller:
-`avow.cli.translate` holds the whole table.
+`avow.cli.translate` holds the whole table. The JSON is a notation too: each node's kind and sort as other programs name
+them, formulas as text besides; `avow.base.codec` tells no kinds, since it reads back by declared types.
 """
 
 from __future__ import annotations

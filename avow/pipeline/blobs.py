@@ -3,7 +3,8 @@
 Each part stands once in a table and is referred to by its place there, so that equal data has equal bytes, however its
 parts are shared in memory, and depth costs nothing. Places in files are left out, and paths are relative to the
 system's folder: neither is anything that an answer may depend on. Only the classes that a slice is made of, by the
-types that its fields declare, are written and made again.
+types that its fields declare, are written and made again. (`avow.base.codec` writes trees for people and other
+programs to read: a part that is shared would stand there once for each use, as deep as it is nested.)
 """
 
 from __future__ import annotations
