@@ -17,8 +17,7 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.base.verdict import bound as named
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, TooLong, demands_progress, refuted_at, refuted_prefix, violation
-from avow.calculus.node_outputs import Doubts, Stuck
-from avow.calculus.node_outputs import judge as judge_formula
+from avow.calculus.node_outputs import Doubts, Stuck, judge
 from avow.calculus.open_values import Holds
 from avow.calculus.questions import Answer
 from avow.calculus.replaying import completions, holds, truths, unsupported
@@ -93,7 +92,9 @@ class Explored:
         return self.following[memory] + stays
 
 
-def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: Machine | None = None) -> Answer:
+def judge_property(
+    frame: Frame, name: str, formula: Property, bounds: Bounds, machine: Machine | None = None
+) -> Answer:
     """Whether every run of the composed contracts has the property, within the scenario.
 
     A `machine` that answered other questions is quicker: it remembers the steps.
@@ -150,7 +151,7 @@ def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tu
     """The shortest run over the scenario at whose last step a claim is false, and nothing about it is in doubt: every
     clause was evaluated exactly at every step. Else, in words, how far it was looked for."""
     doubts = Doubts()
-    holds = judge_formula(machine.world, claim, doubts=doubts, about=name)
+    holds = judge(machine.world, claim, doubts=doubts, about=name)
     end = until(bounds.effort)
     before: dict[_Memory, tuple[_Memory, Step] | None] = {}
     try:

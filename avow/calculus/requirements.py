@@ -21,7 +21,7 @@ from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import steps
 from avow.calculus.invariants import INVARIANT, Written, further, show
-from avow.calculus.model_checking import judge, refuting_run
+from avow.calculus.model_checking import judge_property, refuting_run
 from avow.calculus.questions import Answer, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.variables import Frame, Observed, system_term
@@ -232,7 +232,7 @@ class TemporalQuestion:
             machine = composition.machine(bounds.seed)
         except CannotRun:
             machine = None  # the judge meets the same obstacle, and says what it means for the property
-        answer = judge(composition.frame, self.name, self.formula, bounds, machine)
+        answer = judge_property(composition.frame, self.name, self.formula, bounds, machine)
         if not answer.verdict.supports:
             return answer
         # every node was taken at its word, which it keeps only where its assumptions are met

@@ -21,7 +21,6 @@ from avow.sanity.results import Bounds, Finding, listing
 from avow.sanity.viability import Viability, told_apart, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted, doubted
-from avow.system.formulas import ports_of
 from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
 
 _TRIGGER = "trigger"
@@ -73,7 +72,7 @@ class OverRuns:
         if unsaid:
             name, why = next(iter(unsaid.items()))
             return Finding(Verdict.UNKNOWN, f"{name} speaks of {why.reason}")
-        spoken = {v for a in self.assumptions.values() for v in ports_of(a) if v.role is Role.OUTPUT}
+        spoken = {v for a in self.assumptions.values() for v in free_variables(a) if v.role is Role.OUTPUT}
         if spoken:
             return Finding(
                 Verdict.UNKNOWN, f"an assumption speaks of {min(v.qualified for v in spoken)} at the same step"
@@ -149,7 +148,7 @@ class OverRuns:
     def _constrained(self, name: str) -> Finding:
         output = self.node.output(name).variable
         spoken = {label: f for label, f in self.guarantees.items() if output in free_variables(f)}
-        if not any(output in ports_of(clause.formula) for clause in self.node.guarantees):
+        if not any(output in free_variables(clause.formula) for clause in self.node.guarantees):
             return Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
         if not spoken:
             return Finding(Verdict.UNKNOWN, "it is only remembered")
@@ -160,7 +159,7 @@ class OverRuns:
         found = self._possible(together, text)
         if found.verdict is not Verdict.REFUTED:
             return found
-        remembered = any(output in ports_of(cell.now) for cell in self.remembering.cells)
+        remembered = any(output in free_variables(cell.now) for cell in self.remembering.cells)
         return (
             Finding(Verdict.UNKNOWN, "it is remembered, and may matter later")
             if remembered
@@ -184,7 +183,7 @@ class OverRuns:
             return Finding(Verdict.PROVED)
         if found.verdict is not Verdict.PROVED:
             return found
-        if any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in ports_of(cell.now)):
+        if any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now)):
             return Finding(
                 Verdict.UNKNOWN, f"two values of out.{name} are possible at a step, and one may matter later"
             )

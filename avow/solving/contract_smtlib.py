@@ -12,7 +12,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.formulas.temporal.cells import compile_node
 from avow.language.contract import Contract
 from avow.language.printer import show_term
-from avow.solving.smtlib import export
+from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported
 
 
@@ -31,7 +31,7 @@ def to_smtlib(contract: Contract) -> str:
             first = " ".join(show_term(cell.begins(), "rcl").split())
             comment += f"\nbefore the first step: {first}" if cell.initial is not None else ""
         try:
-            scripts.append(export(formulas, comment=comment))
+            scripts.append(formulas_script(formulas, comment=comment))
         except Unsupported as unsupported:
             raise Rejected(
                 Diagnostic("SMT001", f"node `{node.name}` has no SMT-LIB form: {unsupported}", node.span)

@@ -463,7 +463,7 @@ def _second_opinion(labelled: Mapping[str, Term], effort: int) -> Solution | Non
     from avow.solving import smtlib
 
     try:
-        script = smtlib.export(labelled)
+        script = smtlib.formulas_script(labelled)
     except Unsupported:
         return None
     answer = smtlib.ask_cvc5(script, effort=effort)

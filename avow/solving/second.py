@@ -25,7 +25,7 @@ def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFF
     if not questions or importlib.util.find_spec("cvc5") is None:
         return False
     try:
-        script = smtlib.export([disjunction(questions)])
+        script = smtlib.formulas_script([disjunction(questions)])
     except Unsupported:
         return False
     return smtlib.ask_cvc5(script, effort=max(1, min(effort, SECOND_OPINION_EFFORT))) == "sat"

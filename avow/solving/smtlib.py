@@ -19,7 +19,7 @@ from avow.solving.z3_module import z3
 from avow.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 
 
-def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
+def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
     """A script that asks whether the formulas hold together; each is named by its label. Raises Unsupported."""
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     translator = Translator()

@@ -22,7 +22,7 @@ from avow.solving.limits import effort_told, from_seconds, spent, until
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
-from avow.solving.smtlib import export as smtlib
+from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported
 
 from .endless import endless_run
@@ -112,7 +112,7 @@ def _script(triple: Triple, condition: Condition) -> str:
     """`unsat` means that the condition holds."""
     formulas = {f"H{k}": h for k, h in enumerate(condition.hypotheses, start=1)}
     try:
-        return smtlib(
+        return formulas_script(
             {**formulas, "goal": Not(condition.goal)}, comment=f"{triple.name}: {condition.what}; valid if unsat"
         )
     except Unsupported as error:

@@ -21,7 +21,7 @@ from avow.solving.limits import from_seconds, spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
-from avow.solving.smtlib import export
+from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported
 
 from .invariants import Sequences, candidates
@@ -190,7 +190,7 @@ class Conditions:
         labelled = {**{f"F{k}": fact for k, fact in enumerate(facts, start=1)}, "denied": negation(goal)}
         with contextlib.suppress(Unsupported):
             file = f"{len(self.scripts) + 1:03d}-{name}.smt2"
-            self.scripts[file] = export(labelled, comment=f"{name}: holds if unsat")
+            self.scripts[file] = formulas_script(labelled, comment=f"{name}: holds if unsat")
 
     def never(self, run: Run, end: End) -> bool:
         """Whether the facts exclude a way out; what is assumed is not among them."""

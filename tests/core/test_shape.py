@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,6 +72,38 @@ FUNCTIONS = {"attrgetter", "itemgetter"}
 CHANGES = {"add", "append", "clear", "discard", "extend", "insert", "pop", "popitem", "remove", "setdefault", "update"}
 HOLDERS = {"ContextVar", "Lock", "RLock", "defaultdict", "deque", "dict", "list", "local", "set"}
 CACHES = {"by_identity", "cache", "lru_cache"}
+
+
+def test_the_map_shows_the_floors() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    layers = [layer.split(" | ") for layer in next(c["layers"] for c in contracts if c["type"] == "layers")]
+    held = {room.removeprefix("avow."): len(layers) - at for at, rooms in enumerate(layers) for room in rooms}
+    floor, shown = 0, dict[str, int]()
+    for number, room in re.findall(
+        r"^\| (?:(\d+) )?\| `([\w/*]+)` \|", (ROOT / "docs" / "architecture.md").read_text(), re.M
+    ):
+        floor = int(number or floor)
+        shown[room.removesuffix("/*")] = floor
+    assert shown == held
+
+
+def test_a_room_says_what_it_is_for() -> None:
+    doors = [path for name in ("avow", "backends") for path in (ROOT / name).glob("*/__init__.py")]
+    assert len(doors) > 30
+    assert [path for path in doors if not ast.get_docstring(ast.parse(path.read_text()))] == []
+
+
+def test_no_class_is_imported_by_another_name() -> None:
+    """Two of one name are met together, then: one of them is to be called what it is."""
+    assert [
+        f"{path.relative_to(ROOT)}: {name.name} as {name.asname}"
+        for folder in ("avow", "backends")
+        for path in (ROOT / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").startswith("avow"))
+        for name in node.names
+        if name.asname not in (None, name.name) and name.name.lstrip("_")[0].isupper()
+    ] == []
 
 
 def test_no_file_is_longer_than_one_can_read() -> None:

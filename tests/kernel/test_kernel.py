@@ -26,7 +26,7 @@ from avow.kernel.statements import Claimed
 from avow.kernel.text import Text
 from avow.language.load import check_text
 from avow.solving.questions import entails
-from avow.solving.smtlib import export
+from avow.solving.smtlib import formulas_script
 
 LOOP = (
     node(
@@ -232,7 +232,7 @@ def test_its_text_says_what_the_other_translation_says(formula: str) -> None:
     body = written.formula(term, lambda v: (f"|{v.name}~0|", v.sort))
     script = written.script([f"(not {body})"])
     mine, theirs = ask_z3(script, BUDGET), entails({}, term, effort=5_000).verdict
-    assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, export([term])
+    assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, formulas_script([term])
 
 
 CIRCLE = node(

@@ -32,7 +32,7 @@ from avow.language.styles import STYLES
 from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Iff, Literal, Operation, Term, Variable
 from avow.sanity.mutants import mutants
 from avow.solving.questions import entails, solve
-from avow.solving.smtlib import ask_cvc5, export
+from avow.solving.smtlib import ask_cvc5, formulas_script
 
 from .enumeration import Enumeration
 
@@ -210,7 +210,7 @@ def test_the_columns_of_one_operator_agree(name: str) -> None:
     assert name in SAMPLES, f"a formula with `{name}`, true for some values"
     formula = parse_formula(SAMPLES[name], NODE)
     row = OPERATORS[name]
-    script = export([formula])
+    script = formulas_script([formula])
     assert f"({row.smtlib} " in script or ((name in ("!=", "if") and "not" in script) or "ite" in script), script
     checked = 0
     for values in GRID:
@@ -326,7 +326,7 @@ def test_cvc5_agrees_with_enumeration(seed: int) -> None:
     for values in random.Random(seed).sample(GRID, 2):
         held = wherever_defined(term, values)
         if held is not None:
-            answer = ask_cvc5(export([term, *fixed(values, term)]), effort=10_000)
+            answer = ask_cvc5(formulas_script([term, *fixed(values, term)]), effort=10_000)
             assert answer in ("sat" if held else "unsat", "unknown"), (show_term(term, "rcl"), values)
 
 

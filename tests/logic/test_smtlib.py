@@ -12,7 +12,7 @@ from avow.language.sorts import NATURAL, REAL, STRING, SequenceSort
 from avow.language.terms import Compare, Length, Literal, Not, Role, Term, Variable
 from avow.solving import smtlib
 from avow.solving.questions import solve
-from avow.solving.smtlib import ask_cvc5, export
+from avow.solving.smtlib import ask_cvc5, formulas_script
 
 from .contracts import case_study
 from .random_formulas import formulas
@@ -32,7 +32,7 @@ def ask_z3(script: str) -> str:
 @pytest.mark.parametrize(("hypothesis", "goal"), some(LINEAR, 10))
 def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
     question = {"hypothesis": say(hypothesis), "goal": negation(say(goal))}
-    script = export(question, comment=f"{hypothesis} |- {goal}\n(check-sat)")
+    script = formulas_script(question, comment=f"{hypothesis} |- {goal}\n(check-sat)")
     expected = "unsat" if (hypothesis, goal) in TRUE_ALWAYS else "sat"
     assert ask_z3(script) in {expected, "unknown"}
     answer = ask_cvc5(script, effort=5_000)
@@ -47,7 +47,7 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
 @given(formulas())
 def test_cvc5_never_contradicts_z3(term: Term) -> None:
     answer = solve([term], effort=10_000).status
-    other = ask_cvc5(export([term]), effort=5_000)
+    other = ask_cvc5(formulas_script([term]), effort=5_000)
     assert other in {answer, "unknown"}
 
 
@@ -56,7 +56,7 @@ def test_cvc5_never_contradicts_z3(term: Term) -> None:
 @pytest.mark.parametrize("system", ["remote_inspection", "remote_inspection_published"])
 def test_the_case_study_s_clauses_export(system: str) -> None:
     for node in case_study(system).nodes:
-        script = export({clause.name: clause.formula for clause in node.clauses}, comment=node.name)
+        script = formulas_script({clause.name: clause.formula for clause in node.clauses}, comment=node.name)
         assert ask_z3(script) != "unsat"
         assert ask_cvc5(script, effort=500) in {"sat", "unknown"}
         assert all(f"|clause {clause.name}|" in script for clause in node.clauses)
@@ -65,16 +65,16 @@ def test_the_case_study_s_clauses_export(system: str) -> None:
 @pytest.mark.parametrize("text", ["a|b\\c\n(exit)", "x'", ") (assert false"])
 def test_labels_and_comments_are_data(text: str) -> None:
     s = Variable(Role.INPUT, "s'", STRING)
-    script = export({text: Compare("==", s, Literal(text, STRING))}, comment=text)
+    script = formulas_script({text: Compare("==", s, Literal(text, STRING))}, comment=text)
     assert ask_z3(script) == "sat"
     both = {text: Compare("==", s, Literal(text, STRING)), "other": Not(Compare("==", s, Literal(text, STRING)))}
-    assert ask_z3(export(both)) == "unsat"
+    assert ask_z3(formulas_script(both)) == "unsat"
 
 
 def test_the_same_question_gives_the_same_text() -> None:
     node = case_study("remote_inspection").node("agent")
     clauses = {clause.name: clause.formula for clause in node.clauses}
-    assert export(clauses) == export(clauses)
+    assert formulas_script(clauses) == formulas_script(clauses)
 
 
 def test_a_missing_or_puzzled_cvc5_says_nothing() -> None:
@@ -84,8 +84,8 @@ def test_a_missing_or_puzzled_cvc5_says_nothing() -> None:
 def test_scripts_with_sequences_say_how_cvc5_reads_them() -> None:
     reals = Variable(Role.INPUT, "s", SequenceSort(REAL))
     long = Compare("<", Literal(0, NATURAL), Length(reals, NATURAL))
-    assert export([long]).startswith("; cvc5 reads sequences with --strings-exp\n")
-    assert "strings-exp" not in export([say("in.r < 3")])
+    assert formulas_script([long]).startswith("; cvc5 reads sequences with --strings-exp\n")
+    assert "strings-exp" not in formulas_script([say("in.r < 3")])
 
 
 def test_a_cvc5_that_does_not_keep_its_time_limit_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:

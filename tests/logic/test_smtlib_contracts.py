@@ -17,7 +17,7 @@ from avow.language.contract import Contract
 from avow.language.load import check_text
 from avow.sanity.analysis import Bounds, Property, analyse
 from avow.solving.contract_smtlib import to_smtlib
-from avow.solving.smtlib import ask_cvc5, export
+from avow.solving.smtlib import ask_cvc5, formulas_script
 
 COUNT = int(os.environ.get("AVOW_SMTLIB", "10"))
 SAYS = {Verdict.PROVED: "sat", Verdict.REFUTED: "unsat"}
@@ -73,7 +73,7 @@ def test_the_exported_contract_has_the_verdict_of_sanity() -> None:
         }
         questions = {
             Property.CONSISTENT: to_smtlib(contract),
-            Property.ASSUMPTIONS_SATISFIABLE: export({a.name: a.formula for a in node.assumptions}),
+            Property.ASSUMPTIONS_SATISFIABLE: formulas_script({a.name: a.formula for a in node.assumptions}),
         }
         for about, script in questions.items():
             verdict = found[about].verdict
