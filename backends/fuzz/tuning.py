@@ -3,8 +3,8 @@
 RUNS = 20_000
 """Runs of libFuzzer where the plan says nothing: a few seconds, and a hundred times what the known mutants needed."""
 
-STEPS = 8
-"""Steps of one run at most, where the plan says nothing: what counts to five, or waits twice, comes to its end."""
+STEPS = 12
+"""Steps of one run at most, where the plan says nothing: what counts to ten, or waits twice, comes to its end."""
 
 SEEDS = 400
 """Runs drawn before libFuzzer begins, which are judged like those that it keeps: thresholds are in most of them."""
@@ -12,8 +12,8 @@ SEEDS = 400
 SEED_BYTES = (8, 24, 64, 160)
 """Their lengths: one step of a few numbers, up to several of many."""
 
-LONGEST_RUN = 1024
-"""Bytes of a run at most: eight steps of a long sequence."""
+LONGEST_RUN = 1536
+"""Bytes of a run at most: twelve steps of a long sequence."""
 
 MOST_JUDGED = 6_000
 """Kept runs that are judged, the shortest first: beyond, judging would take longer than fuzzing."""

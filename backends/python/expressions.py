@@ -122,6 +122,10 @@ class Expressions:
                 view = self.view(node.value)
                 if view is not None and not isinstance(index, ast.Slice):
                     return self.item(view, index, line)
+            case ast.Attribute():
+                raise Refusal(
+                    line, f"{ast.unparse(node)} is not in the subset: an enumeration's elements are texts here"
+                )
         raise Refusal(line, f"{type(node).__name__} is not in the subset here")
 
     # -- names -------------------------------------------------------------------------------------------

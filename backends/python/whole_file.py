@@ -19,7 +19,20 @@ MODULES: Mapping[str, frozenset[str]] = {
     "__future__": frozenset({"annotations"}),
     "math": frozenset(name for name in dir(math) if not name.startswith("_")),
     "typing": frozenset(
-        {"Any", "ClassVar", "Final", "List", "Literal", "Mapping", "Optional", "Sequence", "Tuple", "Union"}
+        {
+            "Any",
+            "ClassVar",
+            "Dict",
+            "Final",
+            "Iterable",
+            "List",
+            "Literal",
+            "Mapping",
+            "Optional",
+            "Sequence",
+            "Tuple",
+            "Union",
+        }
     ),
     "collections.abc": frozenset({"Collection", "Iterable", "Iterator", "Mapping", "Sequence", "Sized"}),
     "enum": frozenset({"Enum", "auto"}),

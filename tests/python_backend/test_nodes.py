@@ -137,3 +137,40 @@ def test_a_counted_loop_needs_no_invariant(tmp_path: Path) -> None:
     scripts = [text for name, text in report.logs.items() if name.endswith(".smt2")]
     assert scripts
     assert all("(check-sat)" in text for text in scripts)
+
+
+MODES = """\
+import enum
+from typing import Dict
+
+
+class Mode(enum.Enum):
+    off = 0
+    on = 1
+
+
+class Latch:
+    def __init__(self, params: Dict[str, float]) -> None:
+        self.mode = Mode.off
+
+    def step(self, x: float) -> Dict[str, bool]:
+        if x > 1.0:
+            self.mode = Mode.on
+        return {"lit": self.mode == Mode.on}
+"""
+LATCH = """\
+context { Mode : {off, on}; }
+node latch { inputs( x : REAL, mode : Mode ) outputs( lit : BOOL, mode : Mode ) topics()
+ guarantee stays ( in.mode == on -> out.lit )
+ guarantee off ( out.mode == off -> not out.lit ) }"""
+
+
+@pytest.mark.slow
+def test_memory_that_is_a_member_of_an_enumeration_is_given_as_one(tmp_path: Path) -> None:
+    """A class that is not understood is run all the same: of a right one nothing is refuted, of a wrong one it is."""
+    right = Example(MODES, LATCH, "Latch", {}, {"mode": "mode"})
+    found = right.settled(tmp_path / "right")
+    assert {o.verdict for o in found.values()} == {Verdict.UNKNOWN}, found
+    assert "node.py:5: the class Mode" in found["stays"].summary
+    wrong = replace(right, source=MODES.replace("self.mode == Mode.on}", "x > 1.0}")).settled(tmp_path / "wrong")
+    assert wrong["stays"].verdict is Verdict.REFUTED
