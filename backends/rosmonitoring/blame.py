@@ -181,7 +181,7 @@ class Blame:
         known = self._broken.get((edge.source.node, edge.source.port), {}).get(message)
         if known is not None:
             return known
-        if monitor.pairing is not None and monitor.pairing.waits(violation.index):
+        if monitor.waits(violation.index):
             return _Origin()
         # a node that promised nothing, since what it was told was wrong, passes that on with this message
         if monitor.pairing is not None:

@@ -22,6 +22,7 @@ from avow.ros.bags import publisher
 
 from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
+from .doubts import Doubts
 from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
@@ -43,6 +44,8 @@ class Monitor:
     guarantees: Iterable[str] | None = None
     solver: bool = True
     """Ask Z3 where evaluation alone cannot answer."""
+    graph: bool = False
+    """The events are of a running graph, where nothing orders the topics."""
     events: int = 0
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
@@ -63,6 +66,10 @@ class Monitor:
     timing: Timing = field(init=False)
     pairing: Pairing | None = None
     """Answers and the inputs that they are held against; None: the latest."""
+    doubts: Doubts | None = None
+    """On a graph, where it is the latest."""
+    kept: Pairing | None = None
+    """Either's messages, and answers that wait."""
     paired: frozenset[str] = frozenset()
     """The observed inputs."""
     assumed: tuple[str, ...] = ()
@@ -96,8 +103,10 @@ class Monitor:
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         if answers is not None and answers.by != "arrival":
             self.pairing = Pairing(answers)
-        elif remembers(self.setup.node):
-            self._so_far = SoFar(self.setup.leeway.jitter)
+        else:
+            self._so_far = SoFar(self.setup.leeway.jitter) if remembers(self.setup.node) else None
+            self.doubts = Doubts.beginning(self.values) if self.graph else None
+        self.kept = self.pairing if self.doubts is None else self.doubts.pairing
         wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
         for clause in node.clauses:
@@ -181,14 +190,14 @@ class Monitor:
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
-                if pairing is not None and name in self.paired:
-                    saw(self, pairing, name, event, None)
+                if self.kept is not None and (pairing is None or name in self.paired):
+                    saw(self, self.kept, name, event, None)
                 updated[name] = False
                 continue
             self.supposed.discard(name)
             updated[name] = True
-            if pairing is not None and name in self.paired:
-                saw(self, pairing, name, event, new)
+            if self.kept is not None and (pairing is None or name in self.paired):
+                saw(self, self.kept, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
@@ -236,6 +245,8 @@ class Monitor:
         """The same, with or without a message of these variables."""
         late = self.timing.passes(event, names)
         found = [self.violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
+        if self.doubts is not None and self.doubts.pairing.waiting:
+            self.settle(ticks(time_of(event)), found)
         for watched, deadline in overdue(self._timed, event):
             if self._so_far is not None:
                 self._so_far.note(watched)
@@ -303,8 +314,9 @@ class Monitor:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
         self.backwards = self.backwards or ("" if self._clock is None else self._clock.finish())
-        if self.pairing is not None:
+        if self.kept is not None:
             self.settle(None, found)
+        if self.pairing is not None:
             self.backwards = self.backwards or self.pairing.uneven()
         for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
             self.backwards = finish(self, watched, found) or self.backwards
@@ -315,10 +327,14 @@ class Monitor:
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
         """Judge the answers whose inputs are known by a time (None: the run is over)."""
-        assert self.pairing is not None
-        for asked, choices in self.pairing.ready(now):
+        assert self.kept is not None
+        for asked, choices in self.kept.ready(now):
             self.settled.add(id(asked.watched))
             self.judge_answer(asked, choices, found)
+
+    def waits(self, event: int) -> bool:
+        """Whether an answer of this event or an earlier one is not judged yet."""
+        return self.kept is not None and self.kept.waits(event)
 
     def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
         judge_answer(self, asked, choices, found)
@@ -430,6 +446,8 @@ class Monitor:
         late: str = "",
     ) -> None:  # fmt: skip
         tally = watched.tally
+        if self.doubts is not None and self.doubts.ask(self, watched, values, event):
+            return
         tally.judged += 1
         blame = blamed(watched, self.assumptions, values, self.solver, self._so_far, self.events)
         if blame is None:

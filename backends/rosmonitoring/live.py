@@ -23,8 +23,13 @@ from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
 from .session import Session
-from .tuning import LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
+from .tuning import LIVE_APART, LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
 from .watched import Violation
+
+UNORDERED = (
+    "nothing orders the topics of a graph: by arrival, a breach is told {} s later, where it is one whichever message "
+    "came first, and is undecided else ({})"
+)
 
 
 def follow(
@@ -41,6 +46,8 @@ def follow(
             text = f"{record} cannot be written: {error.strerror}"
             raise Rejected(Diagnostic("MON304", text)) from None
         stack.enter_context(graph)
+        if unsure := [m.setup.node.name for m in running.monitors if m.doubts is not None and m.setup.heard]:
+            warn(UNORDERED.format(float(LIVE_APART), ", ".join(unsure)))
         board = Board(running, graph, verdicts) if verdicts is not None else None
         trouble = Troubles(warn)
         ended: float | None = None

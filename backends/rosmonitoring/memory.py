@@ -90,6 +90,8 @@ class Memory:
         self._keeper = Keeper(cells, leeway.instances)
         self._leeway = leeway
         self._waiting = None if waiting is None else compile_term(waiting)
+        self._breaks: tuple[Mapping[str, Value], Fraction | None] | None = None
+        """Of what it last remembered, how long after the latest step silence breaks it."""
         self._cells = {cell.before.qualified for cell in cells}
         whole = not any(_quantified(term) for term in (formula, *(cell.now for cell in cells)))
         plain = (BOOL, INTEGER, NATURAL, REAL)
@@ -150,10 +152,13 @@ class Memory:
         silence = self.silence
         if silence is None or silence.latest is None or silence.told:
             return None
-        try:
-            after = silence.broken(self._keeper.memory)
-        except (NotEvaluable, KeyError):
-            return None
+        memory = self._keeper.memory
+        if self._breaks is None or self._breaks[0] is not memory:
+            try:
+                self._breaks = memory, silence.broken(memory)
+            except (NotEvaluable, KeyError):
+                self._breaks = memory, None
+        after = self._breaks[1]
         return None if after is None else silence.latest + after
 
     def comes(self, now: Fraction) -> None:

@@ -82,6 +82,10 @@ HEADER_BYTES = 1_000_000
 QUEUED_MESSAGES = 100_000
 """Messages of a running graph that wait to be judged; more are lost, counted and told."""
 
+LIVE_APART = Fraction(1, 2)
+"""Seconds on a running graph within which messages of two topics may be heard in another order than they were said:
+connections on one busy machine differ by some hundredths."""
+
 LIVE_PAUSE = 0.1
 """Seconds without a message after which deadlines are looked at."""
 

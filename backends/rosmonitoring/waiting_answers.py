@@ -75,14 +75,15 @@ def ask(
 
 def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[Violation]) -> None:
     """An answer's inputs are known, or why they are not."""
-    assert monitor.pairing is not None
+    pairing = monitor.kept
+    assert pairing is not None
     watched, tally = asked.watched, asked.watched.tally
-    if not isinstance(choices, str) and (met := _alike(monitor, monitor.pairing, asked, choices)) is not None:
+    if not isinstance(choices, str) and (met := _alike(monitor, pairing, asked, choices)) is not None:
         tally.aged(asked.seconds, asked.since, watched.paired)
         tally.judged += 1
         tally.triggered = tally.triggered or met
         return
-    cases = choices if isinstance(choices, str) else monitor.pairing.cases(asked, choices)
+    cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
     if isinstance(cases, str):
         tally.early += cases == EARLY
         tally.order += cases != EARLY
@@ -105,7 +106,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         said = watched.clause.sentence or watched.clause.text or watched.clause.name
         if verdict is Fault.EXCUSED:
             said += "; but an assumption does not hold"
-        event, heard = monitor.pairing.event_of(asked), asked.heard
+        event, heard = pairing.event_of(asked), asked.heard
         if heard is None:
             heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
         wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])

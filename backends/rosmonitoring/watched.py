@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
 from avow.formulas.values import Value, show
-from avow.language.contract import Clause
+from avow.language.contract import Clause, ClauseKind
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
 from avow.tuning.effort import JUDGE_EFFORT
 
@@ -202,6 +202,8 @@ def verdict_of(
         return None
     if truth:
         return "held"
+    if watched.clause.kind is ClauseKind.ASSUMPTION:
+        return Fault.ASSUMPTION
     for assumed in assumptions:
         if all(n in values for n in assumed.names) and assumed.truth_of(values, solver) is False:
             return Fault.EXCUSED

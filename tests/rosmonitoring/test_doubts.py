@@ -1,0 +1,122 @@
+"""On a running graph nothing orders the topics: a breach is told where no order makes it none."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.session import Session, session
+from avow.backends.rosmonitoring.watched import Fault, Violation
+from avow.system.plan import System
+
+from .test_pairing import MAPPING, RCL, Event
+
+Make = Callable[..., System]
+TWO = """
+node n {
+  inputs( a : REAL, b : REAL )
+  outputs( s : REAL )
+  topics( m/A a matches(in.a), m/B b matches(in.b), m/S s matches(out.s) )
+  assume alike ( in.a == in.b )
+  guarantee small ( out.s <= 10 )
+"""
+VALUES = {"in.a": "value", "in.b": "value", "out.s": "value"}
+
+
+def live(system: System) -> Session:
+    return session(system, make=partial(Monitor, graph=True))
+
+
+def judge(running: Session, events: list[Event]) -> list[Violation]:
+    return [v for event in events for v in running.step(event)] + list(running.finish())
+
+
+def tally(running: Session, clause: str) -> Any:
+    return running.monitors[0].tallies[clause]
+
+
+def answered(rng: random.Random, late: float, wrong: frozenset[int] = frozenset()) -> list[Event]:
+    """Readings that change every two seconds, each answered at once; each topic is heard up to so many seconds late."""
+    said: list[tuple[float, Event]] = []
+    last = {"r": 0.0, "s": 0.0}
+    for k in range(100):
+        high = k // 20 % 2 == 1
+        for topic, fields in (
+            ("r", {"value": 40 if high else 5}),
+            ("s", {"level": "high" if high is not (k in wrong) else "low"}),
+        ):
+            last[topic] = max(last[topic], k * 0.1 + rng.uniform(0, late))  # of one topic, in order
+            said.append((last[topic], {"topic": topic, "time": round(last[topic], 6), **fields}))
+    return [event for _, event in sorted(said, key=lambda one: one[0])]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("answers", [{}, {"answers": None}])
+def test_a_correct_node_is_never_called_broken(seed: int, answers: dict[str, Any], make_system: Make) -> None:
+    events = answered(random.Random(seed), 0.4)
+    system = make_system(RCL, MAPPING, **answers)
+    assert Fault.GUARANTEE in {v.fault for v in judge(session(system), events)}
+    running = live(system)
+    assert judge(running, events) == []
+    counted = tally(running, "low")
+    assert counted.order > 0
+    assert counted.published == counted.judged + counted.order + counted.early == 100
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_broken_in_any_order_is_found_at_its_event(seed: int, make_system: Make) -> None:
+    wrong = frozenset((10, 30, 50))  # a second from any change
+    events = answered(random.Random(seed), 0.4, wrong)
+    found = judge(live(make_system(RCL, MAPPING)), events)
+    places = [k for k, event in enumerate(events, start=1) if event["topic"] == "s"]
+    assert [(v.fault, v.index) for v in found] == [(Fault.GUARANTEE, places[k]) for k in sorted(wrong)]
+
+
+def test_what_nothing_else_could_change_is_told_by_the_initial_value_and_by_one_topic(make_system: Make) -> None:
+    mapping = {**MAPPING, "in.r": {"field": "value", "initial": 40}}
+    running = live(make_system(RCL, mapping))
+    found = judge(running, [{"topic": "s", "time": 1, "level": "low"}])
+    assert [v.clause for v in found] == ["high"]
+    running = live(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + "}", VALUES))
+    event = {"topic": "s", "time": 1, "value": 11}
+    assert [v.clause for v in running.step(event)] == ["small"]  # at once
+
+
+def test_an_assumption_about_two_topics_waits_too(make_system: Make) -> None:
+    events = [{"topic": topic, "time": k, "value": k} for k in (1, 2) for topic in "ab"]
+    running = live(make_system(TWO + "}", VALUES))
+    assert judge(running, events) == []
+    assert tally(running, "alike").order == 1
+    found = judge(live(make_system(TWO + "}", VALUES)), [*events, {"topic": "b", "time": 4, "value": 7}])
+    assert [(v.fault, v.clause, v.index) for v in found] == [(Fault.ASSUMPTION, "alike", 5)]
+
+
+def test_memory_of_several_topics_is_undecided_and_that_of_one_is_told(make_system: Make) -> None:
+    more = "  guarantee follows ( previous(in.a, 0) >= 5 -> out.s >= 5 )\n"
+    more += "  guarantee grows ( out.s >= previous(out.s, 0) )\n}"
+    running = live(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + more, VALUES))
+    events = [{"topic": t, "time": k, "value": v} for k, (t, v) in enumerate([("a", 7), ("s", 6), ("s", 4)], 1)]
+    assert [v.clause for v in judge(running, events)] == ["grows"]
+    assert tally(running, "follows").order == 1
+
+
+def test_a_filter_withholds_at_once_what_is_told_later(make_system: Make) -> None:
+    running = live(make_system(RCL, MAPPING, filter=["out.s"]))
+    events = [(0.0, "r", 40), (2.0, "s", "low"), (2.1, "s", "high"), (2.6, "s", "high"), (2.7, "s", "high")]
+    passed = []
+    found = []
+    for time, topic, value in events:
+        event = {"topic": topic, "time": time, "value" if topic == "r" else "level": value}
+        if topic == "r":
+            found += list(running.step(event))
+            continue
+        told, on = running.offer(event)
+        found += told
+        passed.append(on)
+    assert passed == [False, True, True, True]
+    assert [(v.fault, v.index) for v in found] == [(Fault.GUARANTEE, 2)]
