@@ -76,6 +76,11 @@ def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None, told: Told | 
         if told is not None:
             told(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
+    if frame.left_out:  # an example that keeps to all that was said need not keep to that
+        settled = {
+            c: s if s.circle or s.verdict is Verdict.PROVED else replace(s, verdict=Verdict.UNKNOWN)
+            for c, s in settled.items()
+        }
     loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
     return Answers(goal, settled, loops)
 

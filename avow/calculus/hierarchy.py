@@ -111,6 +111,7 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
         flat.shared,
         flat.required,
         flat.observed,
+        flat.left_out,
         nodes,
         flat=flat,
         faces=folded.faces,

@@ -84,7 +84,8 @@ class SideQuestion:
         goal = composition.goal(self.goal)
         settled = composition.settled(goal, bounds).settled[self.condition]
         if settled.verdict is not Verdict.PROVED:
-            return side_answer(settled, would_hold(composition.frame_of(goal), goal, settled))
+            frame = composition.frame_of(goal)
+            return as_far_as_shown(frame, side_answer(settled, would_hold(frame, goal, settled)))
         answer = side_answer(settled)
         found = composition.certificates.condition(goal, str(self.condition.about), bounds)
         return certified(answer, found, late=composition.certificates.late)
@@ -100,6 +101,25 @@ def certified(answer: Answer, found: Established | None, *, late: bool) -> Answe
         return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=told, vacuous=False)
     details = answer.details | {"certificate": {"key": found.key, "solvers": found.solvers}}
     return replace(answer, established=found, details=details)
+
+
+def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
+    """A refutation by a step or a run that keeps to every clause; unknown where a clause was left out, which may
+    exclude just that step or run. A circle of proofs is one whatever else is said."""
+    if not frame.left_out or answer.verdict is not Verdict.REFUTED or "circle" in answer.details:
+        return answer
+    kept = {key: value for key, value in answer.details.items() if key not in ("would_hold_if", "run")}
+    shown = answer.counterexample
+    told = None if shown is None else Counterexample(shown.values, not_kept_to(frame), shown.trace, shown.loop)
+    summary = f"{answer.summary.partition('; ')[0]}, but {not_kept_to(frame)}"
+    return replace(
+        answer, verdict=Verdict.UNKNOWN, summary=summary, counterexample=told, details=kept | {"genuine": False}
+    )
+
+
+def not_kept_to(frame: Frame) -> str:
+    """Why an example need not be one: `Frame.left_out`."""
+    return f"what has no formula of one step is left out, and may exclude it: {', '.join(frame.left_out)}"
 
 
 def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
@@ -351,6 +371,8 @@ class JointQuestion:
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         frame = composition.frame
+        if frame.left_out:
+            return Answer(Verdict.UNKNOWN, f"whether there is room cannot be told: {not_kept_to(frame)}")
         hypotheses = {
             f"{name}.{clause.name}": frame.clause(name, clause.name)
             for name in self.members

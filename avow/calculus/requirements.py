@@ -22,7 +22,7 @@ from avow.calculus.finder import Hint
 from avow.calculus.induction import steps
 from avow.calculus.invariants import INVARIANT, Written, further, show
 from avow.calculus.model_checking import judge_property, refuting_run
-from avow.calculus.questions import Answer, certified, contracts, would_hold_if
+from avow.calculus.questions import Answer, as_far_as_shown, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.variables import Frame, Observed, system_term
 from avow.formulas.formula import digest, free_variables
@@ -52,6 +52,10 @@ class FormulaQuestion:
         if self.unsaid:
             told = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
             return Answer(Verdict.UNKNOWN, told)
+        return as_far_as_shown(composition.frame, self.searched(composition, bounds))
+
+    def searched(self, composition: Composition, bounds: Bounds) -> Answer:
+        """The answer, of the clauses that have formulas of one step."""
         quick = min(QUICK_EFFORT, bounds.effort)
         answer = self.attempt(composition, replace(bounds, effort=quick))
         if answer.verdict is not Verdict.UNKNOWN:
@@ -232,7 +236,8 @@ class TemporalQuestion:
             machine = composition.machine(bounds.seed)
         except CannotRun:
             machine = None  # the judge meets the same obstacle, and says what it means for the property
-        answer = judge_property(composition.frame, self.name, self.formula, bounds, machine)
+        judged = judge_property(composition.frame, self.name, self.formula, bounds, machine)
+        answer = as_far_as_shown(composition.frame, judged)
         if not answer.verdict.supports:
             return answer
         # every node was taken at its word, which it keeps only where its assumptions are met

@@ -20,7 +20,7 @@ from avow.formulas.temporal.clock import GOES_ON, Timed, compile_timed, events, 
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, REAL, Sort
-from avow.language.terms import TRUE, Role, Term, Variable, histories
+from avow.language.terms import TRUE, Role, Term, Variable, histories, timed
 from avow.system.folding import own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
 from avow.system.graph import Edge, Graph, dataflow
@@ -129,6 +129,10 @@ class Frame:
 
     observed: Mapping[str, Observed] = field(default_factory=dict)
     """The requirements that speak of other steps."""
+
+    left_out: tuple[str, ...] = ()
+    """Guarantees (``sensor.soon``), and what the plan assumes (``in.x``), with limits in seconds that have no formula
+    of one step: no hypothesis says them, so that no example, of a step or of a run, is known to keep to them."""
 
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
@@ -348,19 +352,33 @@ def framed(system: System, graph: Graph, assumed: Sequence[Assumed], required: M
     nodes: dict[str, Node] = {}
     cells: dict[str, tuple[Cell, ...]] = {}
     given: list[Assumed] = []
+    left_out: list[str] = []
     for node in system.contract.nodes:
         own = [a for a in assumed if a.node == node.name]
         nodes[node.name], cells[node.name], said = _of_one_step(node, own, longest, together=together)
+        left_out += [
+            f"{node.name}.{g.name}"
+            for g in node.guarantees
+            if _unsaid(g.formula, nodes[node.name].clause(g.name).formula)
+        ]
+        left_out += [a.port for a, one in zip(own, said, strict=True) if _unsaid(a.formula, one.formula)]
         given += said
     given.sort(key=lambda a: [each.port for each in assumed].index(a.port))
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
     observed = {name: observing(name, term, longest, together=together) for name, term in speaking.items()}
     remembering = {name: kept for name, kept in cells.items() if kept}
     own_names = own_inputs(system, graph)
-    made = Frame(system, graph, tuple(given), own_names, constants, remembering, {}, required, observed, nodes)
+    made = Frame(
+        system, graph, tuple(given), own_names, constants, remembering, {}, required, observed, tuple(left_out), nodes
+    )
     if made.timed or observed:
         made.share()
     return made
+
+
+def _unsaid(clause: Term, said: Term) -> bool:
+    """Whether a clause with limits in seconds has no formula of one step. (`eventually` no first steps can break.)"""
+    return said == TRUE and timed(clause) is not None
 
 
 def _of_one_step(

@@ -159,3 +159,42 @@ def test_two_deadlines_belong_together(tmp_path: Path) -> None:
     assert found.verdict is Verdict.PROVED, found.summary
     assert found.details["invariants"]
     assert "certificate" in found.details
+
+
+PACED = """node a { inputs( e : BOOL ) outputs( x : BOOL ) topics() steps( every 20 ms )
+  guarantee held (held[100 ms](in.e) -> out.x) }
+"""
+OTHERWISE = "node b { inputs( x : BOOL ) outputs( y : BOOL ) topics() steps( every 30 ms )\n"
+LEFT_OUT = PACED + OTHERWISE + "assume given (x or not x and TRUE) guarantee echo (y <=> x) }\n"
+
+
+@pytest.mark.parametrize("formula", ["held[5 steps](a.e) -> a.x", "a.e -> a.x", "a.e -> within[2 steps](b.y)"])
+def test_no_example_is_known_to_keep_to_a_clause_that_is_left_out(tmp_path: Path, formula: str) -> None:
+    """Nodes whose paces contradict share no time: what the first promises in seconds no hypothesis says, and a run that
+    breaks `formula` may break that promise as well."""
+    found = required(tmp_path, LEFT_OUT, formula)
+    assert found.verdict is Verdict.UNKNOWN, found.summary
+    assert "a.held" in found.summary
+
+
+def test_with_what_is_left_out_proofs_stand_and_refutations_of_assumptions_and_room_do_not(tmp_path: Path) -> None:
+    wants = OTHERWISE + "assume given (x) guarantee echo (y <=> x) }\n"
+    assert required(tmp_path / "proof", LEFT_OUT, "b.y <=> a.x").verdict is Verdict.PROVED
+    found = outcomes(make(tmp_path / "side", PACED + wants))
+    assert found["whole.b.given"].verdict is Verdict.UNKNOWN, found["whole.b.given"].summary
+    assert "a.held" in found["whole.b.given"].summary
+    circle = OTHERWISE + "guarantee echo (x -> y) }\n"
+    found = outcomes(make(tmp_path / "room", PACED + circle, "connections: [{from: b.y, to: a.e}]"))
+    rooms = [one for name, one in found.items() if name.startswith("joint.")]
+    assert rooms
+    assert not [one for one in rooms if one.verdict is Verdict.PROVED]
+
+
+def test_a_run_over_the_scenario_keeps_to_no_clause_that_is_left_out(tmp_path: Path) -> None:
+    plan = (
+        "scenario: {domains: {in.e: [TRUE]}, steps: 8}\n"
+        "requirements: {R: {text: test, temporal: 'always not (a.e and not a.x)'}}\n"
+    )
+    found = outcomes(make(tmp_path, LEFT_OUT, plan))["R"]
+    assert found.verdict is Verdict.UNKNOWN, found.summary
+    assert "a.held" in found.summary
