@@ -22,7 +22,7 @@ from typing import Any
 from avow.base.files import PART, read_regular, write
 
 _MARK = "mark"
-_KEY_BYTES = 32
+_KEY_BYTES = hashlib.sha256().digest_size
 
 
 def write_note(path: Path, data: Mapping[str, Any]) -> None:
