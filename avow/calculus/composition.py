@@ -10,11 +10,11 @@ from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, Told, settle
-from avow.calculus.hierarchy import Level, composed_node, innermost, level, shown_contract, with_persistence
 from avow.calculus.kept_answers import ask_once
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
+from avow.calculus.subsystem_contracts import Level, composed_node, innermost, level, shown_contract, with_persistence
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.kernel.solvers import Solvers

@@ -13,7 +13,7 @@ from dataclasses import replace
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Goal, Phase, SideCondition
-from avow.calculus.hierarchy import carried, innermost
+from avow.calculus.subsystem_contracts import carried, innermost
 from avow.formulas.formula import free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import FunctionSort

@@ -21,10 +21,10 @@ from avow.calculus.composition import Composition, argument, asked, compose, com
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
 from avow.calculus.existence import circles, joined, loops, start_name
-from avow.calculus.hierarchy import innermost
 from avow.calculus.hypotheses import Resting
 from avow.calculus.requirements import requirement_question
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
+from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.variables import Frame
 from avow.evidence.claims import Reestablished
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation

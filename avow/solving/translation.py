@@ -55,7 +55,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.solving.one_point import eliminate_points, expand
+from avow.solving.one_point_rule import eliminate_points, expand
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported
 

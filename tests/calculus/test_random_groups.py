@@ -10,7 +10,7 @@ import pytest
 from avow.base.verdict import Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.discharge import Bounds
-from avow.calculus.hierarchy import innermost
+from avow.calculus.subsystem_contracts import innermost
 
 from .make import make, node, settled
 from .test_random_systems import Enumeration, random_system
