@@ -32,10 +32,12 @@ class Clock:
         self._now: Fraction | None = None
         self._waiting: list[tuple[int, Event, int]] = []
         self._dropped = False
+        self._moved = False
 
     def ready(self, index: int, event: Event, place: int) -> Iterator[tuple[int, Event, int]]:
         """The events that can be judged now, each with its number and its place in the trace."""
         read = self._read(event)
+        self._moved = self._moved or (read is not None and self._now is not None and read != self._now)
         self._now = self._now if read is None else read
         if self._now is None:
             self._dropped = len(self._waiting) == EVENTS_WITHOUT_CLOCK
@@ -51,7 +53,9 @@ class Clock:
         return None if self._now is None else {**event, "time": self._now}
 
     def finish(self) -> str:
-        """Why the run is no evidence: the clock was never read."""
+        """Why the run is no evidence: the clock was never read, or stood still."""
+        if self._by is By.SIM and self._now is not None and not self._moved:
+            return f"/clock stood still, by which the plan goes (`time: {self._by}`)"
         what = "no message of /clock came" if self._by is By.SIM else "no message had a `header.stamp`"
         if self._dropped and not self._waiting:
             what = f"more than {EVENTS_WITHOUT_CLOCK} events came before the first time"

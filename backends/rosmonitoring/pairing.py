@@ -102,6 +102,8 @@ class Said:
     value: Value | bytes | None
     place: int
     token: int | None
+    used: bool = False
+    """An answer was held against it, as the only one of its key."""
 
 
 Choices = list[list[Said]] | str
@@ -180,7 +182,10 @@ class Pairing:
             known = self.seen[name] = _Seen()
         known.count += 1
         if self.answers.by != "latency":
-            known.keep(Said(time, seconds, known.count if self.answers.by == "order" else key, value, place, token))
+            said = Said(time, seconds, known.count if self.answers.by == "order" else key, value, place, token)
+            if any(one.used and self._differ(name, one, said) for one in known.by_key.get(said.key, ())):
+                self.late = self.late or f"a message of {name} bears the key of one that was answered before"
+            known.keep(said)
             return
         if self.settled is not None and time <= self.settled:
             self.late = self.late or (
@@ -197,6 +202,11 @@ class Pairing:
         since = first - self._latency - 2 * self._jitter
         while len(messages) > 1 and messages[1].time <= since:
             messages.popleft()
+
+    def _differ(self, name: str, one: Said, other: Said) -> bool:
+        """Whether two messages have other values (one that cannot be read: any)."""
+        values = self.value_of(name, one), self.value_of(name, other)
+        return None in values or values[0] != values[1]
 
     def count(self, watched: Watched, time: Ticks) -> _Count:
         """An answer has come, which need not wait: it counts among the others all the same."""
@@ -329,6 +339,7 @@ class Pairing:
         if not alike:
             return f"no message of {name} bears the answer's {self.answers.by}"
         if len(alike) == 1:
+            alike[0].used = True
             asked.since[name] = alike[0].seconds
             asked.messages[name] = (alike[0].place,)
             return alike

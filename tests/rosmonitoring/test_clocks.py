@@ -86,3 +86,11 @@ def test_without_the_clock_nothing_is_judged(make_system: Make, monkeypatch: pyt
         late.step(event)
     late.finish()
     assert "more than 5 events" in late.backwards
+
+
+def test_a_clock_that_stands_still_is_no_evidence(make_system: Make) -> None:
+    monitor = Monitor(found(made(make_system, "sim")))
+    for event in run("sim", 9):
+        monitor.step({**event, "clock": time(1000)} if event["topic"] == "/clock" else event)
+    assert monitor.finish() == []
+    assert "/clock stood still" in monitor.backwards

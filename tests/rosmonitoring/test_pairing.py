@@ -322,3 +322,16 @@ def test_after_a_loss_order_tells_nothing(
         assert found == []
     else:
         assert "is not told by their order" in running.monitors[0].backwards
+
+
+@pytest.mark.parametrize(("again", "evidence"), [(5, True), (12, False)])
+def test_a_key_that_comes_again_with_another_value_once_it_was_answered_is_no_evidence(
+    again: int, evidence: bool, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    said = [("r", {"value": 5}), ("s", {"level": "low"}), ("r", {"value": again})]
+    events = [{"topic": topic, "time": k, "id": 1, **fields} for k, (topic, fields) in enumerate(said)]
+    trace = tmp_path / "run.jsonl"
+    trace.write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    running = session(make_system(RCL, MAPPING, answers=KEY))
+    assert list(running.run(trace)) == []
+    assert bool(running.unmonitored()) is not evidence
