@@ -117,7 +117,7 @@ class Blame:
 
     def _excuse(self, violation: Violation) -> _Origin | None:
         """Where the assumption began to fail that excuses a breach: by what the answer was held against."""
-        pairing = self.monitors[violation.node].pairing
+        pairing = self.monitors[violation.node].exact
         given = [pairing.answered.get(message, {}) for message, _ in violation.heard.values()] if pairing else []
         found = next((origin for one in given if (origin := self._by(violation.node, one)) is not None), None)
         return found or self._since(violation.node, violation.index)
@@ -184,10 +184,10 @@ class Blame:
         if monitor.waits(violation.index):
             return _Origin()
         # a node that promised nothing, since what it was told was wrong, passes that on with this message
-        if monitor.pairing is not None:
-            return self._by(edge.source.node, monitor.pairing.answered.get(message, {}))
+        if monitor.exact is not None:
+            return self._by(edge.source.node, monitor.exact.answered.get(message, {}))
         latest = all(message >= other for other, _ in violation.heard.values())
-        if latest and violation.heard and monitor.failing():
+        if latest and violation.heard and _failing(monitor):
             return self._since(edge.source.node, violation.index)
         return None
 
@@ -198,3 +198,10 @@ def _place(violation: Violation) -> str:
 
 def _inputs(node: Node, clause: str) -> list[str]:
     return [v.name for v in ports_of(node.clause(clause).formula) if v.role is Role.INPUT]
+
+
+def _failing(monitor: Monitor) -> bool:
+    """Whether an assumption does not hold of the values that are known now."""
+    monitor.catch_up()
+    known = (a for a in monitor.assumptions if a.steps is None and monitor.values.keys() >= set(a.names))
+    return any(assumed.truth_of(monitor.values, monitor.solver) is False for assumed in known)

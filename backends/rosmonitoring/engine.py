@@ -9,7 +9,7 @@ environment's door, not the node's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -23,17 +23,18 @@ from avow.ros.bags import publisher
 from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
 from .doubts import Doubts
-from .memory import UNSURE, SoFar, blamed, hear, overdue, soonest, watching
+from .memory import SoFar, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
 from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
-from .parts import came, finish, judge_part, scatter
+from .parts import came, finish, judge_part, own, scatter
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .waiting_answers import accused, ask, judge_answer, saw
+from .waiting_answers import accused, ask, doubtful, judge_answer, not_met, saw, sure, withdraw
 from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text, verdict_of
 from .wires import MappingError
+from .word import Message, Word, follow, word_of
 
 
 @dataclass(slots=True)
@@ -59,7 +60,7 @@ class Monitor:
     _seen: set[str] = field(default_factory=set)
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
-    _previous: list[tuple[str, str]] = field(default_factory=list)
+    previous: list[tuple[str, str]] = field(default_factory=list)
     clauses: dict[str, list[Watched]] = field(default_factory=dict)
     """Those that are judged when a variable is published."""
     assumptions: list[Watched] = field(default_factory=list)
@@ -72,6 +73,14 @@ class Monitor:
     """Either's messages, and answers that wait."""
     paired: frozenset[str] = frozenset()
     """The observed inputs."""
+    prompt: bool = False
+    """Breaches are told when they are seen, though they may be withdrawn (`by_order`)."""
+    by_order: dict[str, Watched] = field(default_factory=dict)
+    """The clauses of which a verdict may be of messages that do not belong together, which shows only at the end."""
+    in_doubt: list[Violation] = field(default_factory=list)
+    """Their breaches."""
+    word: Word | None = None
+    """The order of the steps, where clauses speak of others and `answers` tells it."""
     assumed: tuple[str, ...] = ()
     """What the assumptions speak of."""
     backwards: str = ""
@@ -90,28 +99,30 @@ class Monitor:
     """Those that also speak of the time between steps, assumptions first."""
     _clock: Clock | None = None
     """Where it does not go by the times of the events."""
-    _so_far: SoFar | None = None
+    since: dict[str, float] = field(default_factory=dict)
+    """When the message came that each variable's value is of, in the word."""
+    so_far: SoFar | None = None
     """Of a node whose clauses speak of other steps."""
 
     def __post_init__(self) -> None:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
         self._clock = None if self.setup.time is By.RECEIPT else Clock(self.setup.time)
         self._observe()
-        answers = self.setup.answers
-        self.paired = self.setup.heard
+        answers, self.paired = self.setup.answers, self.setup.heard
         spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
-        if answers is not None and answers.by != "arrival":
-            self.pairing = Pairing(answers)
-        else:
-            self._so_far = SoFar(self.setup.leeway.jitter) if remembers(self.setup.node) else None
-            self.doubts = Doubts.beginning(self.values) if self.graph else None
-        self.kept = self.pairing if self.doubts is None else self.doubts.pairing
         wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
-        for clause in node.clauses:
-            if clause.kind is ClauseKind.ASSUMPTION or wanted is None or clause.name in wanted:
-                self._watch(clause)
+        watched = [c for c in node.clauses if c.kind is ClauseKind.ASSUMPTION or wanted is None or c.name in wanted]
+        self.word = word_of(self.setup, watched)
+        if self.word is None and answers is not None and answers.by != "arrival":
+            self.pairing = Pairing(answers)
+        else:
+            self.so_far = SoFar(self.setup.leeway.jitter) if remembers(node) else None
+            self.doubts = Doubts.beginning(self.values) if self.graph and self.word is None else None
+        self.kept = self.pairing if self.doubts is None else self.doubts.pairing
+        for clause in watched:
+            self._watch(clause)
 
     def _observe(self) -> None:
         for name, rule in self.setup.rules.items():
@@ -120,14 +131,14 @@ class Monitor:
                 case Constant(value=value):
                     self.values[name] = value
                 case Previous(source=source, initial=initial):
-                    self._previous.append((name, source))
+                    self.previous.append((name, source))
                     self.values |= {} if initial is None else {name: initial}
                 case Fields() | Choice():
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self.values |= {} if rule.initial is None else {name: rule.initial}
                     if rule.initial is not None and getattr(rule, "hold", Hold.LATEST) is Hold.LATEST:
                         self.supposed.add(name)  # of tuples seen so far, none is what was seen
-        for name, source in self._previous:
+        for name, source in self.previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
 
@@ -141,30 +152,35 @@ class Monitor:
         event holds."""
         self.events += 1
         if self._clock is None:
-            return self._step(event, place)
+            return sure(self, self._step(event, place))
         found: list[Violation] = []
         now = self.events
         for number, each, where in self._clock.ready(now, event, place or now):
             self.events = number
             found += self._step(each, where)
         self.events = now
-        return found
+        return sure(self, found)
 
     def _step(self, event: Mapping[str, Any], place: int) -> list[Violation]:
         topic = event.get("topic")
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
-        readers = self._own(readers, event) if readers and self.setup.shared else readers
+        readers = own(self, readers, event) if readers and self.setup.shared else readers
         names = [name for name, _ in readers or ()]
-        if readers is not None and self._so_far is not None and self._timed:
-            self._so_far.hears(time_of(event), self._timed)
+        if readers is not None and self.so_far is not None and self._timed:
+            self.so_far.hears(time_of(event), self._timed)
         found = self._tick(event, set(names))
         if readers is None or not isinstance(topic, str):
             return found
         self.relevant += 1
-        if self.timing.hear(event, same_topic(topic), names):
-            self._miss(set(names))
+        missed = self.timing.hear(event, same_topic(topic), names)
+        if self.word is not None and same_topic(topic) in self.word.topics:
+            message = Message(same_topic(topic), event, self.events, place, tuple(readers), missed)
+            follow(self, self.word.hears(message), found)
+            return found
+        if missed:
+            self.miss(set(names))
             by = "arrival" if self.pairing is None else self.pairing.answers.by
             if self.pairing is not None:
                 self.pairing.lost = self.pairing.lost or by == "order"
@@ -177,8 +193,15 @@ class Monitor:
         pairing = self.pairing
         if pairing is not None and pairing.waiting:
             self.settle(ticks(time_of(event)), found)
-        self.at.update(dict.fromkeys(names, (place or self.events, publisher(event))))
-        updated: dict[str, bool] = {}
+        self.conclude(self.read(event, place, readers, found), event, found)
+        return found
+
+    def read(
+        self, event: Mapping[str, Any], place: int, readers: Sequence[tuple[str, Reader]], found: list[Violation]
+    ) -> dict[str, bool]:
+        """A message's variables, and whether they could be read."""
+        pairing, updated = self.pairing, dict[str, bool]()
+        self.at.update(dict.fromkeys((name for name, _ in readers), (place or self.events, publisher(event))))
         for name, read in readers:
             self._seen.add(name)
             old = self.values.get(name)
@@ -186,10 +209,10 @@ class Monitor:
                 new = read(event, old)
             except MappingError as error:
                 found.append(self.violation(Fault.MAPPING, name, event, str(error)))
-                self._miss({name})
+                self.miss({name})
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
-                    self._forget(name)
+                    self.forget(name)
                 if self.kept is not None and (pairing is None or name in self.paired):
                     saw(self, self.kept, name, event, None)
                 updated[name] = False
@@ -201,6 +224,10 @@ class Monitor:
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
+        return updated
+
+    def conclude(self, updated: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]) -> None:
+        """Judge what is due now that these variables have new values (where they could be read)."""
         hear(self._remembering, (name for name, readable in updated.items() if readable))
         while self._constant:
             self._judge(self._constant.pop(), event, found)
@@ -216,7 +243,16 @@ class Monitor:
                 if source in values:
                     watched.memory[name] = values[source]
         self.settle_previous()
-        return found
+
+    @property
+    def exact(self) -> Pairing | Word | None:
+        """What knows which messages an answer answered."""
+        return self.word or self.pairing
+
+    def waits(self, event: int) -> bool:
+        """Whether an answer of this event or an earlier one is not judged yet, or in doubt."""
+        waiting = any(known is not None and known.waits(event) for known in (self.kept, self.word))
+        return waiting or any(v.index <= event for v in self.in_doubt[:1])
 
     def known(self, watched: Watched, answer: Answer | None) -> Mapping[str, Value]:
         """The values by which an answer is judged: the latest, but for those of the step before, and those of its own
@@ -225,16 +261,8 @@ class Monitor:
         return values if answer is None else {**values, **answer.values}
 
     def _aged(self, watched: Watched, event: Mapping[str, Any]) -> None:
-        names = [name for name in watched.inputs if name in self.timing.heard]
-        watched.tally.aged(float(time_of(event)), self.timing.heard, names)
-
-    def _own(self, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
-        """Those of variables that a message carries, whoever else publishes its topic."""
-        unknown = [name for name, _ in readers if self.setup.whose(name, event) is None]
-        for watched in {id(w): w for name in unknown for w in self.clauses.get(name, ())}.values():
-            watched.tally.unnamed(str(event["topic"]))
-            self.lose(watched)
-        return [(name, read) for name, read in readers if self.setup.whose(name, event)]
+        heard = self.timing.heard if self.word is None else self.since
+        watched.tally.aged(float(time_of(event)), heard, [name for name in watched.inputs if name in heard])
 
     def tick(self, event: Mapping[str, Any]) -> list[Violation]:
         """Time has passed: deadlines do not wait for a message."""
@@ -248,9 +276,9 @@ class Monitor:
         if self.doubts is not None and self.doubts.pairing.waiting:
             self.settle(ticks(time_of(event)), found)
         for watched, deadline in overdue(self._timed, event):
-            if self._so_far is not None:
-                self._so_far.note(watched)
-            self._not_met(watched, self.values, {**event, "time": deadline}, found, "; no step came in time")
+            if self.so_far is not None:
+                self.so_far.note(watched)
+            not_met(self, watched, self.values, {**event, "time": deadline}, found, "; no step came in time")
         return found
 
     @property
@@ -259,13 +287,13 @@ class Monitor:
 
     def settle_previous(self) -> None:
         """An answer is over: what it said is now what the step before said."""
-        for name, source in self._previous:
+        for name, source in self.previous:
             value = self.values.get(source)
             if source in self.at:
                 self.at[name] = self.at[source]
             if value is None:
                 if source in self._seen and name in self.values:
-                    self._forget(name)
+                    self.forget(name)
             elif self.values.get(name) is not value:
                 self.values[name] = value
                 self._versions[name] += 1
@@ -284,7 +312,7 @@ class Monitor:
     def by_values(self) -> bool:
         """Whether a verdict depends on values alone, the latest or those that an answer answered, and changes nothing
         for the next."""
-        return self._so_far is None and self._clock is None
+        return self.so_far is None and self._clock is None
 
     def reader(self, name: str) -> Reader | None:
         """What reads a variable's messages; None of one whose value is made of several."""
@@ -318,12 +346,17 @@ class Monitor:
             self.settle(None, found)
         if self.pairing is not None:
             self.backwards = self.backwards or self.pairing.uneven()
+        if self.word is not None:
+            follow(self, self.word.finish(), found)
+            self.backwards = self.backwards or self.word.uneven
         for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
             self.backwards = finish(self, watched, found) or self.backwards
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
-        return found
+        found = sure(self, found, over=True)
+        found, self.in_doubt = [*self.in_doubt, *found], []
+        return withdraw(self, found) if self.backwards else found
 
     def settle(self, now: Ticks | None, found: list[Violation]) -> None:
         """Judge the answers whose inputs are known by a time (None: the run is over)."""
@@ -331,10 +364,6 @@ class Monitor:
         for asked, choices in self.kept.ready(now):
             self.settled.add(id(asked.watched))
             self.judge_answer(asked, choices, found)
-
-    def waits(self, event: int) -> bool:
-        """Whether an answer of this event or an earlier one is not judged yet."""
-        return self.kept is not None and self.kept.waits(event)
 
     def judge_answer(self, asked: Asked, choices: Choices, found: list[Violation]) -> None:
         judge_answer(self, asked, choices, found)
@@ -361,7 +390,7 @@ class Monitor:
                 due.append((watched, None))
             else:
                 watched.tally.unreadable += 1
-        if self._so_far is not None:  # whether a guarantee was promised depends on what they find
+        if self.so_far is not None:  # whether a guarantee was promised depends on what they find
             due.sort(key=lambda one: one[0].clause.kind is not ClauseKind.ASSUMPTION)
         return due
 
@@ -377,21 +406,23 @@ class Monitor:
     @property
     def remembers(self) -> bool:
         """Whether clauses of the node speak of other steps."""
-        return self._so_far is not None
+        return self.so_far is not None
 
-    def _forget(self, name: str) -> None:
+    def forget(self, name: str) -> None:
         self._versions[name] += 1
         self.values.pop(name, None)
 
     def _watch(self, clause: Clause) -> None:
         tally = self.tallies[clause.name] = Tally()
-        found = watching(self.setup, clause, tally, self._previous, self.values, self.pairing is not None)
+        found = watching(self.setup, clause, tally, self.previous, self.values, self.pairing is not None)
         if found is None:
             return
         watched, triggers = found
         if watched.steps is not None:
             self._remembering.append(watched)
             self._timed += [watched] if watched.steps.silence is not None else []
+        if doubtful(self, watched):
+            self.by_order[clause.name] = watched
         for name in triggers:
             self.clauses.setdefault(name, []).append(watched)
         if not triggers:
@@ -428,8 +459,8 @@ class Monitor:
             watched.truth = watched.truth_of(values, self.solver)
             if not supposed:
                 watched.note_trigger(values)
-        if self._so_far is not None:
-            self._so_far.note(watched)
+        if self.so_far is not None:
+            self.so_far.note(watched)
         if watched.truth is None and lost:
             tally.forgotten += 1
             return
@@ -439,28 +470,9 @@ class Monitor:
         if watched.truth:
             tally.judged += 1
             return
-        self._not_met(watched, values, event, found)
+        not_met(self, watched, values, event, found)
 
-    def _not_met(
-        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation],
-        late: str = "",
-    ) -> None:  # fmt: skip
-        tally = watched.tally
-        if self.doubts is not None and self.doubts.ask(self, watched, values, event):
-            return
-        tally.judged += 1
-        blame = blamed(watched, self.assumptions, values, self.solver, self._so_far, self.events)
-        if blame is None:
-            tally.undecided += 1
-            tally.reason = tally.reason or UNSURE
-            return
-        tally.broken += 1
-        fault, why = blame
-        if fault is Fault.EXCUSED:
-            tally.excused += 1
-        found.append(self.violation(fault, watched.clause.name, event, why + late, watched, values))
-
-    def _miss(self, names: Set[str]) -> None:
+    def miss(self, names: Set[str]) -> None:
         """Messages of these variables were lost, or could not be read."""
         for watched in (*self.assumptions, *self._remembering):
             if not names.isdisjoint(watched.names):
@@ -470,8 +482,8 @@ class Monitor:
         """A step of a clause went by unseen."""
         if watched.steps is not None:
             watched.steps.forget()
-        if self._so_far is not None and watched.clause.kind is ClauseKind.ASSUMPTION:
-            self._so_far.unsure = True
+        if self.so_far is not None and watched.clause.kind is ClauseKind.ASSUMPTION:
+            self.so_far.unsure = True
 
     def violation(
         self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: Watched | None = None,
@@ -484,9 +496,3 @@ class Monitor:
 
     def heard_of(self, names: Iterable[str]) -> Heard:
         return {name: self.at[name] for name in names if name in self.at}
-
-    def failing(self) -> bool:
-        """Whether an assumption does not hold of the values that are known now."""
-        self.catch_up()
-        known = (a for a in self.assumptions if a.steps is None and self.values.keys() >= set(a.names))
-        return any(assumed.truth_of(self.values, self.solver) is False for assumed in known)

@@ -59,7 +59,8 @@ class Telling(Monitor):
         values = {**{n: v for n, v in self.known(watched, answer).items() if n not in held}, **watched.memory}
         before = replace(watched.tally)
         Monitor._judge(self, watched, event, found, answer)
-        self._tell(watched, before, self.events, self._now, self._margin(watched, values))
+        time = self._now if self.word is None else time_of(event)
+        self._tell(watched, before, self.events, time, self._margin(watched, values))
 
     def judge_part(
         self, watched: Watched, parts: Mapping[str, Part], event: Mapping[str, Any], found: list[Violation]

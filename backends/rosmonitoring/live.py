@@ -37,8 +37,8 @@ def follow(
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
     """Judge what a graph says until it is `over`, and pass on what is filtered. Deadlines pass by this machine's clock.
-    Raises Rejected where the
-    record cannot be written."""
+    Raises Rejected where the record cannot be written."""
+    running.prompt()
     with ExitStack() as stack:
         try:
             file = stack.enter_context(record.open("w", encoding="utf-8")) if record is not None else None

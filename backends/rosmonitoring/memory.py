@@ -34,6 +34,7 @@ from .pairing import time_of
 from .rules import Choice, Fields, Previous
 from .silence import Silence, moments
 from .watched import Fault, Watched, trigger_of
+from .word import untold
 
 
 class _Unknown:
@@ -401,8 +402,8 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         if not histories(about.formula):
             continue
         where = "" if about is clause else f"the assumption {about.name}: "
-        if setup.answers is not None and setup.answers.by != "arrival":
-            return f"{where}it speaks of other steps, whose order only `answers: {{by: arrival}}` tells"
+        if setup.answers is not None and setup.answers.by != "arrival" and (reason := untold(setup, about)):
+            return where + reason
         try:
             names = watch(about, Tally(), setup).names
         except NotEvaluable as error:

@@ -14,7 +14,7 @@ from .plans import Plan, Watch, below, is_seen
 from .rules import FieldPath
 from .shapes import Shape
 from .tuning import TICKS
-from .waiting_answers import asks, judges_answers_alone, speaks
+from .waiting_answers import asks, judges_answers_alone, speaks, sure
 from .watched import Violation, Watched
 
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))
@@ -108,7 +108,7 @@ def _settling(monitor: Monitor) -> Any:
     def settle(now: int) -> list[Violation] | None:
         found: list[Violation] = []
         monitor.settle(now, found)
-        return found or None
+        return sure(monitor, found) or None
 
     return settle
 

@@ -347,7 +347,8 @@ class Pairing:
         asked.messages[name] = tuple(said.place for said in alike)
         return [*alike]
 
-    def key(self, event: Mapping[str, Any], path: FieldPath) -> object:
+    @staticmethod
+    def key(event: Mapping[str, Any], path: FieldPath) -> object:
         """By what a message is paired; None of one that does not say it."""
         if not path:
             return None

@@ -16,6 +16,7 @@ from avow.language.contract import ClauseKind
 from avow.language.printer import show_term
 
 from .pairing import ticks, time_of
+from .reading import Reader
 from .tuning import KEYS_KEPT
 from .watched import Answer, Fault, Part, Violation, Watched, open_verdict
 
@@ -156,3 +157,12 @@ def _open(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bo
         return None
     monitor.questions -= 1
     return open_verdict(watched, monitor.assumptions, values, monitor.solver)
+
+
+def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
+    """Those of variables that a message carries, whoever else publishes its topic."""
+    unknown = [name for name, _ in readers if monitor.setup.whose(name, event) is None]
+    for watched in {id(w): w for name in unknown for w in monitor.clauses.get(name, ())}.values():
+        watched.tally.unnamed(str(event["topic"]))
+        monitor.lose(watched)
+    return [(name, read) for name, read in readers if monitor.setup.whose(name, event)]

@@ -49,6 +49,11 @@ class Session:
         topics = (topic for monitor in self.monitors for topic in monitor.setup.filtered)
         self.behind_filters = {name: 0 for topic in topics for name in (topic, raw(topic))}
 
+    def prompt(self) -> None:
+        """Breaches are to be told when they are seen, also such as the end of the run may withdraw."""
+        for monitor in self.monitors:
+            monitor.prompt = True
+
     def listens(self, topic: str) -> bool:
         return any(monitor.listens(topic) for monitor in self.monitors)
 

@@ -32,6 +32,10 @@ BREACHES_KEPT = 1_000
 BREACHES_OPEN = 100
 """Broken assumptions that wait for a verdict on who said it: all are looked at whenever something is told."""
 
+BREACHES_IN_DOUBT = 10_000
+"""Breaches by order that wait for the end of the run, where it shows whether there were as many answers as inputs: some
+15 MB. Others are counted."""
+
 CANDIDATES_SHOWN = 12
 """Fields that an error names as what may be meant; a message with more is looked up anyway."""
 

@@ -9,11 +9,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
+from avow.language.contract import ClauseKind
 from avow.ros.bags import publisher
 
+from .memory import UNSURE, blamed
 from .pairing import EARLY, Asked, Choices, Pairing, Said, ticks, time_of
-from .tuning import COMBINATIONS, REMEMBERED
+from .tuning import BREACHES_IN_DOUBT, COMBINATIONS, REMEMBERED
 from .watched import Answer, Fault, Violation, Watched
+from .word import topics_of
 
 if TYPE_CHECKING:
     from .engine import Monitor
@@ -111,6 +114,85 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
             heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
         wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])
         found.append(replace(wrong, index=asked.index, heard=heard))
+
+
+def not_met(
+    monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation],
+    late: str = "",
+) -> None:  # fmt: skip
+    """A clause does not hold of the latest values, or nobody can tell."""
+    tally = watched.tally
+    if monitor.doubts is not None and monitor.doubts.ask(monitor, watched, values, event):
+        return
+    tally.judged += 1
+    blame = blamed(watched, monitor.assumptions, values, monitor.solver, monitor.so_far, monitor.events)
+    if blame is None:
+        tally.undecided += 1
+        tally.reason = tally.reason or UNSURE
+        return
+    tally.broken += 1
+    fault, why = blame
+    if fault is Fault.EXCUSED:
+        tally.excused += 1
+    found.append(monitor.violation(fault, watched.clause.name, event, why + late, watched, values))
+
+
+def doubtful(monitor: Monitor, watched: Watched) -> bool:
+    """By order: whether a verdict on a clause may be of messages that do not belong together, which shows only once the
+    run is over and there were not as many of both."""
+    setup, spoken = monitor.setup, {*watched.names}
+    if setup.answers is None or setup.answers.by != "order":
+        return False
+    if watched.clause.kind is ClauseKind.GUARANTEE:
+        return bool(setup.heard & {*spoken, *monitor.assumed}) or len(topics_of(setup, spoken)) > 1
+    return monitor.word is not None and len(topics_of(setup, spoken)) > 1
+
+
+def sure(monitor: Monitor, found: list[Violation], *, over: bool = False) -> list[Violation]:
+    """What may be told now; breaches that are in doubt wait for the end of the run."""
+    if not found or not monitor.by_order or (monitor.prompt and not over):
+        return found
+    told: list[Violation] = []
+    for violation in found:
+        if violation.fault is Fault.MAPPING or violation.clause not in monitor.by_order:
+            told.append(violation)
+        elif len(monitor.in_doubt) < BREACHES_IN_DOUBT:
+            monitor.in_doubt.append(violation)
+        else:
+            tally = monitor.by_order[violation.clause].tally
+            tally.reason = tally.reason or f"{BREACHES_IN_DOUBT} breaches are told, the others counted"
+    return told
+
+
+def withdraw(monitor: Monitor, found: list[Violation]) -> list[Violation]:
+    """There were not as many of both: what was judged of messages by their order is undecided, but where the messages'
+    numbers say which were lost: since then, nothing was judged."""
+    if monitor.exact is not None and monitor.exact.lost and len(_sent(monitor)) == 1:
+        return found
+    for watched in monitor.by_order.values():
+        tally = watched.tally
+        tally.order += tally.judged
+        tally.judged = tally.broken = tally.excused = tally.undecided = 0
+        tally.triggered = watched.trigger is None
+        tally.reason = tally.reason or monitor.backwards
+    return [v for v in found if v.fault is Fault.MAPPING or v.clause not in monitor.by_order]
+
+
+def _sent(monitor: Monitor) -> set[int]:
+    """How many messages each topic of such clauses had, with those that were lost by their numbers."""
+    if monitor.word is not None:
+        counts = set(monitor.word.counts.items())
+    else:
+        pairing = monitor.pairing
+        assert pairing is not None
+        by_name = [(name, known.count) for name, known in pairing.seen.items()]
+        for watched in monitor.by_order.values():
+            counted = pairing.counts.get(id(watched))
+            alone = dict.fromkeys(watched.outputs, counted.count if counted is not None else 0)
+            by_name += (watched.counted or alone).items()
+        counts = {(topic, count) for name, count in by_name for topic in topics_of(monitor.setup, (name,))}
+    passages = monitor.timing.passages
+    return {count + (passages[topic].lost if topic in passages else 0) for topic, count in counts}
 
 
 def _alike(monitor: Monitor, pairing: Pairing, asked: Asked, choices: list[list[Said]]) -> bool | None:

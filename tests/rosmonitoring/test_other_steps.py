@@ -260,7 +260,9 @@ def test_a_step_that_is_not_judged_is_not_forgotten(
     ("clause", "said", "options"),
     [
         ("guarantee g ( in.a -> eventually(out.b) )", "`eventually`", {}),
-        ("guarantee g ( once(in.a) -> out.b )", "by: arrival", {"answers": {"by": "stamp"}}),
+        ("guarantee g ( once(in.a) -> out.b )", "latency", {"answers": {"latency": "1 ms", "because": "measured"}}),
+        ("guarantee g ( once[2 s](in.a) -> out.b )", "limits in seconds", {"answers": {"by": "stamp"}}),
+        ("guarantee g ( once(in.a) -> out.b )", "when: any", {"answers": {"by": "stamp"}, "when": "any"}),
     ],
 )
 def test_what_is_not_monitored_is_refused_by_name(

@@ -1,0 +1,246 @@
+"""The steps of a node whose clauses speak of others, where a stamp, key, call or order tells what belongs together.
+
+Each topic keeps the order in which its publisher spoke; between topics, nothing does. So a step is what bears one key
+on all topics of the clauses, inputs before outputs, and the steps follow each other as the messages of each topic do:
+this is the word. What no step takes up before the next one (a message was lost, came twice, or bears no key) may have
+been a step that went by unseen.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from avow.formulas.formula import free_variables
+from avow.language.contract import Clause
+from avow.language.terms import Role, histories, timed
+
+from .options import Setup, same_topic
+from .pairing import Answers, Pairing, time_of
+from .reading import Reader
+from .rules import Choice, Fields, Hold, Previous
+from .tuning import KEYS_KEPT
+
+if TYPE_CHECKING:
+    from .engine import Monitor
+    from .watched import Violation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """One message of the word's topics."""
+
+    topic: str
+    event: Mapping[str, Any]
+    index: int
+    place: int
+    """In the trace."""
+    readers: tuple[tuple[str, Reader], ...]
+    """The variables that it carries."""
+    missed: bool
+    """Others of its topic before it were lost, or come later, by their numbers."""
+    key: object = None
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    inputs: tuple[Message, ...]
+    outputs: tuple[Message, ...]
+    whole: bool
+    """It is a step; else these messages belong to none, and some may have gone by unseen."""
+
+    @property
+    def missed(self) -> bool:
+        return not self.whole or any(message.missed for message in (*self.inputs, *self.outputs))
+
+
+@dataclass(slots=True)
+class Word:
+    """Puts messages in the order of the word. It keeps at most so many of each topic (`KEYS_KEPT`)."""
+
+    answers: Answers
+    topics: Mapping[str, bool]
+    """Those of the clauses; whether they carry outputs."""
+    answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
+    """As `Pairing.answered`."""
+    uneven: str = ""
+    """By order: why the answers need not be paired rightly."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """By order: the messages of each topic."""
+    lost: bool = False
+    """By order: as `Pairing.lost`."""
+    _queues: dict[str, deque[Message]] = field(default_factory=dict)
+    _where: dict[object, set[str]] = field(default_factory=dict)
+    """The topics on which a key waits."""
+    _gone: OrderedDict[object, None] = field(default_factory=OrderedDict)
+    """The latest keys that wait no more, or came twice."""
+    _answer: Fraction | None = None
+    """By order: the time of the latest answer."""
+
+    def __post_init__(self) -> None:
+        self._queues = {topic: deque() for topic in self.topics}
+
+    def hears(self, message: Message) -> Iterator[Step]:
+        """The steps that are known now that a message has come."""
+        topic, queue = message.topic, self._queues[message.topic]
+        key = self._key(message)
+        where = self._where.setdefault(key, set())
+        if key in self._gone or topic in where:  # twice on one topic: nobody knows which of the two is meant
+            self._forget(key)
+            key = object()
+            where = self._where.setdefault(key, set())
+        where.add(topic)
+        queue.append(replace(message, key=key))
+        if len(where) == len(self.topics):
+            yield from self._reach(key, self.topics)
+        elif len(queue) > KEYS_KEPT:
+            yield from self._unpaired([queue.popleft()])
+
+    def finish(self) -> Iterator[Step]:
+        """The run is over. Inputs that nothing has answered yet are in order among themselves."""
+        left = {topic: queue for topic, queue in self._queues.items() if queue}
+        if self.answers.by == "order":
+            late = [t for t, queue in left.items() if self.topics[t] or self._answer_follows(queue)]
+            counts = " and ".join(f"{self.counts.get(topic, 0)} of {topic}" for topic in self.topics)
+            self.uneven = (
+                f"messages: {counts}: which belong together is not told by their order (`answers: {{by: order}}`)"
+                if late
+                else ""
+            )
+        if not any(self.topics[topic] for topic in left) and not self.uneven:
+            for key in [message.key for queue in left.values() for message in queue]:
+                if self._where.get(key, set()) >= {t for t, output in self.topics.items() if not output}:
+                    yield from self._reach(key, left)
+        yield from self._unpaired([message for queue in self._queues.values() for message in queue])
+        for queue in self._queues.values():
+            queue.clear()
+
+    def waits(self, event: int) -> bool:
+        """Whether a message of this event or an earlier one belongs to no step yet."""
+        return any(queue and queue[0].index <= event for queue in self._queues.values())
+
+    def _answer_follows(self, queue: deque[Message]) -> bool:
+        return self._answer is not None and any(time_of(message.event) <= self._answer for message in queue)
+
+    def _key(self, message: Message) -> object:
+        topic, output = message.topic, self.topics[message.topic]
+        if self.answers.by != "order":
+            key = Pairing.key(message.event, self.answers.output if output else self.answers.input)
+            return object() if key is None else key
+        self.lost = self.lost or message.missed
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+        if output:
+            self._answer = max(time_of(message.event), self._answer or Fraction(0))
+        return object() if self.lost else self.counts[topic]
+
+    def _reach(self, key: object, topics: Mapping[str, object]) -> Iterator[Step]:
+        """The step of a key, and before it what nothing will take up any more."""
+        passed: list[Message] = []
+        taken: list[Message] = []
+        for topic in topics:
+            queue = self._queues[topic]
+            while (message := queue.popleft()).key != key:
+                passed.append(message)
+            taken.append(message)
+        yield from self._unpaired(passed)
+        self._forget(key)
+        inputs = tuple(message for message in taken if not self.topics[message.topic])
+        outputs = tuple(message for message in taken if self.topics[message.topic])
+        given = {name: (message.place,) for message in inputs for name, _ in message.readers}
+        for message in outputs:
+            self.answered[message.place] = given
+        while len(self.answered) > KEYS_KEPT:
+            self.answered.popitem(last=False)
+        yield Step(inputs, outputs, whole=True)
+
+    def _unpaired(self, messages: list[Message]) -> Iterator[Step]:
+        by_key: dict[object, list[Message]] = {}
+        for message in messages:
+            by_key.setdefault(message.key, []).append(message)
+        for key, some in by_key.items():
+            self._forget(key)
+            outputs = tuple(message for message in some if self.topics[message.topic])
+            yield Step(tuple(message for message in some if message not in outputs), outputs, whole=False)
+
+    def _forget(self, key: object) -> None:
+        self._where.pop(key, None)
+        self._gone[key] = None
+        self._gone.move_to_end(key)
+        while len(self._gone) > KEYS_KEPT:
+            self._gone.popitem(last=False)
+
+
+def follow(monitor: Monitor, steps: Iterable[Step], found: list[Violation]) -> None:
+    """Judge some steps of the word."""
+    now = monitor.events
+    for step in steps:
+        if step.missed:
+            monitor.miss({*monitor.setup.rules})
+        for part in (step.inputs, step.outputs):
+            updated: dict[str, bool] = {}
+            for message in part:
+                monitor.events = message.index
+                updated |= monitor.read(message.event, message.place, message.readers, found)
+                monitor.since |= dict.fromkeys(updated, float(time_of(message.event)))
+            if step.whole and part:
+                monitor.conclude(updated, part[-1].event, found)
+        if not step.whole:
+            _pass(monitor, {name for message in (*step.inputs, *step.outputs) for name, _ in message.readers})
+    monitor.events = now
+
+
+def _pass(monitor: Monitor, names: set[str]) -> None:
+    """Messages with these variables are part of no step: what they left is not known."""
+    for watched in {id(w): w for name in names for w in monitor.clauses.get(name, ())}.values():
+        watched.tally.published += 1
+        watched.tally.order += 1
+        watched.tally.reason = watched.tally.reason or ALONE
+        watched.memory.clear()
+    for name in names | {name for name, source in monitor.previous if source in names}:
+        if getattr(monitor.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
+            monitor.forget(name)
+
+
+def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
+    """Of some clauses that are judged together; None where none that speaks of other steps is judged by it."""
+    if setup.answers is None or setup.answers.by == "arrival":
+        return None
+    told = [clause for clause in clauses if not untold(setup, clause)]
+    if not any(histories(clause.formula) for clause in told):
+        return None
+    return Word(setup.answers, topics_of(setup, {v.qualified for c in told for v in free_variables(c.formula)}))
+
+
+def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
+    """The topics that carry some variables; whether these are outputs."""
+    sources = [rule.source if isinstance(rule := setup.rules.get(name), Previous) else name for name in names]
+    found: dict[str, bool] = {}
+    for name in sorted(sources):
+        if isinstance(rule := setup.rules.get(name), Fields | Choice):
+            found[same_topic(rule.topic)] = name.startswith(f"{Role.OUTPUT}.")
+    return found
+
+
+def untold(setup: Setup, clause: Clause) -> str:
+    """Why `answers` (other than by arrival) does not tell the steps of a clause; empty where it does."""
+    if not histories(clause.formula):
+        return ""
+    assert setup.answers is not None
+    if setup.answers.by == "latency":
+        return "it speaks of other steps, whose order `answers: {latency: …}` does not tell"
+    if timed(clause.formula) is not None:
+        return "it speaks of limits in seconds, which are judged by `answers: {by: arrival}` alone"
+    if setup.when != "outputs":
+        return f"it speaks of other steps, and with `when: {setup.when}` not every message is of one step"
+    names = [name for name, rule in setup.rules.items() if isinstance(rule, Fields | Choice)]
+    if not setup.shared.keys().isdisjoint(names):
+        return "it speaks of other steps, and several nodes publish a topic: whose step a message is of is not told"
+    sides = [topics_of(setup, [n for n in names if n.startswith(f"{Role.OUTPUT}.") is out]) for out in (False, True)]
+    both = sorted(sides[0].keys() & sides[1].keys())
+    return f"it speaks of other steps, and {both[0]} carries inputs and outputs" if both else ""
+
+
+ALONE = "a message has no counterparts, or they came in another order: a step may have gone by unseen"
