@@ -18,10 +18,10 @@ from avow.language.contract import ClauseKind, Node
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
 from avow.sanity.results import Bounds, Finding, listing
-from avow.sanity.viability import Viability, told_apart, viable
+from avow.sanity.viability import Viability, steps_of, told_apart, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted, doubted
-from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
+from avow.tuning.bounds import RUN_TO_AN_EXAMPLE, VIABILITY_ROUNDS
 
 _TRIGGER = "trigger"
 
@@ -109,9 +109,20 @@ class OverRuns:
     def _realizable(self) -> Finding:
         found = self.viability
         if found.verdict is Verdict.REFUTED:
-            steps = f" in {len(found.run.trace)} steps" if found.run is not None and found.run.trace else ""
+            steps = (
+                f" in {len(found.run.trace)} step{'s' if len(found.run.trace) > 1 else ''}"
+                if found.run is not None and found.run.trace
+                else ""
+            )
             text = found.reason or f"the environment can bring it{steps} to where no output meets the guarantees"
-            return Finding(found.verdict, text, tuple(self.guarantees), found.run)
+            return Finding(found.verdict, text, found.clauses or tuple(self.guarantees), found.run)
+        if found.verdict is Verdict.UNKNOWN and not self.node.inputs and not self.node.assumptions:
+            for length in range(1, VIABILITY_ROUNDS + 1):
+                if self._over(length):
+                    if contradicted([conjunction(self._run(length).values())]):
+                        return Finding(Verdict.ERROR, CONTRADICTED)
+                    text = f"nothing comes in, and no run of {steps_of(length)} meets the guarantees"
+                    return Finding(Verdict.REFUTED, text, tuple(self.guarantees))
         return Finding(found.verdict, found.reason)
 
     def _alone(self, claim: Claim) -> OverRuns:

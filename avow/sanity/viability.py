@@ -19,10 +19,10 @@ from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Remembering
-from avow.formulas.traversal import transform
+from avow.formulas.traversal import subterms, transform
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
-from avow.language.sorts import BOOL
+from avow.language.sorts import BOOL, Sort, TupleSort
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -38,10 +38,11 @@ from avow.language.terms import (
     Variable,
 )
 from avow.sanity.realizability import realizable
-from avow.solving.quantifier_elimination import eliminable, eliminated
+from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
 from avow.solving.questions import entails, solve
 from avow.solving.second import CONTRADICTED, contradicted
-from avow.tuning.bounds import GAME_ANSWERS, GAME_MEMORIES, VIABILITY_ROUNDS
+from avow.tuning.bounds import AHEAD_SIZE, GAME_ANSWERS, GAME_MEMORIES, INPUTS_AHEAD, VIABILITY_ROUNDS
+from avow.tuning.effort import DEFEAT_EFFORT
 
 _Memory = tuple[Value, ...]
 _Move = tuple[Mapping[str, Value], tuple[tuple[Mapping[str, Value], _Memory], ...]]
@@ -55,6 +56,8 @@ class Viability:
     verdict: Verdict
     reason: str = ""
     run: Counterexample | None = None
+    clauses: tuple[str, ...] = ()
+    """The guarantees that conflict, where they are known."""
     reachable: Term | None = None
     """The memories that runs which keep the contract can reach; None where they are not known."""
 
@@ -221,7 +224,11 @@ def _decided(contract: Contract) -> Viability:
         return game.answer()
     if contract.closed(TRUE):
         return Viability(Verdict.PROVED, "whatever was before")
-    return _approached(contract)
+    found = _defeated(contract, 1) or _approached(contract)
+    if found.verdict is Verdict.PROVED or (found.run is not None and found.run.trace):
+        return found
+    defeats = (_defeated(contract, length) for length in range(2, INPUTS_AHEAD + 1))
+    return next(filter(None, defeats), found)
 
 
 def _same(one: Term, other: Term) -> Term:
@@ -351,6 +358,58 @@ class _Game:
             steps.append((*shown, *((name, show(value)) for name, value in outputs.items())))
 
 
+def _defeated(contract: Contract, length: int) -> Viability | None:
+    """By inputs for so many first steps that are chosen ahead: as if these steps were one, whose outputs are those of
+    all of them. None where there are no such inputs, or none are found."""
+
+    def at(variable: Variable, step: int) -> Variable:
+        return Variable(variable.role, f"{variable.name} at {step}", variable.sort)
+
+    memory = dict(contract.first)
+    known, wanted = dict[str, Term](), dict[str, Term]()
+    for step in range(1, length + 1):
+        here: dict[Variable, Term] = {**memory, **{v: at(v, step) for v in (*contract.inputs, *contract.outputs)}}
+        known |= {f"{label} at {step}": substitute(f, here) for label, f in contract.assumed.items()}
+        wanted |= {f"{label} at {step}": substitute(f, here) for label, f in contract.promised.items()}
+        memory = {cell.before: substitute(cell.now, here) for cell in contract.remembering.cells}
+    inputs = [at(v, step) for step in range(1, length + 1) for v in contract.inputs]
+    outputs = [at(v, step) for step in range(1, length + 1) for v in contract.outputs]
+    if any(v in outputs for f in known.values() for v in free_variables(f)):
+        return None  # whether an input is allowed hangs on the answers
+    if not all(_plain(v.sort) for v in inputs):
+        return None
+    if sum(1 for f in wanted.values() for _ in subterms(f)) > AHEAD_SIZE:
+        return None
+    effort = min(contract.effort, DEFEAT_EFFORT)
+    answer = realizable(inputs, outputs, known, wanted, effort=effort, seed=contract.seed, doubtful=True)
+    if answer.verdict is not Verdict.REFUTED:
+        return None
+    given = {v: value_term(answer.inputs[v], v.sort) for v in inputs if v in answer.inputs}  # else: whatever it is
+    left = {label: substitute(f, given) for label, f in wanted.items()}
+    conflict = solve(left, effort=contract.effort, seed=contract.seed, shown=False)
+    if conflict.status != "unsat":
+        return None
+    contract.asked_again([conjunction(left.values())])
+    names = tuple(c.name for c in contract.remembering.node.guarantees)
+    clauses = tuple(name for name in names if any(label.rpartition(" at ")[0] == name for label in conflict.core))
+    run = tuple(
+        tuple((v.qualified, show(answer.inputs[x])) for v in contract.inputs if (x := at(v, step)) in answer.inputs)
+        for step in range(1, length + 1)
+    )
+    told = f"{'with these inputs ' if contract.inputs else ''}no outputs meet {' and '.join(clauses)} at "
+    told += "the first step" if length == 1 else f"each of the first {length} steps"
+    return Viability(Verdict.REFUTED, run=Counterexample(run[-1], told, run), clauses=clauses)
+
+
+def steps_of(number: int) -> str:
+    """A number of steps, for people."""
+    return "a step" if number == 1 else f"{number} steps"
+
+
+def _plain(sort: Sort) -> bool:
+    return isinstance(sort, ELIMINABLE) or (isinstance(sort, TupleSort) and all(map(_plain, sort.items)))
+
+
 def _approached(contract: Contract) -> Viability:
     """By eliminating quantifiers, round by round."""
     unknown = Viability(Verdict.UNKNOWN, "which memories are viable could not be worked out")
@@ -373,7 +432,7 @@ def _approached(contract: Contract) -> Viability:
                 return unknown
         following = conjunction((region, found))
         if solve([contract.at_first(following)], effort=contract.effort, shown=False).status == "unsat":
-            told = f"the environment can bring it to where no output meets the guarantees, within {number} steps"
+            told = f"the environment can bring it to where no output meets the guarantees, within {steps_of(number)}"
             return Viability(Verdict.REFUTED, told, Counterexample(explanation=told))
         if entails([region], following, effort=contract.effort, seed=contract.seed).verdict is Verdict.PROVED:
             return Viability(Verdict.PROVED) if contract.closed(region) else unknown

@@ -18,6 +18,12 @@ RUN_TO_AN_EXAMPLE = 6
 VIABILITY_ROUNDS = 8
 """Rounds in which the viable memories are approached: each eliminates quantifiers from a larger formula."""
 
+INPUTS_AHEAD = 3
+"""Steps for which inputs are chosen ahead, such that no answers go with them: each adds a copy of the contract."""
+
+AHEAD_SIZE = 20_000
+"""Operators of such a question, at most: what is remembered is written out, step into step."""
+
 CHOICES_FOUND = 300
 """Answers that the solver is asked for, where they cannot be enumerated: each costs one question."""
 

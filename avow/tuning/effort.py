@@ -132,6 +132,9 @@ quicker without."""
 CONFLICT_SEARCH_EFFORT = 1_000
 """For whether some set of guarantees can be met at every input: small sets are decided soon, or mostly not at all."""
 
+DEFEAT_EFFORT = 2_000
+"""For inputs, chosen ahead, that leave a node with memory no outputs: those of published contracts took a tenth."""
+
 CONFLICT_EFFORT = 500
 """For each of the questions that make a conflict smaller: there are many, and none of them decides anything."""
 

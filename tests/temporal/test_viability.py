@@ -70,6 +70,40 @@ def node_of(assumed: Term, promised: list[Term]) -> Node:
     )
 
 
+AHEAD = {
+    "two demands at once": (
+        """inputs( start : BOOL, stop : BOOL, n : REAL ) outputs( v : BOOL, m : REAL ) topics()
+        guarantee starts ( rose(start) -> v ) guarantee stops ( rose(stop) -> not v ) guarantee other ( m > n )""",
+        ("starts", "stops"),
+        1,
+    ),
+    "a demand that comes due": (
+        """inputs( a : BOOL, n : REAL ) outputs( v : REAL ) topics()
+        guarantee due ( a -> next(v > 3) ) guarantee low ( previous(n > 1, FALSE) -> v < 2 )""",
+        ("due", "low"),
+        2,
+    ),
+    "nothing comes in, and three steps are too many": (
+        """inputs() outputs( v : REAL ) topics()
+        guarantee up ( v >= previous(v, 0) + 2 ) guarantee low ( v <= 5 )""",
+        ("up", "low"),
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", AHEAD)
+def test_inputs_of_a_refutation_are_shown_where_there_are_numbers(name: str) -> None:
+    text, clauses, length = AHEAD[name]
+    contract, found = check_text(f"node n {{ {text} }}", "n.rcl")
+    assert contract is not None, found
+    (result,) = analyse(contract.nodes[0], wanted=frozenset({"realizable"}))
+    assert (result.verdict, result.clauses) == (Verdict.REFUTED, clauses)
+    assert result.counterexample is not None
+    assert len(result.counterexample.trace) == length
+    assert all(clause in result.counterexample.explanation for clause in clauses)
+
+
 EACH = """inputs( e : {{p, q, r}}, a : BOOL ) outputs( o : {{p, q, r}} ) topics()
   guarantee g ( forall(x in {{p, q, r}} | {} ) )"""
 
