@@ -286,10 +286,25 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
         elif event.startswith(_NETWORK):
             told("outside", "the network")
 
-    drawn = _beside("senses.py").watch_all(told)
+        elif event in _AROUND and not looking and (event != "object.__getattr__" or arguments[1] in _LEADING):
+            looking.append(event)
+            if senses.looks_around(event):
+                told("outside", "what runs it")
+            looking.clear()
+
+    looking: list[str] = []  # what it looks at itself to answer that is nothing that the subject asks for
+    senses = _beside("senses.py")
+    drawn = senses.watch_all(told)
     sys.addaudithook(hook)
     return seen, drawn
 
+
+_AROUND = frozenset(
+    {"sys._getframe", "sys._current_frames", "gc.get_objects", "gc.get_referrers", "gc.get_referents"}
+    | {"object.__getattr__"}
+)
+"""Events by which a subject may find out that it is run by a judge and not by what it is made for."""
+_LEADING = ("tb_frame", "__code__")
 
 _HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
 
