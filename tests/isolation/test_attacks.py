@@ -179,7 +179,7 @@ def test_no_attack_is_believed(tmp_path: Path, name: str, level: str, monkeypatc
         bad |= {Verdict.TESTED}  # which the core does not let count: see test_observed
     assert {*found.values()} <= bad, [o.summary for o in report.outcomes]
     assert (tmp_path / "s.py").read_text() == ATTACKS[name]
-    if name != "a program that writes" or level != "off":  # there nothing keeps it from writing: it is an error
+    if level != "off" or not name.startswith("a program that"):  # there nothing keeps it from writing: it is an error
         assert not (tmp_path / "s2.py").exists()
 
 
