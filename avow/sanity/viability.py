@@ -205,13 +205,18 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
     apart, about = contract.divided()
     try:
         found = _decided(about)
+        if found.verdict is Verdict.PROVED or not apart:
+            return found
+        match solve(apart, effort=effort, seed=seed, shown=False).status:
+            case "sat":
+                return found
+            case "unsat":
+                contract.asked_again([conjunction(apart)])
+                return Viability(Verdict.PROVED, "no input is allowed at any step")
+            case _:  # no answer
+                return Viability(Verdict.UNKNOWN, "whether its assumptions can be met is open")
     except Contradicted:
         return Viability(Verdict.ERROR, CONTRADICTED)
-    if apart:
-        possible = solve(apart, effort=effort, seed=seed, shown=False).status == "sat"
-        sure = found.verdict is Verdict.PROVED or possible
-        return found if sure else Viability(Verdict.UNKNOWN, "whether its assumptions can be met is open")
-    return found
 
 
 def _decided(contract: Contract) -> Viability:
