@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import builtins
+import importlib.util
 import os
 import sys
 
@@ -32,3 +34,14 @@ def leave_here() -> None:
     own = os.path.abspath(_OWN)  # noqa: PTH100
     sys.path[:] = [place for place in sys.path if os.path.abspath(place) not in relative - {own}]  # noqa: PTH100
     os.environ["PYTHONPATH"] = absolute_only()
+    keep_z3()
+
+
+def keep_z3() -> None:
+    """Have Z3's module, whoever imports it, load the library that came with it. By itself it looks in the folder in
+    which one happens to stand first, and on the PATH."""
+    spec = importlib.util.find_spec("z3")
+    for place in (spec.submodule_search_locations if spec is not None else None) or ():
+        here = os.path.abspath(place)  # noqa: PTH100
+        beside = [os.path.join(here, "lib"), here, os.path.join(sys.prefix, "lib")]  # noqa: PTH118
+        setattr(builtins, "Z3_LIB_DIRS", beside)  # noqa: B010 - Z3's own name for it, which no type knows

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import subprocess
-import tarfile
 import tempfile
 from collections.abc import Iterator
 from datetime import date
@@ -14,6 +11,7 @@ from avow import __version__
 from avow.assurance.codec import read_case
 from avow.assurance.compare import Snapshot, of_case, of_ledger
 from avow.assurance.model import RunInfo
+from avow.base import git
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
@@ -53,19 +51,11 @@ def snapshots(name: str | None) -> dict[str, Snapshot]:
 
 def _checkout(place: Workspace, revision: str, folder: Path) -> None:
     """The contracts as of a revision. Raises Rejected."""
-    if revision.startswith("-"):
-        raise Rejected(Diagnostic("DIFF001", f"'{revision}' is no report, ledger or revision"))
-    command = ["git", "-C", str(place.root), "archive", "--format=tar", revision, "contracts"]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=60, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise Rejected(Diagnostic("DIFF001", f"git cannot be asked for '{revision}': {error}")) from None
-    if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        why = said[-1] if said else "git failed"
-        raise Rejected(Diagnostic("DIFF001", f"'{revision}' is no report, ledger or revision here: {why}"))
-    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
-        archive.extractall(folder, filter="data")
+        git.write_files(place.root, revision, place.contracts.name, folder)
+    except (git.GitFailed, OSError) as error:
+        message = f"'{revision}' is no report, ledger or revision here: {error}"
+        raise Rejected(Diagnostic("DIFF001", message)) from None
 
 
 def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:

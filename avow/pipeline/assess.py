@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 from collections import Counter
 from collections.abc import Mapping
 from datetime import UTC, date, datetime
@@ -20,6 +19,7 @@ from avow.backend_kit.registry import backend, names
 from avow.base import codec
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, is_intact, sha256
+from avow.base.git import head
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
@@ -154,7 +154,7 @@ def build(assessment: Assessment) -> Case:
             __version__,
             assessment.run.fresh,
             f"doit verify:{system.name}",
-            _revision(workspace),
+            head(workspace.root),
             {
                 "seconds for each tool": _seconds_in_words(),
                 "seed": "0, unless the plan says otherwise",
@@ -212,15 +212,6 @@ def _tools(assessment: Assessment) -> tuple[ToolInfo, ...]:
 
 def _today() -> date:
     return datetime.now().astimezone().date()
-
-
-def _revision(workspace: Workspace) -> str:
-    command = ["git", "-C", str(workspace.root), "rev-parse", "--short=12", "HEAD"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
 
 
 def _key(assessment: Assessment) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import _ctypes
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import z3
 from helpers import some
 
 AVOW = str(Path(sys.executable).with_name("avow"))
@@ -29,6 +32,7 @@ NAMES = [
     *("hypothesis", "pygls", "doit", "jinja2", "rich", "avow/__init__", "avow/cli", "backends/__init__", "typing"),
     *("encodings/__init__", "cryptography/__init__", "jsonschema", "_avow", "antigravity"),
 ]
+SONAMES = {path.name.removeprefix("libz3.so.") for path in Path(z3.__file__).parent.glob("lib/libz3.so.*")}
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +48,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name in NAMES:
             (where / name).parent.mkdir(parents=True, exist_ok=True)
             (where / f"{name}.py").write_text(text)
+        for library in ("libz3.so", *(f"libz3.so.{version}" for version in SONAMES)):
+            shutil.copy(_ctypes.__file__, where / library)  # any library: Z3's module fails in it, where it is loaded
         (where / "evil.pth").write_text("import evil\n")
         (where / "pyvenv.cfg").write_text("home = .\n")
         (where / "pyproject.toml").write_text("[tool.avow]\nplugins = ['evil']\n[tool.doit]\n")
@@ -124,3 +130,31 @@ def test_the_language_server(place: Path) -> None:
     asked += [message(id=99, method="shutdown"), message(method="exit")]
     said = run(place, "lsp", stdin=b"".join(asked))
     assert '"id":99' in said.replace(" ", ""), said[-2000:]
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not on the PATH")
+def test_a_repository_with_programs_among_its_settings(tmp_path: Path) -> None:
+    """Filters for what is checked out or archived, hooks, what tells of changed files: none is executed."""
+    root = tmp_path / "theirs"
+    folder = root / "contracts" / "s"
+    folder.mkdir(parents=True)
+    (root / "dodo.py").touch()
+    (folder / "s.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text("system: s\nrequirements: {}\nnodes: {n: {criticality: low, methods: []}}\n")
+
+    def git(*words: str) -> None:
+        person = ("-c", "user.name=n", "-c", "user.email=e")
+        subprocess.run(["git", "-C", str(root), *person, *words], check=True, capture_output=True)
+
+    git("init", "-q")
+    git("add", "-A")
+    git("commit", "-qm", "first")
+    program = f"sh -c 'echo $0 >> {root / 'executed'}; cat'"
+    settings = ("filter.evil.smudge", "filter.evil.clean", "filter.evil.process", "core.fsmonitor", "core.pager")
+    for setting in (*settings, "diff.evil.textconv", "core.sshCommand", "core.editor"):
+        git("config", setting, program)
+    (root / ".git" / "info" / "attributes").write_text("* filter=evil diff=evil\n")
+    (folder / "s.rcl").write_text(RCL.replace("<= 1", "<= 2"))
+    said = run(root, "diff", "HEAD")
+    assert "s/n/guarantee/g" in said, said
+    run(root, "report")
