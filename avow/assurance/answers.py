@@ -121,15 +121,24 @@ class Supposition:
 
     @property
     def words(self) -> str:
-        return self.says or NO_WORDS
+        """Plain words, or where to write them."""
+        if self.says:
+            return self.says
+        section, _, rest = self.key.partition(".")
+        method, of_text, _ = rest.partition(":")
+        if section == "suppositions":
+            where = f"suppositions.{method}.WORD, with a word of its text" if of_text else self.key
+        elif section == "assumption":
+            where = "environment, in an entry that assumes it"
+        else:
+            where = self.key
+        return f"(no plain words yet: write says: … under {where}, in plan.yaml)"
 
     @property
     def needing(self) -> tuple[str, ...]:
         """Whose supposition it is, for the column *needed by*."""
         return self.needed_by or ("guarantees only",)
 
-
-NO_WORDS = "(no plain words yet)"
 
 EARLIER = "As of an earlier state"
 """Before the title of a case whose system cannot be read as it stands now, or is gone."""

@@ -21,6 +21,10 @@ ENVELOPE = ("topic", "time")
 PUBLISHER = "_publisher"
 """Where an event has the whole name of the node that published it, if it is known."""
 
+LIVE = "_live"
+"""Marks an event that was heard on a running graph, where each topic has its own connection: the order in which such
+events came is not the order of cause."""
+
 WHOLE = "_message"
 """Where an event has its whole message, if that has fields of those names."""
 

@@ -143,8 +143,8 @@ def _of_json(text: str) -> Listing:
     return Listing(tuple(nodes), types)
 
 
-class _Patient(xmlrpc.client.Transport):
-    """One that does not wait for ever."""
+class _Bounded(xmlrpc.client.Transport):
+    """Waits `MASTER_SECONDS` for an answer, not for ever."""
 
     def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)
@@ -152,13 +152,22 @@ class _Patient(xmlrpc.client.Transport):
         return connection
 
 
+FAILURES = (OSError, HTTPException, ExpatError, xmlrpc.client.Error, ValueError, TypeError)
+"""What a call of `interface` raises where nobody answers, or not as ROS does."""
+
+
+def interface(uri: str) -> Any:
+    """The XML-RPC interface of a ROS 1 master or node; a context."""
+    return xmlrpc.client.ServerProxy(uri, transport=_Bounded(), allow_none=True)
+
+
 def ask_master(uri: str) -> Listing:
     """The graph that a running ROS 1 master knows. Raises NoListing where none answers."""
     try:
-        with xmlrpc.client.ServerProxy(uri, transport=_Patient()) as master:
-            graph: Any = master.getSystemState("/avow")
-            topics: Any = master.getTopicTypes("/avow")
-    except (OSError, HTTPException, ExpatError, xmlrpc.client.Error, ValueError, TypeError) as error:
+        with interface(uri) as master:
+            graph = master.getSystemState("/avow")
+            topics = master.getTopicTypes("/avow")
+    except FAILURES as error:
         raise NoListing(f"no ROS 1 master answers at {uri}: {error}") from None
     try:
         sides: dict[str, dict[str, list[str]]] = {}

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, assert_never
 
+from avow.backend_kit.programs.judging import to_return
 from avow.language.contract import Node
 from avow.language.sorts import (
     BoolSort,
@@ -447,9 +448,9 @@ class Translator(Expressions):
             case ast.expr() if len(outputs) == 1:
                 given = {next(iter(outputs)): value}
             case _:
-                raise Refusal(line, f"a step returns a dict of {', '.join(sorted(outputs)) or 'nothing'}")
+                raise Refusal(line, f"a step returns {to_return(outputs)}")
         if set(given) != set(outputs):
-            raise Refusal(line, f"a step returns {', '.join(sorted(outputs))}, here {', '.join(sorted(given))}")
+            raise Refusal(line, f"a step returns {to_return(outputs)}, here {', '.join(sorted(given)) or '{}'}")
         return Give(tuple((name, self.output(name, part, line)) for name, part in given.items()), line)
 
     def output(self, name: str, value: ast.expr, line: int) -> Expr:

@@ -227,18 +227,14 @@ class _Run:
         self.unknown = ""
         self.violations: list[Violation] = []
         self.first: dict[str, Violation] = {}
-        self.mapping_faults = 0
         self.marks = Marks()
         self.heard: Signals | None = None
 
     def note(self, violations: Iterable[Violation]) -> None:
-        from .watched import Fault
-
         for violation in violations:
             if violation.node != self.monitor.setup.node.name:
                 continue
             self.marks.note(violation)
-            self.mapping_faults += violation.fault is Fault.MAPPING
             self.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
             if len(self.violations) < VIOLATIONS_KEPT:
                 self.violations.append(violation)

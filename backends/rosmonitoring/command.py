@@ -8,7 +8,6 @@ import sys
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -162,8 +161,8 @@ def _live(
     from .session import session
 
     seconds, host, enforce, record, verdicts = how
-    running = session(system, nodes, make=partial(telling.monitor, graph=True))
-    graph = graph_of(live, running, host, enforce=enforce)
+    running = session(system, nodes, make=telling.monitor)
+    graph = graph_of(live, running, host, enforce=enforce, warn=_warn)
     with _until(seconds) as over:
         found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
         return _told(running, found, str(record or ""), telling)

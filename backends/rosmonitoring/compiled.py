@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.bags import LIVE
 
 from .bags import Event
 from .engine import Monitor
@@ -159,6 +160,10 @@ class Compiled:
         self._flush()
         raw = event.get("topic")
         topic = raw if isinstance(raw, str) else ""
+        if self._by_values and LIVE in event and any(watch.monitor.by_arrival for watch in self._watches):
+            self._by_values = False  # from now on answers wait for what is heard after them
+            self._shapes.clear()
+            self._scan, self._handlers = self._compile()
         if not self._by_values and any(watch.monitor.listens(topic) for watch in self._watches):
             self._heard(topic, 1)
             found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]

@@ -49,10 +49,11 @@ class Doubts:
         spoken = [n for n in dict.fromkeys(monitor.spoken(watched)) if n in values]
         topics = {n: same_topic(r.topic) for n in spoken if isinstance(r := monitor.setup.rules[n], Fields | Choice)}
         inputs = tuple(n for n, of in topics.items() if of != topic)
-        remembers = watched.steps is not None or (monitor.remembers and watched.clause.kind is ClauseKind.GUARANTEE)
+        guarantee = watched.clause.kind is ClauseKind.GUARANTEE
+        remembers = watched.steps is not None or (monitor.so_far is not None and guarantee)
         if not inputs or (remembers and watched.clause.pace is not None):
             return False
-        if watched.clause.kind is ClauseKind.GUARANTEE:
+        if guarantee:
             self.latest = monitor.events
         if remembers:
             if len(set(topics.values())) < 2:

@@ -18,7 +18,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
-from avow.ros.bags import publisher
+from avow.ros.bags import LIVE, publisher
 
 from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
@@ -45,8 +45,6 @@ class Monitor:
     guarantees: Iterable[str] | None = None
     solver: bool = True
     """Ask Z3 where evaluation alone cannot answer."""
-    graph: bool = False
-    """The events are of a running graph, where nothing orders the topics."""
     events: int = 0
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
@@ -68,9 +66,7 @@ class Monitor:
     pairing: Pairing | None = None
     """Answers and the inputs that they are held against; None: the latest."""
     doubts: Doubts | None = None
-    """On a graph, where it is the latest."""
-    kept: Pairing | None = None
-    """Either's messages, and answers that wait."""
+    """Where it is the latest, since an event came that was heard on a running graph."""
     paired: frozenset[str] = frozenset()
     """The observed inputs."""
     prompt: bool = False
@@ -119,8 +115,6 @@ class Monitor:
             self.pairing = Pairing(answers)
         else:
             self.so_far = SoFar(self.setup.leeway.jitter) if remembers(node) else None
-            self.doubts = Doubts.beginning(self.values) if self.graph and self.word is None else None
-        self.kept = self.pairing if self.doubts is None else self.doubts.pairing
         for clause in watched:
             self._watch(clause)
 
@@ -166,6 +160,8 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
+        if LIVE in event and self.by_arrival and self.doubts is None:
+            self.doubts = Doubts.beginning(self.values)
         readers = own(self, readers, event) if readers and self.setup.shared else readers
         names = [name for name, _ in readers or ()]
         if readers is not None and self.so_far is not None and self._timed:
@@ -243,6 +239,16 @@ class Monitor:
                 if source in values:
                     watched.memory[name] = values[source]
         self.settle_previous()
+
+    @property
+    def by_arrival(self) -> bool:
+        """Whether an answer is held against what came before it."""
+        return self.pairing is None and self.word is None
+
+    @property
+    def kept(self) -> Pairing | None:
+        """Messages of inputs, and answers that wait for them."""
+        return self.pairing if self.doubts is None else self.doubts.pairing
 
     @property
     def exact(self) -> Pairing | Word | None:
@@ -402,11 +408,6 @@ class Monitor:
     def spoken(self, watched: Watched) -> tuple[str, ...]:
         """What a clause and the assumptions speak of."""
         return (*watched.names, *(n for assumed in self.assumptions for n in assumed.names))
-
-    @property
-    def remembers(self) -> bool:
-        """Whether clauses of the node speak of other steps."""
-        return self.so_far is not None
 
     def forget(self, name: str) -> None:
         self._versions[name] += 1

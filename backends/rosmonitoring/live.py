@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.bags import LIVE
 from avow.ros.calls import is_part
 from avow.ros.dds import domain_of
 
@@ -37,7 +38,7 @@ def follow(
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
     """Judge what a graph says until it is `over`, and pass on what is filtered. Deadlines pass by this machine's clock.
-    Raises Rejected where the record cannot be written."""
+    What is judged, and recorded, is marked as heard `LIVE`. Raises Rejected where the record cannot be written."""
     running.prompt()
     with ExitStack() as stack:
         try:
@@ -46,7 +47,7 @@ def follow(
             text = f"{record} cannot be written: {error.strerror}"
             raise Rejected(Diagnostic("MON304", text)) from None
         stack.enter_context(graph)
-        if unsure := [m.setup.node.name for m in running.monitors if m.doubts is not None and m.setup.heard]:
+        if unsure := [m.setup.node.name for m in running.monitors if m.by_arrival and m.setup.heard]:
             warn(UNORDERED.format(float(LIVE_APART), ", ".join(unsure)))
         board = Board(running, graph, verdicts) if verdicts is not None else None
         trouble = Troubles(warn)
@@ -97,10 +98,10 @@ class Troubles:
             self.tell(heard.trouble)
             return None
         try:
-            return heard.read()
+            return {**heard.read(), LIVE: True}
         except ValueError as error:
             self.tell(str(error))
-            return {"topic": heard.topic, "time": heard.time}
+            return {"topic": heard.topic, "time": heard.time, LIVE: True}
 
     def tell(self, text: str) -> None:
         if text not in self._told and len(self._told) < TOPICS_KEPT:
@@ -149,20 +150,27 @@ class Board:
             yield Status(name, ERROR, violation.text())
 
 
-def graph_of(text: str, running: Session, host: str, *, enforce: bool = False) -> Graph:
-    """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. Raises Rejected."""
+def graph_of(
+    text: str, running: Session, host: str, *, enforce: bool = False, warn: Callable[[str], None] = lambda text: None
+) -> Graph:
+    """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. `warn`: as `Ros1`.
+    Raises Rejected."""
     calls = [topic for topic in running.topics if is_part(topic)]
-    graph = _graph(text, [topic for topic in running.topics if topic not in calls], running, host, enforce=enforce)
+    graph = _graph(
+        text, [topic for topic in running.topics if topic not in calls], running, host, warn, enforce=enforce
+    )
     for topic in calls:
         graph.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
     return graph
 
 
-def _graph(text: str, heard: list[str], running: Session, host: str, *, enforce: bool) -> Graph:
+def _graph(
+    text: str, heard: list[str], running: Session, host: str, warn: Callable[[str], None], *, enforce: bool
+) -> Graph:
     kind, _, address = text.partition(":")
     topics = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
     if kind == "ros1":
-        return Ros1(master_of(text), heard, host, topics)
+        return Ros1(master_of(text), heard, host, topics, warn)
     if enforce:
         raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
     if kind == "dds":

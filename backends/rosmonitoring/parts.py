@@ -93,7 +93,7 @@ def judge_part(
         tally.unreadable += 1
         return
     values: dict[str, Value] = {n: v for part in parts.values() for n, v in (part.values or {}).items()}
-    truth = None if watched.scattered or monitor.remembers else _open(monitor, watched, values)
+    truth = None if watched.scattered or monitor.so_far is not None else _open(monitor, watched, values)
     if truth is None:
         tally.partial += 1
         tally.reason = tally.reason or (SCATTERED if watched.scattered else "")

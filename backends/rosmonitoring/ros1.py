@@ -12,7 +12,6 @@ import socket
 import struct
 import threading
 import time
-import xmlrpc.client
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from contextlib import suppress
 from functools import partial
@@ -23,10 +22,11 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
+from avow.ros.listing import FAILURES, interface
 
 from .enforce import raw
 from .graphs import Inbox, Status
-from .tuning import FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS
+from .tuning import AGAIN_SECONDS, FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS, MASTER_ATTEMPTS, PUBLISHER_SECONDS
 
 CALLER = "/avow_monitor"
 HOST = "127.0.0.1"
@@ -43,24 +43,29 @@ class _Handler(SimpleXMLRPCRequestHandler):
 class Ros1:
     """Hears the topics of a graph; use it as a context."""
 
-    def __init__(self, master: str, topics: Iterable[str], host: str = HOST, filtered: Set[str] = frozenset()) -> None:
+    def __init__(
+        self, master: str, topics: Iterable[str], host: str = HOST, filtered: Set[str] = frozenset(),
+        warn: Callable[[str], None] = lambda text: None,
+    ) -> None:  # fmt: skip
         """`host`: the name or address at which the graph's nodes find this one. `filtered`: of these topics (without
-        their leading slash) only what is passed on is published, of what is said where `raw` calls it."""
+        their leading slash) only what is passed on is published, of what is said where `raw` calls it. `warn`: is told
+        that a master is waited for."""
         self.host = host
+        self._warn = warn
         topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
         self._filtered = {raw(topic): topic for topic in topics if topic[1:] in filtered}
         self.topics = (*topics, *self._filtered)
         self.inbox = Inbox()
         self._uri = master
-        self._master = xmlrpc.client.ServerProxy(master, allow_none=True)
-        self._known: set[tuple[str, str]] = set()
+        self._heard: dict[tuple[str, str], threading.Event] = {}
+        """(topic, publisher) → set once the master names it no more."""
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._spoken: dict[str, Spoken] = {}
         self._speaking = threading.Lock()
 
     def __enter__(self) -> Ros1:
-        """Raises Rejected where there is no master."""
+        """Raises Rejected where no master answers, also not while it is asked again for some seconds."""
         self._slave = _Server((self.host, 0), requestHandler=_Handler, logRequests=False, allow_none=True)
         calls: dict[str, Any] = {"publisherUpdate": self._publishers, "requestTopic": self._requested}
         for name, call in calls.items():
@@ -81,11 +86,11 @@ class Ros1:
     def __exit__(self, *_: object) -> None:
         self._over.set()
         for topic in self.topics:
-            with suppress(OSError, xmlrpc.client.Error):
-                self._master.unregisterSubscriber(CALLER, topic, self.uri)
+            with suppress(Rejected):
+                self._asked("unregisterSubscriber", CALLER, topic, self.uri)
         for spoken in self._spoken.values():
-            with suppress(OSError, xmlrpc.client.Error):
-                self._master.unregisterPublisher(CALLER, spoken.topic, self.uri)
+            with suppress(Rejected):
+                self._asked("unregisterPublisher", CALLER, spoken.topic, self.uri)
             spoken.close()
         self._slave.shutdown()
         self._slave.server_close()
@@ -137,11 +142,19 @@ class Ros1:
         return say
 
     def _asked(self, call: str, *arguments: Any) -> tuple[int, str, Any]:
-        try:
-            code, text, value = getattr(self._master, call)(*arguments)
-        except (OSError, xmlrpc.client.Error, ValueError) as error:
-            text = f"no ROS 1 master answers at {self._uri}: {error}"
-            raise Rejected(Diagnostic("MON303", text, hint="--live ros1:http://host:11311")) from None
+        """What the master says, which may be about to start. Raises Rejected."""
+        for attempt in range(MASTER_ATTEMPTS):
+            try:
+                with interface(self._uri) as master:
+                    code, text, value = getattr(master, call)(*arguments)
+                break
+            except FAILURES as error:
+                text = f"no ROS 1 master answers at {self._uri}: {error}"
+                if self._over.is_set() or attempt + 1 == MASTER_ATTEMPTS:
+                    raise Rejected(Diagnostic("MON303", text, hint="--live ros1:http://host:11311")) from None
+                if not attempt:
+                    self._warn(f"{text}; it is asked again for {MASTER_ATTEMPTS * AGAIN_SECONDS:g} s")
+                self._over.wait(AGAIN_SECONDS)
         if code != 1:
             raise Rejected(Diagnostic("MON303", f"the master at {self._uri} refuses {call}: {text}"))
         return code, text, value
@@ -163,37 +176,51 @@ class Ros1:
                         self.inbox.trouble(topic, text)
                 return 1, "", 0
             for uri in publishers:
-                if (topic, uri) not in self._known and uri != getattr(self, "uri", None):
-                    self._known.add((topic, uri))
-                    threading.Thread(target=self._listen, args=(topic, uri), daemon=True).start()
-            self._known -= {(t, uri) for t, uri in self._known if t == topic and uri not in publishers}
+                if (topic, uri) not in self._heard and uri != getattr(self, "uri", None):
+                    gone = self._heard[topic, uri] = threading.Event()
+                    threading.Thread(target=self._listen, args=(topic, uri, gone), daemon=True).start()
+            for key in [k for k in self._heard if k[0] == topic and k[1] not in publishers]:
+                self._heard.pop(key).set()
         return 1, "", 0
 
-    def _listen(self, topic: str, uri: str) -> None:
-        """Hear one publisher of a topic until it is gone."""
-        try:
-            other: Any = xmlrpc.client.ServerProxy(uri)
+    def _listen(self, topic: str, uri: str, gone: threading.Event) -> None:
+        """Hear one publisher of a topic for as long as the master names it; where it cannot be reached, or breaks off,
+        again."""
+        while not (self._over.is_set() or gone.is_set()):
+            try:
+                self._hear(topic, uri, gone)
+            except (ValueError, Rejected) as error:  # what it says cannot be read, now or later
+                self._trouble(topic, uri, str(error))
+                break
+            except FAILURES as error:
+                if not isinstance(error, EOFError):
+                    self._trouble(topic, uri, f"{error}; it is asked again")
+            gone.wait(AGAIN_SECONDS)
+        with self._lock:
+            if self._heard.get((topic, uri)) is gone:
+                del self._heard[topic, uri]
+
+    def _trouble(self, topic: str, uri: str, text: str) -> None:
+        if not self._over.is_set():
+            self.inbox.trouble(topic, f"{topic} from {uri}: {text}")
+
+    def _hear(self, topic: str, uri: str, gone: threading.Event) -> None:
+        """Hear one publisher until the connection is closed. Raises Rejected, ValueError, and those of `FAILURES`."""
+        with interface(uri) as other:
             code, text, protocol = other.requestTopic(CALLER, topic, [["TCPROS"]])
-            if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
-                self.inbox.trouble(topic, f"{uri} does not speak TCPROS: {text}")
-                return
-            with socket.create_connection((str(protocol[1]), int(protocol[2])), timeout=5) as line:
-                line.settimeout(None)
-                wanted = {"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}
-                line.sendall(header(wanted))
-                fields = read_header(line)
-                read = reader(topic, fields)
-                forward = self._forward(topic, fields)
-                while not self._over.is_set():
-                    said = frame(line, FRAME_BYTES)
-                    on = None if forward is None else partial(forward, said)
-                    self.inbox.message(topic, partial(_event, topic, fields.get("callerid", ""), read, said), on)
-        except (OSError, ValueError, xmlrpc.client.Error) as error:
-            if not self._over.is_set() and not isinstance(error, EOFError):
-                self.inbox.trouble(topic, f"{topic} from {uri}: {error}")
-        finally:
-            with self._lock:
-                self._known.discard((topic, uri))
+        if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
+            raise ConnectionError(f"it does not speak TCPROS: {text}")
+        with socket.create_connection((str(protocol[1]), int(protocol[2])), timeout=PUBLISHER_SECONDS) as line:
+            wanted = {"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}
+            line.sendall(header(wanted))
+            fields = read_header(line)
+            line.settimeout(None)  # from now on silence is its right
+            read = reader(topic, fields)
+            forward = self._forward(topic, fields)
+            while not (self._over.is_set() or gone.is_set()):
+                said = frame(line, FRAME_BYTES)
+                on = None if forward is None else partial(forward, said)
+                self.inbox.message(topic, partial(_event, topic, fields.get("callerid", ""), read, said), on)
 
 
 def _event(topic: str, by: str, read: Callable[[bytes], dict[str, Any]], raw: bytes, now: float) -> Event:

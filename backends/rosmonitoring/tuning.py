@@ -108,6 +108,15 @@ DDS_SETTLE = 0.005
 DDS_TAKEN = 1_000
 """Samples, and writers, that are taken from DDS at a time."""
 
+AGAIN_SECONDS = 1.0
+"""Seconds until a ROS 1 master or publisher that did not answer is asked again."""
+
+MASTER_ATTEMPTS = 10
+"""How often a master is asked: one that was started at the same moment answers within some seconds."""
+
+PUBLISHER_SECONDS = 5.0
+"""For a publisher of ROS 1 to say what its messages hold: one that runs does within milliseconds."""
+
 LISTENER_SECONDS = 1.0
 """Seconds that one who listens may take for a message; who takes longer is left, so that nobody waits for him."""
 

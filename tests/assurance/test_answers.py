@@ -165,11 +165,14 @@ def test_past_its_last_day_a_supposition_opens_what_needs_it() -> None:
     assert "a supposition has expired" in gate.reason
 
 
+NO_WORDS = "(no plain words yet: write says: … under suppositions.hoare.WORD, with a word of its text, in plan.yaml)"
+
+
 def test_without_owner_or_date_a_supposition_weakens() -> None:
     listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
     found = build(listed, formal=True)
     assert found.answers.tone is Tone.AMBER
-    assert found.suppositions[0].words == "(no plain words yet)"
+    assert found.suppositions[0].words == NO_WORDS
     assert {w.key: w.count for w in found.weakenings}["unowned"] == 1
 
 
@@ -219,7 +222,7 @@ def test_a_key_is_about_a_whole_word() -> None:
     listed = [evidence(g, hypotheses=("the map is true", "the runs are drawn")) for g in GUARANTEES]
     words = [Statement(f"suppositions.hoare.{w}", f"said by {w}", "", *OWNED) for w in ("is", "th", "the_map", "run")]
     found = build(listed, words, formal=True)
-    assert [s.words for s in found.suppositions] == ["said by the_map", "(no plain words yet)"]
+    assert [s.words for s in found.suppositions] == ["said by the_map", NO_WORDS]
 
 
 def test_bounds_of_a_scenario_are_one_supposition() -> None:

@@ -174,3 +174,32 @@ def test_memory_that_is_a_member_of_an_enumeration_is_given_as_one(tmp_path: Pat
     assert "node.py:5: the class Mode" in found["stays"].summary
     wrong = replace(right, source=MODES.replace("self.mode == Mode.on}", "x > 1.0}")).settled(tmp_path / "wrong")
     assert wrong["stays"].verdict is Verdict.REFUTED
+
+
+HELD = """\
+class Held:
+    def __init__(self):
+        self.top = 0.0
+
+    def step(self, x):
+        self.top = max(self.top, x)
+        return {}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("returned", "verdict", "why"),
+    [
+        ("{}", Verdict.PROVED, ""),
+        ("None", Verdict.REFUTED, "the step returns None; it has to return {}, since all outputs are held in memory"),
+        ('{"top": 1.0}', Verdict.REFUTED, "it has to return {}, since all outputs are held in memory"),
+    ],
+)
+def test_a_step_whose_outputs_are_all_memory_returns_an_empty_dict(
+    returned: str, verdict: Verdict, why: str, tmp_path: Path
+) -> None:
+    rcl = "node held { inputs( x : REAL, top : REAL ) outputs( top : REAL ) topics() guarantee at ( out.top >= in.x ) }"
+    found = Example(HELD.replace("{}", returned), rcl, "Held", {}, {"top": "top"}).settled(tmp_path)["at"]
+    assert found.verdict is verdict, found
+    assert why in found.summary

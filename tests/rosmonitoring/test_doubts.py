@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Callable
-from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
+from avow.ros.bags import LIVE
 from avow.system.plan import System
 
 from .test_pairing import MAPPING, RCL, Event
@@ -28,8 +29,8 @@ node n {
 VALUES = {"in.a": "value", "in.b": "value", "out.s": "value"}
 
 
-def live(system: System) -> Session:
-    return session(system, make=partial(Monitor, graph=True))
+def live(events: list[Event]) -> list[Event]:
+    return [{**event, LIVE: True} for event in events]
 
 
 def judge(running: Session, events: list[Event]) -> list[Violation]:
@@ -61,8 +62,8 @@ def test_a_correct_node_is_never_called_broken(seed: int, answers: dict[str, Any
     events = answered(random.Random(seed), 0.4)
     system = make_system(RCL, MAPPING, **answers)
     assert Fault.GUARANTEE in {v.fault for v in judge(session(system), events)}
-    running = live(system)
-    assert judge(running, events) == []
+    running = session(system)
+    assert judge(running, live(events)) == []
     counted = tally(running, "low")
     assert counted.order > 0
     assert counted.published == counted.judged + counted.order + counted.early == 100
@@ -72,46 +73,46 @@ def test_a_correct_node_is_never_called_broken(seed: int, answers: dict[str, Any
 def test_what_is_broken_in_any_order_is_found_at_its_event(seed: int, make_system: Make) -> None:
     wrong = frozenset((10, 30, 50))  # a second from any change
     events = answered(random.Random(seed), 0.4, wrong)
-    found = judge(live(make_system(RCL, MAPPING)), events)
+    found = judge(session(make_system(RCL, MAPPING)), live(events))
     places = [k for k, event in enumerate(events, start=1) if event["topic"] == "s"]
     assert [(v.fault, v.index) for v in found] == [(Fault.GUARANTEE, places[k]) for k in sorted(wrong)]
 
 
 def test_what_nothing_else_could_change_is_told_by_the_initial_value_and_by_one_topic(make_system: Make) -> None:
     mapping = {**MAPPING, "in.r": {"field": "value", "initial": 40}}
-    running = live(make_system(RCL, mapping))
-    found = judge(running, [{"topic": "s", "time": 1, "level": "low"}])
+    running = session(make_system(RCL, mapping))
+    found = judge(running, live([{"topic": "s", "time": 1, "level": "low"}]))
     assert [v.clause for v in found] == ["high"]
-    running = live(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + "}", VALUES))
-    event = {"topic": "s", "time": 1, "value": 11}
+    running = session(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + "}", VALUES))
+    event = {"topic": "s", "time": 1, "value": 11, LIVE: True}
     assert [v.clause for v in running.step(event)] == ["small"]  # at once
 
 
 def test_an_assumption_about_two_topics_waits_too(make_system: Make) -> None:
     events = [{"topic": topic, "time": k, "value": k} for k in (1, 2) for topic in "ab"]
-    running = live(make_system(TWO + "}", VALUES))
-    assert judge(running, events) == []
+    running = session(make_system(TWO + "}", VALUES))
+    assert judge(running, live(events)) == []
     assert tally(running, "alike").order == 1
-    found = judge(live(make_system(TWO + "}", VALUES)), [*events, {"topic": "b", "time": 4, "value": 7}])
+    found = judge(session(make_system(TWO + "}", VALUES)), live([*events, {"topic": "b", "time": 4, "value": 7}]))
     assert [(v.fault, v.clause, v.index) for v in found] == [(Fault.ASSUMPTION, "alike", 5)]
 
 
 def test_memory_of_several_topics_is_undecided_and_that_of_one_is_told(make_system: Make) -> None:
     more = "  guarantee follows ( previous(in.a, 0) >= 5 -> out.s >= 5 )\n"
     more += "  guarantee grows ( out.s >= previous(out.s, 0) )\n}"
-    running = live(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + more, VALUES))
+    running = session(make_system(TWO.replace("assume alike ( in.a == in.b )", "") + more, VALUES))
     events = [{"topic": t, "time": k, "value": v} for k, (t, v) in enumerate([("a", 7), ("s", 6), ("s", 4)], 1)]
-    assert [v.clause for v in judge(running, events)] == ["grows"]
+    assert [v.clause for v in judge(running, live(events))] == ["grows"]
     assert tally(running, "follows").order == 1
 
 
 def test_a_filter_withholds_at_once_what_is_told_later(make_system: Make) -> None:
-    running = live(make_system(RCL, MAPPING, filter=["out.s"]))
+    running = session(make_system(RCL, MAPPING, filter=["out.s"]))
     events = [(0.0, "r", 40), (2.0, "s", "low"), (2.1, "s", "high"), (2.6, "s", "high"), (2.7, "s", "high")]
     passed = []
     found = []
     for time, topic, value in events:
-        event = {"topic": topic, "time": time, "value" if topic == "r" else "level": value}
+        event = {LIVE: True, "topic": topic, "time": time, "value" if topic == "r" else "level": value}
         if topic == "r":
             found += list(running.step(event))
             continue
@@ -120,3 +121,24 @@ def test_a_filter_withholds_at_once_what_is_told_later(make_system: Make) -> Non
         passed.append(on)
     assert passed == [False, True, True, True]
     assert [(v.fault, v.index) for v in found] == [(Fault.GUARANTEE, 2)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_record_is_judged_as_it_was_live(seed: int, make_system: Make, tmp_path: Path) -> None:
+    """Also where what came before it, in one file, was written in order."""
+    events, system = answered(random.Random(seed), 0.4, frozenset((10, 30))), make_system(RCL, MAPPING)
+    found = [(v.clause, v.index) for v in judge(session(system), live(events))]
+    assert len(found) == 2
+    record = tmp_path / "run.jsonl"
+
+    def judged(lines: list[Event]) -> tuple[list[tuple[str, int]], int]:
+        record.write_text("".join(f"{json.dumps(line)}\n" for line in lines), encoding="utf-8")
+        running = session(system)
+        return [(v.clause, v.index) for _, v in running.run(record)], tally(running, "low").order
+
+    again, open_ = judged(live(events))
+    assert again == found
+    assert open_ > 0
+    before = answered(random.Random(seed), 0)
+    later = [{**event, "time": event["time"] + 100} for event in events]
+    assert judged(before + live(later))[0] == [(clause, index + len(before)) for clause, index in found]

@@ -12,11 +12,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
+from avow.backends.rosmonitoring import ros1
 from avow.backends.rosmonitoring.live import follow, graph_of
 from avow.backends.rosmonitoring.ros1 import Ros1, frame, header, master_of, read_header, reader
 from avow.backends.rosmonitoring.rosbridge import Rosbridge
@@ -43,8 +45,8 @@ MAPPING = {"in.r": "data", "out.s": "data"}
 class Master:
     """What of ROS's master a publisher and a subscriber need."""
 
-    def __init__(self) -> None:
-        self.server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False, allow_none=True)
+    def __init__(self, port: int = 0) -> None:
+        self.server = SimpleXMLRPCServer(("127.0.0.1", port), logRequests=False, allow_none=True)
         self.publishers: dict[str, list[str]] = {}
         for call in (self.registerSubscriber, self.registerPublisher, self.unregisterSubscriber):
             self.server.register_function(call)
@@ -117,7 +119,7 @@ def test_what_a_graph_says_is_judged_and_recorded(
     record = tmp_path / "run.jsonl"
     system = make_system(RCL, MAPPING)
     found, warned = heard(master, system, say, lambda running: running.events == 4, record)
-    assert warned == []
+    assert [w.partition(":")[0] for w in warned] == ["nothing orders the topics of a graph"]
     assert [(v.clause, v.index) for v in found] == [("low", 3)]
     assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
     again = [(v.clause, v.index) for _, v in session(system).run(record)]
@@ -250,11 +252,54 @@ def test_a_header_is_read_as_it_is_written() -> None:
         assert frame(other, 10) == b"abc"
 
 
-def test_no_master_is_told() -> None:
+def test_no_master_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ros1, "AGAIN_SECONDS", 0)
     with pytest.raises(Rejected, match="no ROS 1 master"), Ros1("http://127.0.0.1:1", ("s",)):
         pass
     with pytest.raises(Rejected, match="no address"):
         master_of("ros1:ftp://x")
+
+
+def test_a_master_that_is_about_to_start_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ros1, "AGAIN_SECONDS", 0)
+    port = a_free_port()
+    started: list[Master] = []
+    with Ros1(f"http://127.0.0.1:{port}", ("s",), warn=lambda text: started.append(Master(port))) as graph:
+        assert [one.uri for one in started] == [graph._uri]
+    started[0].server.shutdown()
+    started[0].server.server_close()
+
+
+def test_a_publisher_that_is_not_ready_is_asked_again(master: Master, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is named by the master before it can be heard; says nothing where it is heard; and then is there."""
+    monkeypatch.setattr(ros1, "AGAIN_SECONDS", 0.01)
+    monkeypatch.setattr(ros1, "PUBLISHER_SECONDS", 0.2)
+
+    def next_trouble(graph: Ros1) -> str:
+        heard = graph.inbox.get(60)
+        assert heard is not None
+        return heard.trouble
+
+    with (
+        Ros1(master.uri, ("s",)) as graph,
+        Ros1(master.uri, ()) as node,
+        socket.create_server(("127.0.0.1", 0)) as mute,
+    ):
+        graph._publishers("", "/s", [node.uri])
+        assert "not published here; it is asked again" in next_trouble(graph)
+        port = int(mute.getsockname()[1])
+        node._spoken["/s"] = SimpleNamespace(topic="/s", port=port, close=lambda: None)  # type: ignore[assignment]
+        while "timed out" not in next_trouble(graph):
+            pass
+        spoken = node.speak("/s", *FLOAT64)
+        spoken.say(float64(1.5))
+        while (heard := graph.inbox.get(60)) is not None and heard.read is None:
+            pass
+        assert heard is not None
+        assert heard.read is not None
+        assert heard.read()["data"] == 1.5
+        graph._publishers("", "/s", [])
+        assert not graph._heard
 
 
 def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
@@ -279,11 +324,11 @@ def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
         running = session(make_system(RCL, MAPPING))
         warned: list[str] = []
         graph = graph_of(address, running, "127.0.0.1")
-        over = until(lambda: running.events == 4 and len(warned) == 2)
+        over = until(lambda: running.events == 4 and len(warned) == 3)
         found = list(follow(running, graph, over, None, "/verdicts", warned.append))
         listening.shutdown()
     assert [(v.clause, v.index) for v in found] == [("low", 2), ("out.s", 3)]
-    assert warned == ["rosbridge: something is wrong", "rosbridge said what is no message"]
+    assert warned[1:] == ["rosbridge: something is wrong", "rosbridge said what is no message"]
     published = [one for one in asked if one["op"] == "publish"]
     levels = {status["name"]: status["level"] for status in published[-1]["msg"]["status"]}
     assert levels == {"n.low": 2, "n.out.s": 2}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -115,6 +115,11 @@ class Seen:
         return tuple((name, show(value)) for name, value in self.values.items())
 
 
+def to_return(outputs: Iterable[str]) -> str:
+    """What a step has to return, in words; `outputs`: those that are not held in memory."""
+    return ", ".join(sorted(outputs)) or "{}, since all outputs are held in memory"
+
+
 def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: Any) -> Seen:
     """The reply to a case of one step, in the contract's words."""
     values: dict[str, Value] = {f"in.{name}": exact(value) for name, value in case.items()}
@@ -126,7 +131,7 @@ def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: 
         value = _plain(answer["value"])
         given = value if isinstance(value, dict) else {next(iter(others)): value} if len(others) == 1 else None
         if given is None or set(given) != set(others):
-            raise NoValue(f"the step returns {value!r}; it has to return {', '.join(sorted(others)) or 'nothing'}")
+            raise NoValue(f"the step returns {value!r}; it has to return {to_return(others)}")
         for name, port in others.items():
             values[f"out.{name}"] = returned(name, given[name], port.sort)
         for port in node.outputs:
