@@ -3,19 +3,21 @@
 A method leaves it in its evidence's details, under `timeline`; the report draws it. However long the run was, a lane
 has a bounded number of columns. Signals lose detail by that; marks are counted, and none is lost.
 
-Its JSON is written here and not by `avow.base.codec`: a stretch and a mark are rows without names, of which a record
-has thousands, and what another's record holds must lie within its events.
+Of stretches and marks, which are rows, a record has thousands.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from dataclasses import field
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from markupsafe import Markup, escape
 
+from avow.base.codec import Unreadable, called, from_json
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.tuning.shown import TIMELINE_COLUMNS
@@ -31,17 +33,27 @@ KINDS: Mapping[str, tuple[str, str]] = {
 """Kind of mark → its shape, around the origin, and its words. Shapes differ, so that paper needs no colours."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """What a lane's signal was over some events, counted from 1: between two numbers, or a word ("" for several)."""
+class Word(NamedTuple):
+    """What a lane's signal was over some events, counted from 1; "" for several words."""
 
     first: int
     last: int
-    said: tuple[float, float] | str
+    said: str
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Band(NamedTuple):
+    """Between which numbers it was."""
+
+    first: int
+    last: int
+    low: float
+    high: float
+
+
+Stretch = Word | Band
+
+
+class Mark(NamedTuple):
     """So many findings of one kind, at neighbouring events; `time`: of the first of them, in seconds, as text."""
 
     kind: str
@@ -56,7 +68,7 @@ class Lane:
     """A port, or a clause (which has no signal)."""
 
     name: str
-    stretches: tuple[Stretch, ...] = ()
+    stretches: tuple[Stretch, ...] = field(default=(), metadata=called("signal"))
     marks: tuple[Mark, ...] = ()
 
 
@@ -64,10 +76,10 @@ class Lane:
 class Timeline:
     """One run. `every`: the signals are those of about one event in so many; marks are of all."""
 
-    name: str
+    name: str = field(metadata=called("trace"))
     events: int
-    start: str
-    end: str
+    start: str = field(metadata=called("from"))
+    end: str = field(metadata=called("to"))
     """Times in seconds, as text."""
     lanes: tuple[Lane, ...]
     every: int = 1
@@ -103,13 +115,13 @@ class Columns(Generic[T]):
 def joined_stretches(one: Stretch, other: Stretch) -> Stretch:
     """Over both: the least and the greatest number, or the word if it is one."""
     first, last = min(one.first, other.first), max(one.last, other.last)
-    match one.said, other.said:
-        case (float(low), float(high)), (float(lower), float(higher)):
-            return Stretch(first, last, (min(low, lower), max(high, higher)))
-        case said, same if said == same:
-            return Stretch(first, last, said)
+    match one, other:
+        case Band(), Band():
+            return Band(first, last, min(one.low, other.low), max(one.high, other.high))
+        case Word(said=said), Word(said=same) if said == same:
+            return Word(first, last, said)
         case _:  # several words
-            return Stretch(first, last, "")
+            return Word(first, last, "")
 
 
 def joined_marks(one: Mark, other: Mark) -> Mark:
@@ -121,80 +133,34 @@ def runs(stretches: Iterable[Stretch]) -> tuple[Stretch, ...]:
     """Neighbours that say the same word, or the same number, as one."""
     found: list[Stretch] = []
     for stretch in stretches:
-        if found and stretch.said and found[-1].said == stretch.said:
-            found[-1] = Stretch(found[-1].first, stretch.last, stretch.said)
+        if found and stretch[2:] != ("",) and found[-1][2:] == stretch[2:]:
+            found[-1] = stretch._replace(first=found[-1].first)
         else:
             found.append(stretch)
     return tuple(found)
 
 
-# -- as JSON, in evidence ----------------------------------------------------------------------------------------------
-
-
-def to_json(timeline: Timeline) -> dict[str, Any]:
-    lanes = [
-        {
-            "name": lane.name,
-            "signal": [[s.first, s.last, *((s.said,) if isinstance(s.said, str) else s.said)] for s in lane.stretches],
-            "marks": [[m.kind, m.first, m.last, m.number, m.time] for m in lane.marks],
-        }
-        for lane in timeline.lanes
-    ]
-    return {
-        "trace": timeline.name, "events": timeline.events, "from": timeline.start, "to": timeline.end,
-        "every": timeline.every, "lanes": lanes,
-    }  # fmt: skip
-
-
 def timelines(details: Mapping[str, Any]) -> list[Timeline]:
     """Those of an evidence's details. Evidence may be anybody's: what is no timeline is left out."""
     found = details.get("timeline")
-    read = [_timeline(one) for one in found] if isinstance(found, list) else []
-    return [one for one in read if one is not None]
+    read = []
+    for one in found if isinstance(found, list) else ():
+        with contextlib.suppress(Unreadable):
+            read.append(from_json(Timeline, one))
+    return [one for one in read if _is_whole(one)]
 
 
-def _timeline(found: Any) -> Timeline | None:
-    match found:
-        case {
-            "trace": str(name), "events": int(events), "from": str(start), "to": str(end), "every": int(every),
-            "lanes": [*lanes],
-        } if events > 0 and every > 0:  # fmt: skip
-            read = [_lane(one, events) for one in lanes]
-            whole = tuple(lane for lane in read if lane is not None)
-            return Timeline(name, events, start, end, whole, every) if len(whole) == len(lanes) else None
-        case _:  # not what a record of a timeline has
-            return None
-
-
-def _lane(found: Any, events: int) -> Lane | None:
-    match found:
-        case {"name": str(name), "signal": [*signal], "marks": [*marks]}:
-            stretches = tuple(_stretch(one) for one in signal)
-            read = tuple(_mark(one) for one in marks)
-            inside = all(s is not None and 0 < s.first <= s.last <= events for s in stretches)
-            if inside and all(m is not None and 0 < m.first <= m.last <= events for m in read):
-                return Lane(name, tuple(s for s in stretches if s), tuple(m for m in read if m))
-    return None
-
-
-def _stretch(found: Any) -> Stretch | None:
-    match found:
-        case [int(first), int(last), str(word)]:
-            return Stretch(first, last, word)
-        case [int(first), int(last), float() | int() as low, float() | int() as high] if (
-            math.isfinite(low) and math.isfinite(high) and low <= high
-        ):
-            return Stretch(first, last, (float(low), float(high)))
-        case _:  # not what a record of a timeline has
-            return None
-
-
-def _mark(found: Any) -> Mark | None:
-    match found:
-        case [str(kind), int(first), int(last), int(number), str(time)] if kind in KINDS:
-            return Mark(kind, first, last, number, time)
-        case _:  # not what a record of a timeline has
-            return None
+def _is_whole(timeline: Timeline) -> bool:
+    """Whether all of it lies within its events."""
+    marks = [mark for lane in timeline.lanes for mark in lane.marks]
+    stretches = [stretch for lane in timeline.lanes for stretch in lane.stretches]
+    return (
+        timeline.every > 0
+        and timeline.events > 0
+        and all(0 < row.first <= row.last <= timeline.events for row in (*marks, *stretches))
+        and all(mark.kind in KINDS for mark in marks)
+        and all(-math.inf < s.low <= s.high < math.inf for s in stretches if isinstance(s, Band))
+    )
 
 
 # -- as a picture ------------------------------------------------------------------------------------------------------
@@ -257,11 +223,11 @@ def _drawn(lane: Lane, top: int, events: int) -> Iterable[str]:
     yield f'<rect class="lane" x="{_LEFT}" y="{top}" width="{_WIDTH - _LEFT - _RIGHT}" height="{height}"/>'
     yield f'<text x="2" y="{middle + 3:.1f}">{_text(_short(lane.name, 27))}<title>{_text(lane.name)}</title></text>'
     ends = [*(s.first for s in lane.stretches[1:]), events]
-    numbers = [s.said for s in lane.stretches if not isinstance(s.said, str)]
-    if numbers:
-        yield from _curve(lane.stretches, ends, (min(n for n, _ in numbers), max(n for _, n in numbers)), top, events)
+    bands = [s for s in lane.stretches if isinstance(s, Band)]
+    if bands:
+        yield from _curve(lane.stretches, ends, (min(b.low for b in bands), max(b.high for b in bands)), top, events)
     for stretch, end in zip(lane.stretches, ends, strict=False):
-        if isinstance(stretch.said, str):
+        if isinstance(stretch, Word):
             yield _word(_x(stretch.first, events), _x(end, events), stretch.said, middle)
     for mark in lane.marks:
         shape, words = KINDS[mark.kind]
@@ -284,9 +250,9 @@ def _curve(
 
     path = ""
     for stretch, end in zip(stretches, ends, strict=True):
-        if isinstance(stretch.said, str):
+        if isinstance(stretch, Word):
             continue
-        least, most = stretch.said
+        _, _, least, most = stretch
         start = "" if path else f"M{_x(stretch.first, events):.1f} {y(least):.1f}"
         path += f"{start}V{y(most):.1f}V{y(least):.1f}H{_x(end, events):.1f}"
     yield f'<path class="signal" d="{path}"/>'

@@ -3,11 +3,17 @@ follows.
 
 Writing, reading and the schema come from the same type hints, so they cannot drift apart. Reading is strict: an unknown
 or missing field, or a value of another type, is `Unreadable`, never a guess. What a field of type Any holds is made
-plain when it is written (fractions, paths, enumerations become texts).
+plain when it is written (fractions, paths, enumerations become texts). A NamedTuple is a row, a list without names, for
+what there are thousands of; bytes are text in base64. Of a union, what is read is the first that the data fits.
+
+Plain dictionaries are made elsewhere only where a standard says what is in them (SARIF, in-toto, DSSE, JUnit,
+CycloneDX, ReqIF, ROS), where a command shows what no dataclass holds, and in `avow.pipeline.blobs`, whose values share
+their parts. (Of the libraries, msgspec passes over fields that a dataclass does not have.)
 """
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import json
 import math
@@ -16,7 +22,7 @@ import typing
 from collections.abc import Callable, Mapping
 from enum import StrEnum
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 Read = Callable[[Any], Any]
@@ -25,7 +31,12 @@ LATER: Mapping[str, Any] = {"avow.later": True}
 """Metadata of a field that texts of earlier versions do not have, and that is not written where it is empty."""
 
 
-class Unreadable(Exception):  # noqa: N818 - it says what the text is
+def called(key: str) -> Mapping[str, Any]:
+    """Metadata of a field that has another name in JSON."""
+    return {"avow.key": key}
+
+
+class Unreadable(ValueError):  # noqa: N818 - it says what the text is
     """Text that is not what it should be: torn, edited, or of another program."""
 
 
@@ -57,7 +68,7 @@ def plain(value: object) -> Any:
             return str(value)
 
 
-def to_json(value: object) -> Any:
+def to_json(value: Any) -> Any:
     """A dataclass, or a tuple of such, as plain data."""
     kind: Any = type(value)
     if kind is str or value is None or kind is bool or kind is int:
@@ -66,14 +77,18 @@ def to_json(value: object) -> Any:
         return [to_json(item) for item in value]
     if isinstance(value, str):
         return str(value)
+    if kind is dict:
+        return {str(key): to_json(item) for key, item in value.items()}
+    if kind is bytes:
+        return base64.b64encode(value).decode()
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         return plain(value)
-    later, found = _later(kind), dict[str, Any]()
-    for name in _fields(kind):
-        item = getattr(value, name)
-        if item or name not in later:  # most parts are plain, and there are very many
+    found = dict[str, Any]()
+    for key, field in _fields(kind).items():
+        item = getattr(value, field.name)
+        if item or not field.later:  # most parts are plain, and there are very many
             plainly = item is None or type(item) in (str, bool, int)
-            found[name] = item if plainly else to_json(item)
+            found[key] = item if plainly else to_json(item)
     return found
 
 
@@ -86,15 +101,29 @@ def from_json(kind: type[T], data: object) -> T:
     return found
 
 
-@cache
-def _fields(kind: type) -> dict[str, Any]:
-    hints = typing.get_type_hints(kind)
-    return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
+def from_text(kind: type[T], text: str | bytes) -> T:
+    """As `from_json`, of the JSON text. Raises Unreadable, whatever the text is."""
+    try:
+        return from_json(kind, json.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise Unreadable(str(error)) from None
+
+
+class _Field(NamedTuple):
+    name: str
+    hint: Any
+    later: bool
 
 
 @cache
+def _fields(kind: type) -> dict[str, _Field]:
+    """By their names in JSON."""
+    hints, told = typing.get_type_hints(kind), dataclasses.fields(kind)
+    return {f.metadata.get("avow.key", f.name): _Field(f.name, hints[f.name], "avow.later" in f.metadata) for f in told}
+
+
 def _later(kind: type) -> frozenset[str]:
-    return frozenset(field.name for field in dataclasses.fields(kind) if field.metadata == LATER)
+    return frozenset(key for key, field in _fields(kind).items() if field.later)
 
 
 @cache
@@ -105,10 +134,11 @@ def _reader(kind: Any) -> Read:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if origin is tuple:
         return _of_tuple(arguments)
+    if items := _row(kind):
+        row = _of_tuple(items)
+        return lambda data: kind(*row(data))
     if origin is types.UnionType or origin is typing.Union:
-        inner = _reader(next(a for a in arguments if a is not type(None)))
-        optional = type(None) in arguments
-        return lambda data: None if data is None and optional else inner(data)
+        return _of_union([_reader(a) for a in arguments if a is not type(None)], optional=type(None) in arguments)
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return _of_mapping(_reader(arguments[1]))
     return _of_plain(kind)
@@ -116,9 +146,9 @@ def _reader(kind: Any) -> Read:
 
 def _of_fields(kind: type) -> Read:
     later, names = _later(kind), frozenset(_fields(kind))
-    readers = {name: _reader(hint) for name, hint in _fields(kind).items()}
+    readers = {key: (field.name, _reader(field.hint)) for key, field in _fields(kind).items()}
 
-    def read(data: Any) -> Any:
+    def whole(data: Any) -> Any:
         if type(data) is not dict:
             raise Unreadable(f": not a {kind.__name__}")
         if data.keys() != names:
@@ -126,14 +156,39 @@ def _of_fields(kind: type) -> Read:
             if missing or extra:
                 raise Unreadable(f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}")
         values = {}
-        for name, item in data.items():
+        for key, item in data.items():
+            name, read = readers[key]
             try:
-                values[name] = readers[name](item)
+                values[name] = read(item)
             except Unreadable as error:
-                raise Unreadable(f".{name}{error}") from None
+                raise Unreadable(f".{key}{error}") from None
         return kind(**values)
 
-    return read
+    return whole
+
+
+def _row(kind: Any) -> tuple[Any, ...]:
+    """The types of a NamedTuple's items; of anything else none."""
+    if not (isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")):
+        return ()
+    hints = typing.get_type_hints(kind)
+    return tuple(hints[name] for name in kind._fields)
+
+
+def _of_union(readers: list[Read], *, optional: bool) -> Read:
+    *others, last = readers
+
+    def first(data: Any) -> Any:
+        if data is None and optional:
+            return None
+        for read in others:
+            try:
+                return read(data)
+            except Unreadable:
+                continue
+        return last(data)
+
+    return first
 
 
 def _of_tuple(arguments: tuple[Any, ...]) -> Read:
@@ -176,6 +231,8 @@ def _of_plain(kind: Any) -> Read:
         return _of_enum(kind)
     if kind is float:
         return _float
+    if kind is bytes:
+        return _bytes
     if kind not in (str, int, bool):
         raise TypeError(f"{kind} has no form in JSON")
 
@@ -204,25 +261,31 @@ def _float(data: Any) -> float:
     return float(data)
 
 
+def _bytes(data: Any) -> bytes:
+    try:
+        return base64.b64decode(data, validate=True)
+    except (TypeError, ValueError):
+        raise Unreadable(": no bytes in base64") from None
+
+
 def schema(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     """The JSON schema (2020-12) of a type; dataclasses are added to `definitions`."""
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         if kind.__name__ not in definitions:
             definitions[kind.__name__] = {}
-            fields = _fields(kind)
+            fields, later = _fields(kind), _later(kind)
             definitions[kind.__name__] = {
                 "description": (kind.__doc__ or "").strip().split("\n\n")[0],
                 "type": "object",
-                "properties": {name: schema(hint, definitions) for name, hint in fields.items()},
-                "required": [name for name in fields if name not in _later(kind)],
+                "properties": {key: schema(field.hint, definitions) for key, field in fields.items()},
+                "required": [key for key in fields if key not in later],
                 "additionalProperties": False,
             }
         return {"$ref": f"#/$defs/{kind.__name__}"}
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin is tuple:
-        if len(arguments) == 2 and arguments[1] is Ellipsis:
-            return {"type": "array", "items": schema(arguments[0], definitions)}
-        items = [schema(a, definitions) for a in arguments]
+    if origin is tuple and len(arguments) == 2 and arguments[1] is Ellipsis:
+        return {"type": "array", "items": schema(arguments[0], definitions)}
+    if items := [schema(a, definitions) for a in (arguments if origin is tuple else _row(kind))]:
         return {"type": "array", "prefixItems": items, "minItems": len(items), "maxItems": len(items)}
     if origin is types.UnionType or origin is typing.Union:
         return {"anyOf": [schema(a, definitions) for a in arguments]}
@@ -240,5 +303,6 @@ _PLAIN: dict[Any, dict[str, Any]] = {
     int: {"type": "integer"},
     float: {"type": "number"},
     bool: {"type": "boolean"},
+    bytes: {"type": "string", "contentEncoding": "base64"},
     type(None): {"type": "null"},
 }

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import Any
 
+from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest
@@ -23,14 +23,16 @@ from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.tuning.sizes import ANSWERS_KEPT
 
+_Kept = tuple[tuple[str, ...], bool] | Said
+
 
 @dataclass(slots=True)
 class KeptAnswers:
     """`before`: what earlier runs left; `now`: what was used or found in this one. What a proof needs and whether its
     premises contradict, or what a solver said of a script."""
 
-    before: dict[str, tuple[tuple[str, ...], bool] | Said] = field(default_factory=dict)
-    now: dict[str, tuple[tuple[str, ...], bool] | Said] = field(default_factory=dict)
+    before: dict[str, _Kept] = field(default_factory=dict)
+    now: dict[str, _Kept] = field(default_factory=dict)
     asked: int = 0
     """Questions that were put to the solver."""
 
@@ -38,29 +40,21 @@ class KeptAnswers:
     def read(cls, text: str) -> KeptAnswers:
         """What cannot be read is nothing."""
         try:
-            return cls({str(mark): _read(said) for mark, said in json.loads(text).items()})
-        except (ValueError, TypeError, AttributeError):
+            return cls(from_text(dict[str, _Kept], text))
+        except Unreadable:
             return cls()
 
     def written(self) -> str:
         """For the next run: those of this one, and as many of the earlier ones as there is room for."""
-        return json.dumps(dict(list({**self.before, **self.now}.items())[-ANSWERS_KEPT:]))
+        return json.dumps(to_json(dict(list({**self.before, **self.now}.items())[-ANSWERS_KEPT:])))
 
-    def find(self, mark: str) -> tuple[tuple[str, ...], bool] | Said | None:
+    def find(self, mark: str) -> _Kept | None:
         found = self.now.get(mark) or self.before.pop(mark, None)
         if found is not None:
             self.now[mark] = found
         else:
             self.asked += 1
         return found
-
-
-def _read(said: Any) -> tuple[tuple[str, ...], bool] | Said:
-    """Raises ValueError, TypeError."""
-    if isinstance(said, list):
-        needed, vacuous = said
-        return tuple(map(str, needed)), vacuous is True
-    return Said(said)
 
 
 _kept: ContextVar[KeptAnswers | None] = ContextVar("kept answers", default=None)

@@ -12,11 +12,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from avow.base.codec import from_json
 from avow.base.files import sha256
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
 from avow.isolation.level import Isolation, wanted
-from avow.isolation.observed import ISOLATION, OBSERVED, Observed, Seen, from_json, look
+from avow.isolation.observed import ISOLATION, OBSERVED, Observed, Seen, look
 
 
 def stands(record: Evidence, root: Path) -> bool:
@@ -29,7 +30,7 @@ def changed(record: Evidence, root: Path) -> tuple[str, ...]:
     if OBSERVED not in record.details:
         return ()
     try:
-        seen = from_json(record.details.get(OBSERVED, ()))
+        seen = from_json(tuple[Observed, ...], record.details[OBSERVED])
     except ValueError:
         return ("what was observed cannot be read",)
     return tuple(o.path for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
@@ -72,7 +73,7 @@ def outside_of(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
     found: dict[tuple[str, Seen], Observed] = {}
     for entry in entries:
         try:
-            seen = from_json(entry.evidence.details.get(OBSERVED, ()))
+            seen = from_json(tuple[Observed, ...], entry.evidence.details.get(OBSERVED, []))
         except ValueError:
             continue
         found |= {(o.path, o.kind): o for o in seen if Path(o.path).is_absolute() and o.kind is not Seen.OUTSIDE}

@@ -21,11 +21,12 @@ import base64
 import json
 import os
 from collections.abc import Iterable
+from dataclasses import field
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from avow.base.codec import canonical
+from avow.base.codec import LATER, canonical, from_json, to_json
 from avow.base.files import read_regular, sha256
 from avow.base.records import dataclass
 from avow.evidence.appending import append, locked
@@ -50,9 +51,9 @@ class Statement:
     records: int
     head: str
     time: str
-    note: str = ""
+    note: str = field(default="", metadata=LATER)
     """Who acknowledged, and why."""
-    state: str = ""
+    state: str = field(default="", metadata=LATER)
     """Digest of the damage that was acknowledged."""
 
 
@@ -116,16 +117,8 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
         os.ftruncate(file, len(whole))  # what a killed run left half written
         lines = whole.splitlines()
         last = _read(lines[-1]) if lines else None
-        body = {
-            "event": event.value,
-            "head": head,
-            "n": len(lines),
-            "prev": last[2] if last else GENESIS,
-            "records": records,
-            "system": system,
-            "time": datetime.now(UTC).isoformat(timespec="seconds"),
-            **more,
-        }
+        said = Statement(event, system, records, head, datetime.now(UTC).isoformat(timespec="seconds"), **more)
+        body = {**to_json(said), "n": len(lines), "prev": last[2] if last else GENESIS}
         append(file, canonical({**body, "hash": sha256(canonical(body))}).encode() + b"\n")
 
 
@@ -137,19 +130,11 @@ def _is_newest(index: Index, event: Event, system: str, records: int, head: str)
 def _read(line: bytes) -> tuple[Statement, int, str, str] | None:
     """(what it says, its number, its hash, what it follows); None for a line that is not as it was written."""
     try:
-        data = json.loads(line)
-        body = {key: value for key, value in data.items() if key != "hash"}
+        body = json.loads(line)
+        mark = str(body.pop("hash"))
         written = canonical({**body, "hash": sha256(canonical(body))}).encode()
-        statement = Statement(
-            Event(data["event"]),
-            str(data["system"]),
-            int(data["records"]),
-            str(data["head"]),
-            str(data["time"]),
-            str(data.get("note", "")),
-            str(data.get("state", "")),
-        )
-        place, mark, follows = int(data["n"]), str(data["hash"]), str(data["prev"])
+        place, follows = int(body.pop("n")), str(body.pop("prev"))
+        statement = from_json(Statement, body)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
     return (statement, place, mark, follows) if written == line else None

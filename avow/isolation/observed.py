@@ -3,7 +3,7 @@
 Who declares nothing reads all the same. So what was seen becomes part of what an answer depends on: a record is current
 only while every one of these is as it was.
 
-In a record each is a row of three texts, not the object that `avow.base.codec` makes: there may be thousands.
+In a record each is a row: there may be thousands.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import stat
 import sys
 import sysconfig
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from avow.base.files import digest_file, sha256
 from avow.base.module_path import absolute_only
@@ -44,12 +43,11 @@ class Seen(StrEnum):
     """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
 
 
-@dataclass(frozen=True, slots=True)
-class Observed:
+class Observed(NamedTuple):
     """One thing that the answer depends on. `path` is absolute, or relative to the workspace in a record."""
 
-    path: str
     kind: Seen
+    path: str
     digest: str = ""
 
 
@@ -99,7 +97,7 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
     for event, path in events:
         kind = _kind(event, path)
         if kind is not None:
-            found.setdefault((path, kind), Observed(path, kind, look(kind, path)))
+            found.setdefault((path, kind), Observed(kind, path, look(kind, path)))
     return tuple(found[key] for key in sorted(found))
 
 
@@ -146,19 +144,7 @@ def _of_python(path: str) -> bool:
 def interpreter() -> Observed:
     """The Python that runs a subject."""
     path = os.path.realpath(sys.executable)
-    return Observed(path, Seen.READ, look(Seen.READ, path))
-
-
-def to_json(observed: Iterable[Observed]) -> list[list[str]]:
-    return [[o.kind.value, o.path, o.digest] for o in observed]
-
-
-def from_json(data: Any) -> tuple[Observed, ...]:
-    """Raises ValueError for what `to_json` did not make."""
-    try:
-        return tuple(Observed(str(path), Seen(kind), str(mark)) for kind, path, mark in data)
-    except TypeError as error:
-        raise ValueError("not a list of what was observed") from error
+    return Observed(Seen.READ, path, look(Seen.READ, path))
 
 
 OBSERVED = "observed"

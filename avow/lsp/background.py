@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from avow.base.codec import from_text, to_json
 from avow.base.process import die_with, kill_tree, unwatch, watch
 from avow.language.contract import Contract, Node
 from avow.language.load import check_in_part, sound_nodes
@@ -110,8 +111,8 @@ class Asked:
             process.stdin.write(json.dumps({"texts": texts, "nodes": sorted(missing)}).encode())
             process.stdin.close()
             while line := await process.stdout.readline():
-                found = json.loads(line)
-                self.answers[found["key"]] = tuple(Answer(**answer) for answer in found["answers"])
+                key, answers = from_text(tuple[str, tuple[Answer, ...]], line)
+                self.answers[key] = answers
                 while len(self.answers) > NODES_REMEMBERED:
                     del self.answers[next(iter(self.answers))]
                 self.told()
@@ -140,20 +141,20 @@ def main(parent: int) -> None:
         key = _key(node)
         if key not in asked["nodes"]:
             continue
-        answers = [
-            {
-                "name": result.name,
-                "subject": result.subject or "",
-                "claim": result.claim,
-                "verdict": str(result.verdict),
-                "severity": str(result.severity),
-                "explanation": result.explanation,
-                "example": result.counterexample.text() if result.counterexample is not None else "",
-                "because": result.because or "",
-            }
+        answers = tuple(
+            Answer(
+                result.name,
+                result.subject or "",
+                result.claim,
+                str(result.verdict),
+                str(result.severity),
+                result.explanation,
+                result.counterexample.text() if result.counterexample is not None else "",
+                result.because or "",
+            )
             for result in analyse(node, contract)
-        ]
-        print(json.dumps({"key": key, "answers": answers}), flush=True)
+        )
+        print(json.dumps(to_json((key, answers))), flush=True)
 
 
 if __name__ == "__main__":

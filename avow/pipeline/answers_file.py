@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 
+from avow.base.codec import Unreadable, from_text
 from avow.base.files import is_intact, read_regular
 from avow.base.workspace import Workspace
 from avow.calculus.kept_answers import KeptAnswers
@@ -36,10 +37,10 @@ def earlier(workspace: Workspace, work: Work, run: Run) -> str:
 def read_answers(text: str) -> KeptAnswers:
     """Those of this engine and solver."""
     try:
-        said = json.loads(text or "{}")
-        return KeptAnswers.read(said["answers"] if said.get("engine") == engine_identity() else "{}")
-    except (ValueError, AttributeError, KeyError):
+        said = from_text(dict[str, str], text)
+    except Unreadable:
         return KeptAnswers()
+    return KeptAnswers.read(said.get("answers", "") if said.get("engine") == engine_identity() else "")
 
 
 def write_answers(answers: KeptAnswers) -> str:

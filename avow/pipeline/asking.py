@@ -36,7 +36,7 @@ def settle(
     folder: Path,
     run: Run,
     altered: Altered | None = None,
-    kept: Mapping[str, Sequence[Any]] | None = None,
+    kept: Mapping[str, tuple[Any, ...]] | None = None,
     earlier: str = "",
 ) -> Report:
     """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once, and

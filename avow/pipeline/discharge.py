@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import json
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
+from avow.base.codec import canonical, to_json
 from avow.base.files import digest_file, is_intact, sha256, write
 from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
@@ -22,7 +21,7 @@ from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
-from avow.isolation.observed import ISOLATION, OBSERVED, to_json
+from avow.isolation.observed import ISOLATION, OBSERVED
 from avow.pipeline import asking
 from avow.pipeline.answers_file import earlier
 from avow.pipeline.export import folder
@@ -132,13 +131,13 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     return report.outcomes
 
 
-def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...]) -> dict[str, list[Any]]:
+def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...]) -> dict[str, tuple[Any, ...]]:
     """Obligation → the cases that refuted it once, newest first, whatever the subject and the options were."""
-    ledger, found = ledger_of(workspace.ledger(work.system.name)), dict[str, list[Any]]()
+    ledger, found = ledger_of(workspace.ledger(work.system.name)), dict[str, tuple[Any, ...]]()
     for o in obligations:
         cases = [e.evidence.details[CASE] for e in reversed(ledger.refutations(o.id, o.digest, work.engine))]
         if cases:
-            found[o.id] = list({json.dumps(case, sort_keys=True): case for case in cases}.values())[:CASES_KEPT]
+            found[o.id] = tuple({canonical(case): case for case in cases}.values())[:CASES_KEPT]
     return found
 
 
@@ -147,7 +146,7 @@ def _circumstances(workspace: Workspace, report: Report) -> dict[str, object]:
     if report.isolation is Isolation.NONE:
         return {}
     root = str(workspace.root.resolve()) + os.sep
-    seen = [replace(o, path=o.path.removeprefix(root)) for o in report.observed]
+    seen = tuple(o._replace(path=o.path.removeprefix(root)) for o in report.observed)
     return {ISOLATION: report.isolation.value, OBSERVED: to_json(seen)}
 
 

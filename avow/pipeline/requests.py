@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, field
+from collections.abc import Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Limits, Report
-from avow.base.codec import Unreadable, from_json, to_json
+from avow.base.codec import Unreadable, canonical, from_text, to_json
 from avow.base.records import dataclass
 from avow.pipeline.mutant_systems import Altered
-
-_TEXTS = ("system", "node", "method", "engine", "home", "root", "folder", "earlier")
 
 Tools = tuple[tuple[str, ...], ...]
 """Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
@@ -44,7 +41,7 @@ class Request:
     folder: str = ""
     """Where the exported files are; relative to the workspace."""
     altered: Altered | None = None
-    kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    kept: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     """Obligation → cases that refuted it once, as its backend wrote them (`record.CASE`): to be tried first."""
     earlier: str = ""
     """What the engine kept for itself when it was asked last (`avow.calculus.kept_answers`): hints."""
@@ -77,43 +74,16 @@ class Unanswered(ValueError):  # noqa: N818 - it says what it is
 
 
 def request_bytes(request: Request) -> bytes:
-    said = {
-        **{name: getattr(request, name) for name in _TEXTS},
-        "keys": dict(request.keys),
-        "limits": asdict(request.limits),
-        "cut": request.cut.decode("utf-8", "surrogatepass"),
-        "files": {name: base64.b64encode(data).decode() for name, data in request.files.items()},
-        "tools": request.tools,
-        "altered": asdict(request.altered) if request.altered else None,
-        "kept": {name: list(cases) for name, cases in request.kept.items()},
-    }
-    return json.dumps(said, sort_keys=True).encode()
+    return canonical(to_json(request)).encode()
 
 
 def read_request(data: bytes) -> Request:
-    """Raises ValueError, TypeError, LookupError."""
-    said = json.loads(data)
-    return Request(
-        **{name: str(said[name]) for name in _TEXTS},
-        keys=dict(said["keys"]),
-        limits=Limits(**said["limits"]),
-        cut=said["cut"].encode("utf-8", "surrogatepass"),
-        files={name: base64.b64decode(text, validate=True) for name, text in said["files"].items()},
-        tools=tuple(tuple(map(str, tool)) for tool in said["tools"]),
-        altered=Altered(**said["altered"]) if said["altered"] else None,
-        kept={name: tuple(cases) for name, cases in said["kept"].items()},
-    )
+    """Raises Unreadable."""
+    return from_text(Request, data)
 
 
 def response_bytes(response: Response) -> bytes:
-    body = {
-        "request": response.request,
-        "report": to_json(response.report) if response.report else None,
-        "refused": response.refused,
-        "worker": response.worker,
-        "cpu": response.cpu,
-    }
-    text = json.dumps(body, default=str, sort_keys=True)
+    text = canonical(to_json(response))
     return json.dumps({"body": text, "sha256": hashlib.sha256(text.encode()).hexdigest()}).encode()
 
 
@@ -122,16 +92,12 @@ def read_response(data: object, asked: bytes) -> Response:
     if not isinstance(data, bytes):
         raise Unanswered(f"an answer is bytes, not {type(data).__name__}")
     try:
-        outer = json.loads(data)
-        text: str = outer["body"]
+        outer = from_text(dict[str, str], data)
+        text = outer["body"]
         if hashlib.sha256(text.encode()).hexdigest() != outer["sha256"]:
             raise Unanswered("its digest is not that of what it says")
-        said: dict[str, Any] = json.loads(text)
-        report = from_json(Report, said["report"]) if said["report"] is not None else None
-        found = Response(said["request"], report, str(said["refused"]), str(said["worker"]), float(said["cpu"]))
-    except Unanswered:
-        raise
-    except (Unreadable, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        found = from_text(Response, text)
+    except (Unreadable, KeyError, UnicodeError) as error:
         raise Unanswered(f"{type(error).__name__}: {error}"[:300]) from error
     if found.request != request_digest(asked):
         raise Unanswered("it answers another request")

@@ -24,7 +24,7 @@ from avow.base.programs import program_files
 from avow.base.tools import package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Observed, Seen, from_json, look, to_json
+from avow.isolation.observed import Observed, Seen, look
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 
@@ -53,7 +53,7 @@ class Shortcut:
         try:
             kept = read_note(_stamp(self.workspace)) or {}
             results = tuple(codec.from_json(Result, r) for r in kept["results"])
-            observed = from_json(kept["observed"])
+            observed = codec.from_json(tuple[Observed, ...], kept["observed"])
             if kept["identity"] != _identity(self.workspace, observed):
                 return None
         except (codec.Unreadable, OSError, ValueError, KeyError, TypeError):
@@ -69,11 +69,11 @@ class Shortcut:
         try:
             if self._begun != _sources(self.workspace) or _reads_elsewhere(self.workspace):
                 return
-            tools = (Observed(str(file), Seen.READ) for path in programs for file in program_files(path))
+            tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
             observed = (*_observed(self.workspace), *dict.fromkeys(tools))
             kept = {
                 "identity": _identity(self.workspace, observed),
-                "observed": to_json(observed),
+                "observed": codec.to_json(observed),
                 "results": codec.to_json(tuple(results)),
             }
             write_note(_stamp(self.workspace), kept)

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from avow.base import process
+from avow.base.codec import to_json
 from avow.isolation import judge
 from avow.isolation.level import Isolation, available, sealed
-from avow.isolation.observed import to_json
 from avow.isolation.program import Program
 from avow.isolation.subject import SubjectFailed
 from avow.tuning.running import SUBJECT_PATIENCE

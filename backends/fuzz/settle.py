@@ -16,6 +16,7 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Job, Limits, Report
+from avow.base.codec import from_json
 from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.plain import ALLOWS_MORE
@@ -25,7 +26,7 @@ from avow.drive.steps import coded, plain
 from avow.evidence.obligation import ProgramClaim
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
-from avow.isolation.observed import Observed, from_json
+from avow.isolation.observed import Observed
 
 from . import building
 from .building import NotBuilt
@@ -209,7 +210,7 @@ class Work:
         question = {"what": "runs", "program": str(program), "root": root, "runs": words, "twin": str(twin or "")}
         answer = self._ask({**question, "crashes": MOST_CRASHES})
         self._kept_apart(answer)
-        self.observed.update(dict.fromkeys(from_json(answer["observed"])))
+        self.observed.update(dict.fromkeys(from_json(tuple[Observed, ...], answer["observed"])))
         if answer["fault"]:
             raise Unanswered(Verdict.UNKNOWN if answer["silent"] else Verdict.ERROR, answer["fault"])
         return answer

@@ -15,6 +15,7 @@ from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
+from avow.base.codec import from_json
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
@@ -23,7 +24,7 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
-from avow.isolation.observed import from_json
+from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Node
 from avow.solving.questions import opaque_sorts
 
@@ -83,7 +84,10 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     try:
-        observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
+        observed, isolation = (
+            from_json(tuple[Observed, ...], answer.pop("observed")),
+            Isolation(answer.pop("isolation")),
+        )
         refuting = export.numbers(job) == ANY
         exact = export.numbers(job) == "exact"
         outcomes = tuple(

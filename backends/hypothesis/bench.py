@@ -23,12 +23,12 @@ from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
+from avow.base.codec import to_json
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Value, show
 from avow.isolation import judge
-from avow.isolation.observed import to_json
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
 from avow.language.terms import Term

@@ -315,7 +315,7 @@ def _draw(job: Job, run: _Run) -> None:
 
 def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation) -> list[dict[str, Any]]:
     """A picture's content for each trace, those with a finding first."""
-    from avow.backend_kit.timeline import to_json
+    from avow.base.codec import to_json
 
     from .lanes import timeline
 

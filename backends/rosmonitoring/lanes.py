@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from avow.backend_kit.timeline import (
+    Band,
     Columns,
     Lane,
     Mark,
     Stretch,
     Timeline,
+    Word,
     joined_marks,
     joined_stretches,
     runs,
@@ -97,11 +99,11 @@ def signals(
             if not setup.whose(name, recorded.event):
                 continue
             try:
-                said = _said(read(recorded.event, None), sort)
+                said = _said(read(recorded.event, None), sort, index)
             except MappingError:
                 continue  # it has a mark
             columns = found.setdefault((setup.node.name, name), Columns(joined_stretches))
-            columns.put(index, Stretch(index, index, said))
+            columns.put(index, said)
     return Signals({key: runs(each.items()) for key, each in found.items()}, start, end, every)
 
 
@@ -133,12 +135,12 @@ def timeline(
     return Timeline(name, max(events, 1), heard.start, heard.end, tuple(lanes), heard.every)
 
 
-def _said(value: Value, sort: Sort) -> tuple[float, float] | str:
+def _said(value: Value, sort: Sort, at: int) -> Stretch:
     if isinstance(sort, RealSort | IntegerSort | NaturalSort):
         number = as_float(value)  # type: ignore[arg-type]
-        return number, number
+        return Band(at, at, number, number)
     text = show(value)
-    return text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…"
+    return Word(at, at, text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…")
 
 
 def _sampled(

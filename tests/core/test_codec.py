@@ -8,14 +8,19 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avow.base.codec import LATER, Unreadable, canonical, from_json, schema, to_json
+from avow.backend_kit.timeline import timelines
+from avow.base.codec import LATER, Unreadable, called, canonical, from_json, from_text, schema, to_json
+from avow.calculus.kept_answers import KeptAnswers
+from avow.evidence.heads import read_index
+from avow.isolation.observed import Observed
+from avow.kernel.solvers import Said
 
 
 class Colour(StrEnum):
@@ -31,6 +36,17 @@ class Inner:
     at: int | None = None
 
 
+class Short(NamedTuple):
+    first: int
+    word: str
+
+
+class Long(NamedTuple):
+    first: int
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, slots=True)
 class Outer:
     """All kinds of fields."""
@@ -44,6 +60,9 @@ class Outer:
     words: Mapping[str, str]
     free: Mapping[str, Any] = field(default_factory=dict)
     new: tuple[Inner, ...] = field(default=(), metadata=LATER)
+    rows: tuple[Short | Long, ...] = field(default=(), metadata=called("from"))
+    raw: bytes = b""
+    either: float | str = 0.0
 
 
 inner = st.builds(Inner, st.text(), st.none() | st.integers())
@@ -58,8 +77,15 @@ outer = st.builds(
     st.dictionaries(st.text(), st.text()),
     st.dictionaries(st.text(), st.none() | st.integers() | st.lists(st.text())),
     st.lists(inner).map(tuple),
+    st.lists(st.builds(Short) | st.builds(Long, low=st.floats(0, 1), high=st.floats(1, 2))).map(tuple),
+    st.binary(),
+    st.floats(0, 1) | st.text(),
 )
-ONE = Outer(Colour.RED, 1.5, True, (("a", 1),), Inner("x", 2), (Inner("y"),), {"k": "v"}, {"z": [1]}, (Inner("n"),))
+ROWS = (Short(1, "w"), Long(2, 0.5, 1.5))
+ONE = Outer(
+    *(Colour.RED, 1.5, True, (("a", 1),), Inner("x", 2), (Inner("y"),), {"k": "v"}, {"z": [1]}),
+    *((Inner("n"),), ROWS, b"\0\xff", "e"),
+)
 
 
 @given(outer)
@@ -124,3 +150,26 @@ def test_unknown_and_missing_fields_are_unreadable(at: tuple[Any, ...]) -> None:
             part.pop("name" if at else "flag")
         with pytest.raises(Unreadable, match="fields missing"):
             from_json(Outer, data)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "7", '{"name": 1, "at": 2}', b"\xff"], ids=range(6))
+def test_a_text_that_is_none_of_ours_is_unreadable(text: str | bytes) -> None:
+    with pytest.raises(Unreadable):
+        from_text(Inner, text)
+
+
+def test_what_was_stored_reads_back_and_is_written_the_same(tmp_path: Path) -> None:
+    """Written by the release before rows were the codec's."""
+    stored = json.loads(Path(__file__).with_name("stored.json").read_text())
+    (timeline,) = timelines({"timeline": [stored["timeline"]]})
+    assert to_json(timeline) == stored["timeline"]
+    assert to_json(from_json(tuple[Observed, ...], stored["observed"])) == stored["observed"]
+    answers = KeptAnswers.read(stored["answers"])
+    assert answers.written() == stored["answers"]
+    assert answers.before == {"m1": (("A1", "G2"), False), "m2": Said.UNSAT}
+    index = tmp_path / "heads.jsonl"
+    index.write_text("".join(f"{line}\n" for line in stored["index"]))
+    found = read_index(index)
+    assert (found.damage, [s.event for s in found.statements]) == ((), ["began", "reached", "acknowledged"])
+    assert found.statements[2].note == "A. Person: seen"
+    assert found.marks == tuple(json.loads(line)["hash"] for line in stored["index"])

@@ -14,20 +14,21 @@ import pytest
 from avow.backend_kit.protocol import Limits
 from avow.backend_kit.timeline import (
     KINDS,
+    Band,
     Columns,
     Lane,
     Mark,
-    Stretch,
     Timeline,
+    Word,
     in_words,
     joined_marks,
     joined_stretches,
     picture,
     runs,
     timelines,
-    to_json,
 )
 from avow.backends.rosmonitoring import BACKEND, lanes
+from avow.base.codec import to_json
 from avow.cli import main
 from avow.report.page import environment
 from avow.system.load import load_system
@@ -100,10 +101,10 @@ def test_a_single_peak_of_a_long_signal_is_in_its_column() -> None:
     columns = Columns(joined_stretches)
     for event in range(1, 100_001):
         value = 99.0 if event == 70_001 else 1.0
-        columns.put(event, Stretch(event, event, (value, value)))
+        columns.put(event, Band(event, event, value, value))
     found = runs(columns.items())
     assert len(found) <= 3
-    (peak,) = [s for s in found if s.said == (1.0, 99.0)]
+    (peak,) = [s for s in found if s[2:] == (1.0, 99.0)]
     assert peak.first <= 70_001 <= peak.last
 
 
@@ -113,9 +114,9 @@ def test_evidence_has_a_timeline_of_what_each_guarantee_reads(tmp_path: Path) ->
     found = drawn(guard(tmp_path, events), tmp_path)
     assert [lane.name for lane in found["bounded"].lanes] == ["bounded", "out.speed"]
     assert found["bounded"].lanes[0].marks == (Mark("broken", 15, 15, 1, "1.4"),)
-    assert [s.said for s in found["bounded"].lanes[1].stretches] == [(2.0, 2.0), (12.0, 12.0), (2.0, 2.0)]
+    assert [s[2:] for s in found["bounded"].lanes[1].stretches] == [(2.0, 2.0), (12.0, 12.0), (2.0, 2.0)]
     assert [lane.name for lane in found["slows"].lanes] == ["slows", "in.r", "out.mode"]
-    assert found["slows"].lanes[2].stretches == (Stretch(2, 29, "fast"),)
+    assert found["slows"].lanes[2].stretches == (Word(2, 29, "fast"),)
     assert (found["slows"].events, found["slows"].start, found["slows"].end) == (30, "0", "2.9")
     assert in_words(found["bounded"]) == "run.jsonl, 30 events: bounded: broken 1 time, first at event 15 (t = 1.4)"
     assert in_words(found["slows"]) == "run.jsonl, 30 events: no finding"
@@ -143,7 +144,7 @@ def test_of_a_long_run_signals_are_sampled_and_no_finding_is_lost(
     assert found.every == 30
     assert sum(m.number for m in found.lanes[0].marks) == 3
     assert [m.first for m in found.lanes[0].marks] == [501, 1002, 3000]
-    assert 11.0 in {high for s in found.lanes[1].stretches if not isinstance(s.said, str) for _, high in [s.said]}
+    assert 11.0 in {s.high for s in found.lanes[1].stretches if isinstance(s, Band)}
     assert "signals of one event in 30, marks of all" in in_words(found)
 
 
@@ -177,7 +178,7 @@ HOSTILE = '</title></text></svg><script>alert(1)</script>\x00\x1b&quot;" onload=
 
 def test_text_of_a_trace_is_only_text() -> None:
     marks = tuple(Mark(kind, 1, 2, 2, HOSTILE) for kind in KINDS)
-    lane = Lane(HOSTILE, (Stretch(1, 1, HOSTILE), Stretch(2, 9, HOSTILE + "x")), marks)
+    lane = Lane(HOSTILE, (Word(1, 1, HOSTILE), Word(2, 9, HOSTILE + "x")), marks)
     whole = Timeline(HOSTILE, 9, HOSTILE, HOSTILE, (lane,))
     for svg in (picture(whole), picture(whole, alone=True)):
         assert {e.tag.rpartition("}")[2] for e in parsed(svg).iter()} <= {
@@ -198,8 +199,8 @@ def test_it_fits_its_box_whatever_the_numbers() -> None:
     chance = Random(3)
     for events in (1, 2, 1000, 10**9):
         ends = sorted(chance.randrange(1, events + 1) for _ in range(20))
-        numbers = tuple(Stretch(e, e, (-1.7e308 * chance.random(), 1.7e308 * chance.random())) for e in ends)
-        words = tuple(Stretch(e, e, "m" * chance.randrange(90)) for e in ends)
+        numbers = tuple(Band(e, e, -1.7e308 * chance.random(), 1.7e308 * chance.random()) for e in ends)
+        words = tuple(Word(e, e, "m" * chance.randrange(90)) for e in ends)
         marks = tuple(Mark(kind, e, events, 3) for kind in KINDS for e in ends)
         lanes_ = (Lane("c", (), marks), Lane("n" * 90, numbers, marks), Lane("w", words, marks))
         root = parsed(picture(Timeline("t", events, "0", "9" * 90, lanes_)))

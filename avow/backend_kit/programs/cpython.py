@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.base.codec import from_json, to_json
 from avow.drive.steps import coded
 from avow.isolation import judge
 from avow.isolation.level import Isolation
-from avow.isolation.observed import Observed, from_json, to_json
+from avow.isolation.observed import Observed
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
         return Told((), fault, (), Isolation.NONE, done.timed_out)
     replies = tuple(json.loads(r) if isinstance(r, str) else r for r in answer["replies"])
-    observed, isolation = from_json(answer["observed"]), Isolation(answer["isolation"])
+    observed, isolation = from_json(tuple[Observed, ...], answer["observed"]), Isolation(answer["isolation"])
     return Told(replies, str(answer["fault"]), observed, isolation, bool(answer["silent"]))
 
 
