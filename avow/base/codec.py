@@ -147,10 +147,32 @@ def _reader(kind: Any) -> Read:
 def _of_fields(kind: type) -> Read:
     later, names = _later(kind), frozenset(_fields(kind))
     readers = {key: (field.name, _reader(field.hint)) for key, field in _fields(kind).items()}
+    told = dataclasses.fields(kind)
+    defaults = [f.default if key in later else dataclasses.MISSING for key, f in zip(readers, told, strict=True)]
+    in_order = [(key, read, default) for (key, (_, read)), default in zip(readers.items(), defaults, strict=True)]
+    by_place = all(f.init and not f.kw_only for f in told)
+
+    def at_once(data: dict[str, Any]) -> list[Any]:
+        """The values in the order of the fields, where all is as it should be: nearly always. Else none."""
+        values, there = [], 0
+        try:
+            for key, read, default in in_order:
+                if key in data:
+                    values.append(read(data[key]))
+                    there += 1
+                elif default is dataclasses.MISSING:
+                    return []
+                else:
+                    values.append(default)
+        except Unreadable:
+            return []
+        return values if by_place and there == len(data) else []
 
     def whole(data: Any) -> Any:
         if type(data) is not dict:
             raise Unreadable(f": not a {kind.__name__}")
+        if found := at_once(data):
+            return kind(*found)
         if data.keys() != names:
             missing, extra = names - later - data.keys(), data.keys() - names
             if missing or extra:

@@ -10,12 +10,15 @@
   folder names the ledgers themselves (`avow.evidence.heads`).
 - A line has one spelling, byte for byte. Another encoding, a space or a key that stands twice is damage.
 - The same evidence appended twice is kept once.
+- ``<file>.read`` is a note of this user's Avow (`avow.base.notes`): so many first bytes, with that digest, were found
+  without damage. A run does not hold these lines against each other again; `audit` and a fresh run do.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import json
 import os
 import threading
@@ -25,6 +28,7 @@ from typing import Any
 
 from avow.base.codec import Unreadable, canonical
 from avow.base.files import read_regular, sha256, write
+from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
@@ -55,8 +59,10 @@ class Damage:
 class Ledger:
     """One system's ledger file. Safe to use from several threads and several processes at once."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, remembers: bool = False) -> None:
+        """`remembers`: what a note says was read without damage is not checked again."""
         self.path = path
+        self._remembers = remembers
         self.repaired: tuple[str, ...] = ()
         """What was done about torn lines, in sentences."""
         self._lock = threading.RLock()
@@ -111,6 +117,13 @@ class Ledger:
             found = [e for name in (obligation, digest) for e in self._refuted.get((name, backend), ())]
             return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
 
+    def check(self) -> None:
+        """Hold every line against the one before it, whatever a note says of them."""
+        with self._lock:
+            if self._remembers:
+                self._remembers = False
+                self._forget()
+
     @contextlib.contextmanager
     def still(self) -> Iterator[None]:
         """Many questions about the ledger as it stands now: within the block nothing is read, and nothing written. Not
@@ -136,16 +149,16 @@ class Ledger:
             self._mend(file)
             self._refresh()
             cut = self._lines > 0 and bool(self._cut_off())
-            added, lines, result = dict[str, Entry](), [], []
+            added, lines, result = dict[bytes, Entry](), [], []
             previous, number = self._stated_head, self._lines
             for evidence in evidences:
-                data = encode(evidence)
-                identity = canonical(data)
+                spelled = canonical(encode(evidence))
+                identity = spelled.encode()
                 known = self._known.get(identity) or added.get(identity)
                 if known is not None:
                     result.append(known)
                     continue
-                mark, line = _spell(identity, number, previous)
+                mark, line = _spell(spelled, number, previous)
                 entry = Entry(number, previous, mark, evidence)
                 lines.append(line + "\n")
                 added[identity] = entry
@@ -156,6 +169,7 @@ class Ledger:
             if lines:
                 append(file, "".join(lines).encode())
                 self._refresh()
+                self._remember()
             if lines and not cut:  # a new head would make the cut unseen; a ledger deleted as a whole begins anew
                 write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
             return tuple(result)
@@ -172,19 +186,38 @@ class Ledger:
 
     def _forget(self) -> None:
         self._seen: tuple[int, ...] = ()
+        self._digest = hashlib.sha256()
         self._offset = 0
         self._lines = 0
         self._tail = b""
         self._stated_head = GENESIS
         self._entries: list[Entry] = []
         self._damage: list[Damage] = []
-        self._known: dict[str, Entry] = {}
+        self._known: dict[bytes, Entry] = {}
         self._by_key: dict[tuple[str, str], list[Entry]] = {}
         self._refuted: dict[tuple[str, str], list[Entry]] = {}
 
     @property
     def _head_file(self) -> Path:
         return self.path.with_name(self.path.name + ".head")
+
+    @property
+    def _note(self) -> Path:
+        return self.path.with_name(self.path.name + ".read")
+
+    def _remember(self) -> None:
+        if self._remembers and not self._damage:
+            with contextlib.suppress(OSError):  # the next run reads all of it again
+                write_note(self._note, {"bytes": self._offset, "sha256": self._digest.hexdigest()})
+
+    def _remembered(self, data: bytes) -> int:
+        """How many of a ledger's bytes were read before and found without damage."""
+        said = read_note(self._note) if self._remembers and not self._offset else None
+        match said:
+            case {"bytes": int(size), "sha256": str(digest)} if size <= len(data) and sha256(data[:size]) == digest:
+                return size
+            case _:  # no note, or one of another ledger
+                return 0
 
     def _mend(self, file: int) -> None:
         """Put a torn last line (a run was killed while writing it) aside, so that the chain goes on behind it."""
@@ -222,11 +255,21 @@ class Ledger:
             self._forget()
             return
         self._seen = _identity(info)
+        known = self._remembered(data)
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
         self._tail = data[len(whole) :]
-        for line in whole.split(b"\n")[:-1]:
+        self._digest.update(whole)
+        if known:
+            self._believe(whole[:known].split(b"\n")[:-1])
+        for line in whole[known:].split(b"\n")[:-1]:
             self._take(line)
+
+    def _believe(self, lines: Sequence[bytes]) -> None:
+        """The first lines, taken before."""
+        for line, data in zip(lines, json.loads(b"[%b]" % b",".join(lines)), strict=True):
+            self._keep(line[len(_BEFORE) : line.rindex(_BEHIND)], _entry(data))
+        self._lines, self._stated_head = len(lines), self._entries[-1].hash
 
     def _take(self, line: bytes) -> None:
         number = self._lines
@@ -242,8 +285,9 @@ class Ledger:
         if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
-        identity = canonical(data["evidence"])
-        mark, spelled = _spell(identity, entry.number, entry.previous)
+        evidence = canonical(data["evidence"])
+        identity = evidence.encode()
+        mark, spelled = _spell(evidence, entry.number, entry.previous)
         if mark != entry.hash:
             self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
             return
@@ -251,6 +295,9 @@ class Ledger:
             self._damage.append(Damage(number + 1, "is not spelled as it was written (encoding, spaces, doubled keys)"))
         if follows and identity in self._known:
             self._damage.append(Damage(number + 1, f"repeats record {self._known[identity].number + 1}"))
+        self._keep(identity, entry)
+
+    def _keep(self, identity: bytes, entry: Entry) -> None:
         self._entries.append(entry)
         self._known.setdefault(identity, entry)
         record = entry.evidence
@@ -286,7 +333,11 @@ class Ledger:
 @functools.cache
 def ledger_of(path: Path) -> Ledger:
     """One reader for each file and process: it reads what was added since, not all again."""
-    return Ledger(path)
+    return Ledger(path, remembers=True)
+
+
+_BEFORE, _BEHIND = b'{"evidence":', b',"hash":"'
+"""What stands in a line before its record, and last in it behind it."""
 
 
 def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:

@@ -62,6 +62,8 @@ def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected
         return surveyed
     path = state.workspace.ledger(surveyed.system.name)
     try:
+        if state.run.fresh:
+            ledger_of(path).check()
         ledger_of(path).records()
         read_index(index_path(path.parent))
     except OSError as error:

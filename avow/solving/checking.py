@@ -7,12 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, assert_never
 from typing import Literal as OneOf
 
-import z3
-
 from avow.base.records import dataclass
 from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps, watchdog
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
+from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Sorts
 from avow.tuning.bounds import SMALL_NUMBER
 from avow.tuning.effort import QUESTION_EFFORT, QUESTION_STEPS, SMALLER_MODEL_EFFORT

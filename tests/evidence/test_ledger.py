@@ -20,6 +20,7 @@ from assurance.sample import chain, evidence
 
 from avow.assurance.codec import evidence_schema
 from avow.base.codec import Unreadable
+from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence import ledger as module
 from avow.evidence.encoding import decode, encode
@@ -257,3 +258,52 @@ def test_while_it_stands_still_nothing_is_read_and_nothing_written(tmp_path: Pat
     ledger.append(third)
     assert len(other.records()) == 3
     assert not ledger.damage
+
+
+def remembered(path: Path) -> Ledger:
+    ledger = Ledger(path, remembers=True)
+    ledger.append_all(some(6))
+    return ledger
+
+
+def test_lines_that_were_found_whole_are_not_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "x.jsonl"
+    remembered(path)
+    Ledger(path).append(evidence("node.later"))  # by one that leaves no note
+    taken: list[int] = []
+    take = Ledger._take
+    monkeypatch.setattr(Ledger, "_take", lambda ledger, line: (taken.append(len(line)), take(ledger, line))[1])
+    again = Ledger(path, remembers=True)
+    assert again.records() == Ledger(path).records()
+    assert len(taken) == 1 + 7
+    assert again.append(some(6)[2]).number == 2, "what is there is known"
+    again.check()
+    assert again.records() == Ledger(path).records()
+    assert again.damage == ()
+    assert len(taken) == 1 + 7 + 7 + 7
+
+
+@pytest.mark.parametrize("at", [0, 2, 5])
+@pytest.mark.parametrize(
+    ("old", "new"), [("proved", "tested"), ('"n":', '"n": '), ('"vacuous":false', '"vacuous":true ')]
+)
+def test_a_note_on_a_ledger_makes_no_edit_unseen(tmp_path: Path, at: int, old: str, new: str) -> None:
+    path = tmp_path / "x.jsonl"
+    remembered(path)
+    lines = path.read_text().splitlines(keepends=True)
+    lines[at] = lines[at].replace(old, new, 1)
+    path.write_text("".join(lines))
+    for _ in range(2):
+        assert Ledger(path, remembers=True).damage == Ledger(path).damage != ()
+    path.write_text("".join(lines[:at] + lines[at + 1 :]))
+    assert Ledger(path, remembers=True).damage == Ledger(path).damage != ()
+
+
+def test_an_edited_note_on_a_ledger_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    remembered(path)
+    note = path.with_name("x.jsonl.read")
+    path.write_text(path.read_text().replace("proved", "tested", 1))
+    said = json.loads(note.read_text()) | {"sha256": sha256(path.read_bytes())}
+    note.write_text(json.dumps(said))
+    assert Ledger(path, remembers=True).damage != ()
