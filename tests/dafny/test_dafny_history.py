@@ -7,7 +7,7 @@ import random
 from collections.abc import Sequence
 
 import pytest
-from temporal.positions import Step, broken, value
+from oracle.values import Step, broken, value
 from temporal.test_cells import formula, response, run_of
 
 from avow.backend_kit.protocol import Limits

@@ -9,7 +9,7 @@ import random
 from itertools import product
 
 import pytest
-from temporal.positions import broken, value
+from oracle.values import broken, value
 
 from avow.fretish.meaning import Unsaid, demands
 from avow.fretish.sentence import Condition, Denied, Duration, Expression, Name, Scope, Sentence, Timing

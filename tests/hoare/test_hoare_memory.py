@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from helpers import some
-from temporal import positions
+from oracle.values import breaks, keeps
 from temporal.test_cells import A, B, N, formula
 from temporal.test_systems import clause as drawn_clause
 
@@ -20,7 +20,7 @@ from avow.base.verdict import Outcome, Verdict
 from avow.formulas.formula import substitute
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
-from avow.language.terms import RESPONSES, History, Implies, Literal, Term
+from avow.language.terms import Literal
 
 from .systems import make_job
 
@@ -185,12 +185,6 @@ def text_of(table: dict[tuple[int, bool], tuple[bool, int]]) -> str:
     return "\n".join((*lines, "ELSE", "  b := FALSE", "ENDIF")) + "\n"
 
 
-def broken(clause: Term, run: list[dict[str, bool]]) -> bool:
-    if isinstance(clause, Implies) and isinstance(clause.right, History) and clause.right.operator in RESPONSES:
-        return positions.broken(clause.left, clause.right, run) is not None
-    return not all(positions.value(clause, run, k) for k in range(len(run)))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(200), 4))
 def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> None:
@@ -209,14 +203,14 @@ def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> N
         for a in word:
             b, state = table[state, a]
             run.append({"in.a": a, "out.b": b})
-            if not positions.value(assumption, run, len(run) - 1):
+            if not keeps(assumption, run):
                 break
-            bad = bad or broken(guarantee, run)
+            bad = bad or breaks(guarantee, run)
     assert found.verdict in (Verdict.PROVED, Verdict.REFUTED, Verdict.UNKNOWN), found.summary
     assert found.verdict is not Verdict.PROVED or not bad, said
     if found.verdict is Verdict.REFUTED:
         assert found.counterexample is not None
         steps = found.counterexample.trace or (found.counterexample.values,)
         run = [{name: value == "TRUE" for name, value in step} for step in steps]
-        assert broken(guarantee, run), said
-        assert all(positions.value(assumption, run, k) for k in range(len(run)))
+        assert breaks(guarantee, run), said
+        assert not breaks(assumption, run)

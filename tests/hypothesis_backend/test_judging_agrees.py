@@ -9,12 +9,12 @@ import json
 import random
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 import pytest
 from helpers import some
+from oracle.values import plain
 from rosmonitoring.conftest import make_system
-from rosmonitoring.test_agreement import MAPPING, NATURALS, RCL, REALS, formula, truth
+from rosmonitoring.test_agreement import MAPPING, MEANING, RCL, formula
 
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.judging import judged
@@ -50,21 +50,6 @@ def value(rng: random.Random, variable: Variable) -> Value:
     return rng.choice((0, 1, 2))
 
 
-def plain(found: Value) -> Any:
-    """As the brute force has values: elements as strings, commands as tuples, relations as sets of tuples."""
-    match found:
-        case Element(name=name):
-            return name
-        case Data(constructor=name, arguments=arguments):
-            return (name, *map(plain, arguments))
-        case FunctionValue(table=table):
-            return {tuple(map(plain, key)) for key in table}
-        case bool():
-            return found
-        case _:
-            return Fraction(found)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("seed", some(range(4), 2, slow=2))
 def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> None:
     rng = random.Random(seed)
@@ -78,7 +63,7 @@ def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> No
         for _ in range(4):
             values = {v: value(rng, v) for v in sorted(free_variables(clause.formula), key=lambda v: v.qualified)}
             snapshot = {v.qualified: plain(found) for v, found in values.items()}
-            expected = truth(clause.formula, snapshot, {}, REALS, NATURALS)
+            expected = MEANING.holds(clause.formula, snapshot)
             assert judge.holds({v.qualified: found for v, found in values.items()}) is expected, (clause.text, values)
             if rng.random() < 0.3:
                 by_z3 = replay([clause.formula], values, effort=3000)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from helpers import some
 from hoare.systems import make_job
-from temporal import positions
+from oracle.values import breaks, keeps
 from temporal.test_cells import A, B, N, formula
 from temporal.test_systems import clause as drawn_clause
 
@@ -28,7 +28,7 @@ from avow.formulas.values import Value
 from avow.isolation.subject import SubjectProcess
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
-from avow.language.terms import RESPONSES, History, Implies, Literal, Term
+from avow.language.terms import Literal, Term
 
 GATE = """node gate {
   inputs( request : BOOL, reading : REAL )
@@ -192,12 +192,6 @@ class Machine(FunctionBench):
         return {"b": output}
 
 
-def broken(clause: Term, run: list[dict[str, bool]]) -> bool:
-    if isinstance(clause, Implies) and isinstance(clause.right, History) and clause.right.operator in RESPONSES:
-        return positions.broken(clause.left, clause.right, run) is not None
-    return not all(positions.value(clause, run, k) for k in range(len(run)))
-
-
 def shortest(table: Mapping[tuple[int, bool], tuple[bool, int]], assumed: Term, promised: Term, most: int) -> bool:
     """Whether a run of so many steps keeps the assumption and breaks the guarantee."""
     for word in product((False, True), repeat=most):
@@ -205,9 +199,9 @@ def shortest(table: Mapping[tuple[int, bool], tuple[bool, int]], assumed: Term, 
         for a in word:
             b, state = table[state, a]
             run.append({"in.a": a, "out.b": b})
-            if not positions.value(assumed, run, len(run) - 1):
+            if not keeps(assumed, run):
                 break
-            if broken(promised, run):
+            if breaks(promised, run):
                 return True
     return False
 
@@ -232,5 +226,5 @@ def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> N
         return
     assert bench._shrunk("g") is not None
     found = [{"in.a": i["a"], "out.b": o["b"]} for i, o in bench.traces["g"]]
-    assert broken(clauses[1], found), rcl  # type: ignore[arg-type]
-    assert all(positions.value(clauses[0], found, k) for k in range(len(found)))
+    assert breaks(clauses[1], found), rcl  # type: ignore[arg-type]
+    assert not breaks(clauses[0], found)

@@ -1,7 +1,7 @@
 """Random contracts over nearly all of the language, small enough that every case can be written out.
 
 A port of an infinite type has a clause of its own, named `LIMIT` and the port, that admits only values of
-`enumeration.domain`, and not all of these.
+`oracle.values.domain`, and not all of these.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from random import Random
 
-LIMIT = "limit_"
+from oracle.sanity import LIMIT
 
 CONTEXT = """\
 context {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Mapping
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from oracle.values import Step, domain, holds, plain, situations
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest, free_variables, normalise
@@ -16,34 +17,14 @@ from avow.language.terms import Not, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.solving.questions import entails, replay, solve
 
-from .enumeration import Enumeration, Values, domain
 from .random_formulas import FUNCTION_OUTPUT, INPUTS, OUTPUTS, formulas
-
-holds = Enumeration().holds
 
 few = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
 
-def situations(variables: tuple[Variable, ...]) -> list[Values]:
-    return [dict(zip(variables, choice, strict=True)) for choice in product(*(domain(v.sort) for v in variables))]
-
-
-def plain(value: Value) -> object:
-    """A solver's value in the brute-force evaluator's terms."""
-    if isinstance(value, Element):
-        return value.name
-    return value
-
-
-def spread(values: dict[Variable, Value]) -> Values:
-    result: Values = {}
-    for variable, value in values.items():
-        if isinstance(value, FunctionValue):
-            points = domain(variable.sort.parameters[0])  # type: ignore[union-attr]
-            result[variable] = {(p,): plain(value(Element(str(p)))) for p in points}
-        else:
-            result[variable] = plain(value)
-    return result
+def named(values: Mapping[Variable, Value]) -> Step:
+    """A solver's values in the oracle's terms."""
+    return {variable.qualified: plain(value) for variable, value in values.items()}
 
 
 def as_value(value: object) -> Value:
@@ -63,7 +44,7 @@ def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
     answer = solve([term], effort=20_000)
     assert answer.status == ("sat" if expected else "unsat")
     if expected:
-        assert holds(term, spread(dict(answer.values))) is True
+        assert holds(term, named(answer.values)) is True
 
 
 @few
@@ -75,8 +56,8 @@ def test_entailment_is_right(left: Term, right: Term) -> None:
     assert answer.verdict is (Verdict.PROVED if expected else Verdict.REFUTED)
     if not expected:
         values = {**{v: as_value(domain(v.sort)[0]) for v in free}, **answer.values}
-        assert holds(left, spread(values)) is True
-        assert holds(right, spread(values)) is False
+        assert holds(left, named(values)) is True
+        assert holds(right, named(values)) is False
 
 
 @few
@@ -84,8 +65,7 @@ def test_entailment_is_right(left: Term, right: Term) -> None:
 def test_replay_agrees_with_evaluation(term: Term, data: st.DataObject) -> None:
     free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
     situation = data.draw(st.sampled_from(situations(free)))
-    values = {variable: as_value(value) for variable, value in situation.items()}
-    assert replay([term], values) is holds(term, situation)
+    assert replay([term], {v: as_value(situation[v.qualified]) for v in free}) is holds(term, situation)
 
 
 @few
@@ -110,7 +90,7 @@ def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
     @settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
     @given(formulas(INPUTS), st.lists(formulas(INPUTS + outputs), min_size=1, max_size=3))
     def check(assumption: Term, guarantees: list[Term]) -> None:
-        def met(inputs: Values) -> bool:
+        def met(inputs: Step) -> bool:
             return any(all(holds(g, {**inputs, **out}) for g in guarantees) for out in situations(outputs))
 
         allowed = [inputs for inputs in situations(INPUTS) if holds(assumption, inputs)]
@@ -120,7 +100,7 @@ def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
         verdicts.append(answer.verdict)
         assert answer.verdict in {Verdict.PROVED if expected else Verdict.REFUTED, Verdict.UNKNOWN}
         if answer.verdict is Verdict.REFUTED:
-            inputs = spread({v: as_value(domain(v.sort)[0]) for v in INPUTS} | dict(answer.inputs))
+            inputs = named({v: as_value(domain(v.sort)[0]) for v in INPUTS} | dict(answer.inputs))
             assert holds(assumption, inputs)
             assert not met(inputs)
 

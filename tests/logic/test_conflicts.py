@@ -8,18 +8,17 @@ from itertools import combinations, product
 
 import pytest
 from helpers import some
+from oracle.values import holds
 
 from avow.base.verdict import Verdict
 from avow.formulas.values import Value
-from avow.language.terms import Role, Variable
+from avow.language.terms import Role
 from avow.sanity.conflicts import Conflict, conflicts
 from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import realizable
 
 from .contracts import contract
-from .enumeration import Enumeration
 
-holds = Enumeration().holds
 LABELS = tuple("abcdefg")
 
 
@@ -100,8 +99,8 @@ def test_conflicts_are_those_of_enumeration_and_are_wherever_it_is_said(seed: in
     text = drawn(random.Random(seed))
     (node,) = contract(text).nodes
     bools: tuple[Value, ...] = (False, True)
-    inputs = [p.variable for p in node.inputs]
-    outputs = [p.variable for p in node.outputs]
+    inputs = [p.variable.qualified for p in node.inputs]
+    outputs = [p.variable.qualified for p in node.outputs]
     formulas = {c.name: c.formula for c in node.guarantees}
     allowed = [
         at
@@ -116,7 +115,7 @@ def test_conflicts_are_those_of_enumeration_and_are_wherever_it_is_said(seed: in
         for at in allowed
     }
 
-    def fails(chosen: frozenset[str], at: dict[Variable, Value]) -> bool:
+    def fails(chosen: frozenset[str], at: dict[str, Value]) -> bool:
         return not any(chosen <= some for some in met[tuple(at.values())])
 
     failing = [s for s in subsets(formulas) if any(fails(s, at) for at in allowed)]
@@ -130,7 +129,7 @@ def test_conflicts_are_those_of_enumeration_and_are_wherever_it_is_said(seed: in
         assert any(fails(chosen, at) and not any(fails(chosen - {g}, at) for g in chosen) for at in allowed)
         assert conflict.where is not None
         for at in allowed:
-            same = all(at[v] == value for v, value in conflict.inputs.items())
+            same = all(at[v.qualified] == value for v, value in conflict.inputs.items())
             if same or (conflict.where and all(holds(term, at) for term in conflict.where)):
                 assert fails(chosen, at), (conflict, at)
 

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 import z3
 from helpers import some
+from oracle.values import Meaning
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.cases import TooManyCases, lifted
-from avow.formulas.formula import digest, normalise
+from avow.formulas.formula import digest, free_variables, normalise
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.traversal import subterms
 from avow.kernel.text import Text
@@ -33,8 +34,6 @@ from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Iff, 
 from avow.sanity.mutants import mutants
 from avow.solving.questions import entails, solve
 from avow.solving.smtlib import ask_cvc5, formulas_script
-
-from .enumeration import Enumeration
 
 CONTRACT = (
     "node n { inputs( a : INTEGER, k : NATURAL, p : BOOL, x : REAL ) outputs( q : BOOL ) topics() guarantee( q ) }"
@@ -130,10 +129,6 @@ class Writer:
         )
 
 
-def valuation(term: Term, values: dict[str, Any]) -> dict[Variable, Any]:
-    return {part: values[part.name] for part in subterms(term) if isinstance(part, Variable)}
-
-
 def named(values: dict[str, Any]) -> dict[str, Any]:
     return {("out." if name == "q" else "in.") + name: value for name, value in values.items()}
 
@@ -214,7 +209,7 @@ def test_the_columns_of_one_operator_agree(name: str) -> None:
     assert f"({row.smtlib} " in script or ((name in ("!=", "if") and "not" in script) or "ite" in script), script
     checked = 0
     for values in GRID:
-        held = Enumeration().holds(formula, valuation(formula, values))
+        held = Meaning().holds(formula, named(values))
         assert evaluate(formula, named(values)) is held
         checked += held
     assert entails([], formula).verdict is not Verdict.PROVED
@@ -269,8 +264,8 @@ def test_a_divisor_stays_positive_in_mutants() -> None:
 
 def wherever_defined(term: Term, values: dict[str, Any]) -> bool | None:
     """The truth by enumeration; None where it may depend on what a division by zero yields."""
-    enumeration = Enumeration()
-    held = enumeration.holds(term, valuation(term, values))
+    enumeration = Meaning()
+    held = enumeration.holds(term, named(values))
     return None if enumeration.strayed else held
 
 
@@ -306,7 +301,7 @@ def test_what_is_printed_reads_back(seed: int) -> None:
 
 
 def fixed(values: dict[str, Any], term: Term) -> list[Term]:
-    return [Compare("==", v, Literal(values[v.name], v.sort)) for v in valuation(term, values)]
+    return [Compare("==", v, Literal(values[v.name], v.sort)) for v in free_variables(term)]
 
 
 @pytest.mark.parametrize("seed", some(range(40), 20))

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import pytest
+from oracle.sanity import Survey, is_small, judge
+from oracle.values import Meaning
 
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
@@ -20,8 +22,6 @@ from avow.sanity.analysis import SanityResult, analyse
 from avow.sanity.claims import Property
 
 from .contracts import node
-from .enumeration import Enumeration
-from .oracle import Survey, is_small, judge
 from .random_contracts import random_contract
 
 QUICK = (1, 3, 7, 8, 22, 24, 25, 28)
@@ -127,7 +127,7 @@ def test_the_facts_of_a_contract_that_is_bad_in_every_way() -> None:
         "| assume limit_n ( n <= 1 ) assume TRUISM ( n >= 0 ) assume ( n <= 2 ) assume ONLY ( n == 0 )"
         " guarantee DEMAND ( in.i -> out.o ) guarantee NEVER ( n == 1 -> out.o ) guarantee DENIAL ( not out.o )"
     )
-    facts = Survey(bad, Enumeration()).facts()
+    facts = Survey(bad, Meaning()).facts()
     assert {name for name, fact in facts.items() if not fact.holds} == {
         *("realizable", "not-tautological-NEVER", "not-vacuous-NEVER", "not-redundant-NEVER", "constrained-free"),
         *("determined-free", "not-tautological-TRUISM", "not-redundant-TRUISM", "needed-TRUISM"),

@@ -10,40 +10,21 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from itertools import product
 from typing import Any
 
 import pytest
 from helpers import some
+from oracle.values import Meaning
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.rml_interpreter import Interpreter
 from avow.backends.rosmonitoring.rml_translate import translate
 from avow.backends.rosmonitoring.watched import Fault
-from avow.language.sorts import NaturalSort
+from avow.language.sorts import NATURAL, REAL
 from avow.language.terms import (
-    And,
-    Apply,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    SetTerm,
     Term,
     Variable,
-    Widen,
 )
 from avow.system.plan import System
 
@@ -249,71 +230,11 @@ def whole(raw: Any) -> Fraction:
     return real(raw)
 
 
-def truth(term: Term, snapshot: Snapshot, bound: dict[str, Any], reals: set[Any], naturals: set[Any]) -> Any:
-    def value(part: Term) -> Any:
-        return truth(part, snapshot, bound, reals, naturals)
-
-    match term:
-        case Literal(value=raw):
-            return raw if isinstance(raw, bool) else Fraction(raw) if not isinstance(raw, str) else raw
-        case EnumValue(name=name):
-            return name
-        case Variable():
-            return bound[term.name] if term.name in bound else snapshot[term.qualified]
-        case Construct(constructor=name, arguments=arguments):
-            return (name, *map(value, arguments))
-        case Apply(function=function, arguments=arguments):
-            return tuple(map(value, arguments)) in value(function)
-        case Widen(term=inner):
-            return value(inner)
-        case Negative(term=inner):
-            return -value(inner)
-        case Arithmetic(operator=operator, left=left, right=right):
-            return value(left) + value(right) if operator == "+" else value(left) - value(right)
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            return value(then) if value(condition) else value(otherwise)
-        case Operation(operator=name, arguments=arguments):
-            given = [value(a) for a in arguments]
-            match name:
-                case "xor":
-                    return given[0] is not given[1]
-                case "mod":
-                    return given[0] - given[1] * (given[0] // given[1])
-            return {"min": min, "max": max, "abs": lambda a: max(a, -a)}[name](*given)
-        case Compare(operator=operator, left=left, right=right):
-            a, b = value(left), value(right)
-            if operator in ("==", "!="):
-                return (a == b) is (operator == "==")
-            return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b}[operator]
-        case In(item=item, collection=SetTerm(items=items)):
-            return value(item) in [value(i) for i in items]
-        case Not(body=body):
-            return not value(body)
-        case And(items=items):
-            return all(value(i) for i in items)
-        case Or(items=items):
-            return any(value(i) for i in items)
-        case Implies(left=left, right=right):
-            return not value(left) or value(right)
-        case Iff(left=left, right=right):
-            return value(left) == value(right)
-        case Quantified(quantifier=quantifier, variables=variables, body=body):
-            pools = [naturals if isinstance(v.sort, NaturalSort) else reals for v in variables]
-            names = [v.name for v in variables]
-            found = (
-                truth(body, snapshot, {**bound, **dict(zip(names, chosen, strict=True))}, reals, naturals)
-                for chosen in product(*pools)
-            )
-            if quantifier is Quantifier.UNIQUE:
-                return sum(found) == 1
-            return any(found) if quantifier is Quantifier.EXISTS else all(found)
-    raise AssertionError(term)
-
-
 REALS = {Fraction(v, 2) for v in (-5, -3, -1, 0, 1, 2, 4, 5, 8, 14, 17)}
 NATURALS = {Fraction(v) for v in range(5)}
 """Large enough for these formulas: every value that occurs in them and in the traces, one between each two neighbours,
 and one beyond each end."""
+MEANING = Meaning(ranges={REAL: REALS, NATURAL: NATURALS})
 
 
 def brute_force(system: System, events: list[dict[str, Any]], when: str = "outputs") -> int | None:
@@ -345,7 +266,7 @@ def brute_force(system: System, events: list[dict[str, Any]], when: str = "outpu
         if due:
             fresh = set()
         judged = due and mentioned <= snapshot.keys()
-        if judged and not truth(clause.formula, snapshot, {}, REALS, NATURALS):
+        if judged and not MEANING.holds(clause.formula, snapshot):
             return index
         if "out.marks" in awaited and len(awaited) > 1:
             if due:

@@ -6,8 +6,8 @@ import random
 from dataclasses import replace
 from typing import Any
 
+from oracle.values import Step
 from temporal import test_quantified_cells as quantified
-from temporal.positions import Step
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup, setup
@@ -66,7 +66,7 @@ def wrong(known: Setup, rng: random.Random) -> str | None:
         decided, broken = tally.decided, tally.broken
         monitor.step(event)
         told.append(None if tally.decided == decided else tally.broken == broken)
-    expected = [quantified.by_definition(term, run, k) for k in range(len(run))]
+    expected = quantified.by_definition(term, run)
     differs = any(one is not None and one is not other for one, other in zip(told, expected, strict=True))
     return f"{clause}: {told} for {expected}" if differs or (None in told and not tally.reason) else None
 

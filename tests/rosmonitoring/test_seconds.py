@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from oracle.seconds import InSeconds, Word
 from temporal.test_clock import A, B, X, formula, word_of
-from temporal.timed_words import Meaning, Word
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup
@@ -177,7 +177,7 @@ def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
     limit = None if operator is Past.UNTIL else Limit("", Literal(Fraction(rng.randrange(4)), REAL), False)
     wanted = tuple(formula(rng, 1) for _ in range(2 if operator is Past.UNTIL else 1))
     response = History(operator, wanted, BOOL, limit)
-    meaning, judged, wrong = Meaning(word), 0, list[str]()
+    meaning, judged, wrong = InSeconds(word), 0, list[str]()
     for whole in (term, Implies(trigger, response)):
         about, asked = free_variables(whole), free_variables(trigger)
         of_inputs = whole is not term and bool(asked) and asked <= {A, X}
@@ -192,13 +192,13 @@ def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
                 told += monitor.step({"topic": each, "time": time, **parts[each]})
         if monitor.tallies["g"].reason:  # refused by name
             continue
-        places = range(len(meaning.positions))
+        places = range(len(word.positions))
         first = (
-            next((p for p in places if not meaning.value(term, p)), None)
+            next((p for p in places if not meaning.at(term, p)), None)
             if whole is term
-            else meaning.broken(trigger, response)
+            else meaning.broken(trigger, response, word)
         )
-        expected = [] if first is None else [str(meaning.positions[first].start)]
+        expected = [] if first is None else [str(word.positions[first].start)]
         judged += 1
         if [v.time for v in told][:1] != expected:
             wrong.append(f"{show_term(whole, 'rcl')}: {told[:1]} for {expected} of {word}, {topics}")

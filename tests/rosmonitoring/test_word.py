@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from helpers import some
-from temporal.positions import Step, broken, value
+from oracle.values import Step, broken, value
 from temporal.test_cells import formula, response, run_of
 
 from avow.backend_kit.protocol import Limits

@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable
 
 import pytest
+from oracle.values import Step, broken, value
 
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
@@ -36,7 +37,6 @@ from avow.language.terms import (
     Variable,
     histories,
 )
-from temporal.positions import Step, broken, value
 
 A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
 N = Variable(Role.INPUT, "n", NATURAL)

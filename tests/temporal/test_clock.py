@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import pytest
+from oracle.seconds import InSeconds, Word
 
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
@@ -34,7 +35,6 @@ from avow.language.terms import (
     Variable,
     timed,
 )
-from temporal.timed_words import Meaning, Word
 
 A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
 X = Variable(Role.INPUT, "x", REAL)
@@ -131,7 +131,7 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
     limit = Limit("", Literal(Fraction(rng.randrange(4)), REAL), False) if operator is not Past.UNTIL else None
     wanted = (formula(rng, 1), formula(rng, 1)) if operator is Past.UNTIL else (formula(rng, 1),)
     response = History(operator, wanted, BOOL, limit)
-    meaning = Meaning(word)
+    meaning = InSeconds(word)
     for whole in (term, Implies(trigger, response)):
         if timed(whole) is None:
             continue
@@ -147,19 +147,19 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
             judged, values = along(word, records, clause, positions, instants)
         except AssertionError:
             return f"{shown}: an interval is not alike"
-        places = range(len(meaning.positions))
+        places = range(len(word.positions))
         if whole is term:
-            expected = [bool(meaning.value(term, p)) for p in places]
+            expected = [bool(meaning.at(term, p)) for p in places]
             if values != expected:
                 return f"{shown}: {[p for p in places if values[p] != expected[p]]} of {word.times}"
         else:
             first = next((p for p in places if not values[p]), None)
-            if first != meaning.broken(trigger, response):
-                return f"{shown}: first broken {first}, {meaning.broken(trigger, response)} of {word}"
+            if first != meaning.broken(trigger, response, word):
+                return f"{shown}: first broken {first}, {meaning.broken(trigger, response, word)} of {word}"
         for k in range(len(word.steps)):  # a step tells of itself, and of the silence before it unless it was told then
-            before = meaning.places[k - 1] + 1 if k else 0
+            before = word.places[k - 1] + 1 if k else 0
             told = k > 0 and not values[before - 1]
-            if judged[k] != all(values[before : meaning.places[k] + 1]) and not told:
+            if judged[k] != all(values[before : word.places[k] + 1]) and not told:
                 return f"{shown}: at step {k}"
     return None
 

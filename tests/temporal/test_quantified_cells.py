@@ -4,10 +4,10 @@ values up to a number that no step names."""
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
 
 import pytest
 from helpers import some
+from oracle.values import Meaning, Step, plain
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evaluation.running import Keeper
@@ -18,8 +18,7 @@ from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL, FunctionSort, SequenceSort
 from avow.language.terms import Apply, Compare, In, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.tuning.bounds import INSTANCES
-from temporal import positions, test_cells
-from temporal.positions import Step
+from temporal import test_cells
 from temporal.test_cells import A, N, record
 
 K, L = (Variable(Role.BOUND, name, NATURAL) for name in "kl")
@@ -78,16 +77,9 @@ def run_of(rng: random.Random, length: int = 6) -> list[Step]:
     return [step() for _ in range(length)]
 
 
-def by_definition(term: Term, run: list[Step], k: int) -> bool:
-    assert isinstance(term, Quantified)
-    over = all if term.quantifier is Quantifier.FORALL else any
-    name, rest = term.variables[0].name, term.variables[1:]
-    inside: Callable[[list[Step]], bool] = lambda steps: (  # noqa: E731
-        by_definition(Quantified(term.quantifier, rest, term.body), steps, k)
-        if rest
-        else bool(positions.value(term.body, steps, k))
-    )
-    return over(inside([{**step, name: n} for step in run]) for n in range(ALL))
+def by_definition(term: Term, run: list[Step]) -> list[bool]:
+    shown = [{name: plain(v) for name, v in step.items()} for step in run]
+    return [Meaning(ranges={NATURAL: range(ALL)}).value(term, shown, k) for k in range(len(run))]
 
 
 def agreed(rng: random.Random) -> bool | str:
@@ -98,7 +90,7 @@ def agreed(rng: random.Random) -> bool | str:
         found = test_cells.judged(term, run)
     except NotEvaluable:
         return False
-    return found == [by_definition(term, run, k) for k in range(len(run))] or show_term(term, "rcl")
+    return found == by_definition(term, run) or show_term(term, "rcl")
 
 
 @pytest.mark.parametrize("seed", some(range(4), 2, slow=2))

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 from helpers import some
+from oracle.runs import longer
+from oracle.values import Step, keeps
 
 from avow.base.verdict import Verdict
 from avow.calculus.discharge import Bounds
@@ -13,8 +15,7 @@ from avow.calculus.refinement import refines
 from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Node
 from avow.language.load import check_text
-from temporal.positions import Step
-from temporal.test_viability import BOTH, drawn, holds, node_of
+from temporal.test_viability import drawn, node_of
 
 DEPTH = 4
 
@@ -25,16 +26,14 @@ def broken_by(concrete: Node, abstract: Node, run: list[Step] | None = None) -> 
     found: set[str] = set()
     if len(run) == DEPTH:
         return found
-    for a in BOTH:
-        for b in BOTH:
-            longer = [*run, {"in.a": a, "out.b": b, "in.n": 1}]
-            if not all(holds(c.formula, longer) for c in abstract.assumptions):
-                continue
-            wrong = {f"A {c.name}" for c in concrete.assumptions if not holds(c.formula, longer)}
-            if not wrong and all(holds(g.formula, longer) for g in concrete.guarantees):
-                wrong = {f"G {g.name}" for g in abstract.guarantees if not holds(g.formula, longer)}
-                found |= wrong or broken_by(concrete, abstract, longer)
-            found |= wrong
+    for more in longer(run):
+        if not all(keeps(c.formula, more) for c in abstract.assumptions):
+            continue
+        wrong = {f"A {c.name}" for c in concrete.assumptions if not keeps(c.formula, more)}
+        if not wrong and all(keeps(g.formula, more) for g in concrete.guarantees):
+            wrong = {f"G {g.name}" for g in abstract.guarantees if not keeps(g.formula, more)}
+            found |= wrong or broken_by(concrete, abstract, more)
+        found |= wrong
     return found
 
 

@@ -1,6 +1,6 @@
 """What the sanity verdicts about a small contract have to be: every input is written out with every output.
 
-A claim *holds* of the cases listed, where its output ranges over the values of `enumeration.domain`:
+A claim *holds* of the cases listed, where its output ranges over the values of `values.domain`:
 
 | claim                   | holds if                                                                             |
 |-------------------------|--------------------------------------------------------------------------------------|
@@ -16,7 +16,7 @@ A claim *holds* of the cases listed, where its output ranges over the values of 
 | determined              | no allowed input has two good outputs that differ in this one                        |
 | needed                  | an input that meets all assumptions but this one has no good output                  |
 
-Infinite types are cut off, which decides no less where the clauses that limit them (`random_contracts.LIMIT`) apply.
+Infinite types are cut off, which decides no less where the clauses that limit them (`LIMIT`) apply.
 Where they do not (a guarantee by itself, the limits themselves), an example decides, and that there is none does not.
 Elements outside a sequence and quotients by zero have two values in turn; an answer must be right with either, and a
 claim of a contract that asks for one may stay open.
@@ -38,9 +38,10 @@ from avow.language.terms import Term, Variable
 from avow.sanity.analysis import SanityResult
 from avow.sanity.claims import triggers
 
-from .enumeration import Enumeration, Values, domain, is_finite
-from .random_contracts import LIMIT
+from .values import Meaning, Step, domain, is_finite
 
+LIMIT = "limit_"
+"""A clause of this name keeps the port named after it within the values of `values.domain`, and not all of these."""
 MOST_CASES = 4_000
 """Contracts with more pairs of an input and an output are left out."""
 
@@ -75,10 +76,10 @@ def is_small(node: Node) -> bool:
 
 def judge(node: Node, results: Iterable[SanityResult]) -> Judgement:
     """Hold verdicts against the facts about a node that is small."""
-    surveys = [Survey(node, Enumeration(0))]
+    surveys = [Survey(node, Meaning(0))]
     strayed = surveys[0].meaning.strayed
     if strayed:
-        surveys.append(Survey(node, Enumeration(-1)))
+        surveys.append(Survey(node, Meaning(-1)))
     tables = [survey.facts() for survey in surveys]
     found: dict[str, list[str]] = {"right": [], "wrong": [], "unknown": [], "hinging": []}
     for result in results:
@@ -114,7 +115,7 @@ class Situation:
 class Survey:
     """All cases of a node."""
 
-    def __init__(self, node: Node, meaning: Enumeration) -> None:
+    def __init__(self, node: Node, meaning: Meaning) -> None:
         self.node = node
         self.meaning = meaning
         self.outputs = [port.variable for port in node.outputs]
@@ -131,13 +132,13 @@ class Survey:
             cases = tuple(self._case(at, {**given, **chosen}) for at, chosen in _choices(self.outputs))
             yield Situation(self._failed(self.assumptions, given), cases)
 
-    def _case(self, at: tuple[int, ...], values: Values) -> Case:
+    def _case(self, at: tuple[int, ...], values: Step) -> Case:
         triggered = {
             name: tuple(self.meaning.holds(trigger, values) for trigger in each) for name, each in self.triggers.items()
         }
         return Case(at, self._failed(self.guarantees, values), triggered)
 
-    def _failed(self, clauses: Mapping[str, Term], values: Values) -> frozenset[str]:
+    def _failed(self, clauses: Mapping[str, Term], values: Step) -> frozenset[str]:
         return frozenset(name for name, formula in clauses.items() if not self.meaning.holds(formula, values))
 
     def facts(self) -> dict[str, Fact]:
@@ -190,10 +191,10 @@ class Survey:
         }
 
 
-def _choices(variables: Sequence[Variable]) -> Iterator[tuple[tuple[int, ...], Values]]:
+def _choices(variables: Sequence[Variable]) -> Iterator[tuple[tuple[int, ...], Step]]:
     """Every choice of values, with their places in the domains."""
     for chosen in product(*(tuple(enumerate(domain(v.sort))) for v in variables)):
-        yield tuple(k for k, _ in chosen), {v: value for v, (_, value) in zip(variables, chosen, strict=True)}
+        yield tuple(k for k, _ in chosen), {v.qualified: value for v, (_, value) in zip(variables, chosen, strict=True)}
 
 
 def _without(at: tuple[int, ...], place: int) -> tuple[int, ...]:
