@@ -108,7 +108,7 @@ class RosMonitoringBackend(Backend):
     def export(self, job: Job) -> Mapping[str, str]:
         from .configuration import configuration, identifier
         from .options import setup
-        from .rml_translate import translate
+        from .rml.translate import translate
 
         found, faults = setup(job.system, job.node, job.method.options)
         if faults:
@@ -130,7 +130,7 @@ class RosMonitoringBackend(Backend):
         """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
         from .configuration import identifier
         from .options import setup
-        from .rml_translate import translate
+        from .rml.translate import translate
 
         options = next((m.options for m in system.plan.node(node.name).methods if m.backend == self.name), None)
         found, faults = setup(system, node, options)
@@ -194,7 +194,7 @@ class RosMonitoringBackend(Backend):
 
 
 def _refused(job: Job, found: Setup) -> dict[str, str]:
-    from .rml_translate import translate
+    from .rml.translate import translate
 
     return translate(found, [job.clause(o) for o in job.obligations]).refused
 

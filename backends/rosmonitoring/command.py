@@ -157,7 +157,7 @@ def _live(
     system: System, nodes: tuple[str, ...], live: str,
     how: tuple[float | None, str, bool, Path | None, str | None], telling: _Telling,
 ) -> int:  # fmt: skip
-    from .live import follow, graph_of
+    from .live.follow import follow, graph_of
     from .session import session
 
     seconds, host, enforce, record, verdicts = how
@@ -342,7 +342,7 @@ def _print_summary(running: Session) -> None:
 
 
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:
-    from .serve import HOST, serve
+    from .live.serve import HOST, serve
     from .session import session
 
     session(system, nodes)  # a fault of the plan is told now, not at the first connection

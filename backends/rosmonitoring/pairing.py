@@ -55,7 +55,7 @@ def ticks(seconds: Fraction) -> Ticks:
 
 
 def ticks_of(text: bytes) -> int:
-    """The time that a line has, as `shapes` knows it: digits, and at most 20 decimals."""
+    """The time that a line has, as `compiled.shapes` knows it: digits, and at most 20 decimals."""
     whole, _, rest = text.partition(b".")
     return int(whole + rest) * _SCALES[len(rest)]
 
@@ -84,7 +84,7 @@ class Asked:
     places: tuple[int, ...]
     """Their places in the trace."""
     tokens: tuple[int, ...] | None = None
-    """What stands for those of `values` that the clause speaks of (`plans.Token`)."""
+    """What stands for those of `values` that the clause speaks of (`compiled.plans.Token`)."""
     since: dict[str, float] = field(default_factory=dict)
     """When the oldest message came that each input's value may be of."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)

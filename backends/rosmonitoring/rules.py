@@ -2,7 +2,7 @@
 
 A rule says from which topic and fields a contract variable gets its value, or that it gets it another way: from the
 scenario's tables, or from an output's value of the step before. `avow.backends.rosmonitoring.options` makes the rules
-from the plan; `reading` turns messages into values by them; `rml_guard` turns them into RML patterns.
+from the plan; `reading` turns messages into values by them; `rml` turns them into RML patterns.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from avow.system.schema import suggest
 
 from .bags import Origin, is_bag, messages
 from .blame import Blame
-from .compiled import Compiled
+from .compiled.monitors import Compiled
 from .coverage import Tally
 from .ends import NAME
 from .enforce import WITHHELD, raw, told_withheld

@@ -110,7 +110,7 @@ class Watched:
     paired: tuple[str, ...] = ()
     """The observed inputs that an answer has to be paired with."""
     alike: dict[tuple[int, ...], bool] = field(default_factory=dict)
-    """Where it held, by tokens of values (`plans.Token`), and whether its antecedent was met there."""
+    """Where it held, by tokens of values (`compiled.plans.Token`), and whether its antecedent was met there."""
     steps: Memory | None = None
     """What it remembers, where it speaks of other steps."""
 

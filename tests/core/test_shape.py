@@ -63,7 +63,7 @@ ELSEWHERE = {
     "backends/ajpf/spin_tool.version": ONCE,
     "backends/hoare/parser._lark": ONCE,
     "backends/hypothesis/bench.providers.is_local_module_file": PATCHED,
-    "backends/rosmonitoring/rml_reader._parser": ONCE,
+    "backends/rosmonitoring/rml/reader._parser": ONCE,
     "backends/rosmonitoring/traces._decoder": ONCE,
 }
 """What outlives a call in the other rooms, and why it may."""

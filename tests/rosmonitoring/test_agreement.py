@@ -18,8 +18,8 @@ from oracle.values import Meaning
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml_interpreter import Interpreter
-from avow.backends.rosmonitoring.rml_translate import translate
+from avow.backends.rosmonitoring.rml.interpreter import Interpreter
+from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.watched import Fault
 from avow.language.sorts import NATURAL, REAL
 from avow.language.terms import (

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml_translate import translate
+from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.session import session
 from avow.base.diagnostics import Rejected
 from avow.ros.calls import as_message, part_topic, parts_of

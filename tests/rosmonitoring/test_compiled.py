@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from helpers import some
 
-from avow.backends.rosmonitoring.compiled import Compiled
+from avow.backends.rosmonitoring.compiled.monitors import Compiled
+from avow.backends.rosmonitoring.compiled.regions import regions
+from avow.backends.rosmonitoring.compiled.shapes import scanner, shape
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup, setup
-from avow.backends.rosmonitoring.regions import regions
 from avow.backends.rosmonitoring.session import session
-from avow.backends.rosmonitoring.shapes import scanner, shape
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.backends.rosmonitoring.watched import Violation
 from avow.base.diagnostics import Rejected

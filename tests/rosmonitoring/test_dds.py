@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from avow.backends.rosmonitoring import dds
-from avow.backends.rosmonitoring.live import follow, graph_of
+from avow.backends.rosmonitoring.live import dds
+from avow.backends.rosmonitoring.live.follow import follow, graph_of
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected

@@ -18,10 +18,10 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from avow.backends.rosmonitoring import ros1
-from avow.backends.rosmonitoring.live import follow, graph_of
-from avow.backends.rosmonitoring.ros1 import Ros1, frame, header, master_of, read_header, reader
-from avow.backends.rosmonitoring.rosbridge import Rosbridge
+from avow.backends.rosmonitoring.live import ros1
+from avow.backends.rosmonitoring.live.follow import follow, graph_of
+from avow.backends.rosmonitoring.live.ros1 import Ros1, frame, header, master_of, read_header, reader
+from avow.backends.rosmonitoring.live.rosbridge import Rosbridge
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected

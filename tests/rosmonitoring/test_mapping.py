@@ -10,7 +10,7 @@ import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml_translate import translate
+from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.watched import Fault
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.values import Data, Element, FunctionValue, SequenceValue, Value

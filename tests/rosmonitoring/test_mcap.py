@@ -11,8 +11,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from avow.backends.rosmonitoring import live
-from avow.backends.rosmonitoring.graphs import Inbox
+from avow.backends.rosmonitoring.live import follow
+from avow.backends.rosmonitoring.live.graphs import Inbox
 from avow.cli import main
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -192,7 +192,7 @@ class Spoken:
 def test_a_running_graph_gives_record_timeline_and_mcap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limits(tmp_path)
     events = pairs(40)
-    monkeypatch.setattr(live, "graph_of", lambda *_, **__: Spoken(events))
+    monkeypatch.setattr(follow, "graph_of", lambda *_, **__: Spoken(events))
     record, drawn, out = tmp_path / "r.jsonl", tmp_path / "t.svg", tmp_path / "v.mcap"
     files = ("--record", str(record), "--timeline", str(drawn), "--mcap", str(out))
     assert monitor(tmp_path, "--live", "ros1", "--for", "0", *files) == 1

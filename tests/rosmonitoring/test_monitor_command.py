@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from helpers import avow, some
 
-from avow.backends.rosmonitoring.serve import answer, serve
+from avow.backends.rosmonitoring.live.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
 from avow.system.plan import System
 from rosmonitoring.conftest import CASE

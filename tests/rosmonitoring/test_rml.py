@@ -11,9 +11,9 @@ import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml_interpreter import Interpreter
-from avow.backends.rosmonitoring.rml_reader import Malformed, read
-from avow.backends.rosmonitoring.rml_translate import Translation, translate
+from avow.backends.rosmonitoring.rml.interpreter import Interpreter
+from avow.backends.rosmonitoring.rml.reader import Malformed, read
+from avow.backends.rosmonitoring.rml.translate import Translation, translate
 from avow.system.plan import System
 
 GOLDEN = Path(__file__).parent / "golden"

@@ -23,19 +23,19 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import LIVE
 
-from .bags import Event
-from .engine import Monitor
-from .numbers import Decimal
-from .options import same_topic
-from .pace import SEQUENCE
+from ..bags import Event
+from ..engine import Monitor
+from ..numbers import Decimal
+from ..options import same_topic
+from ..pace import SEQUENCE
+from ..rules import FieldPath, Previous
+from ..traces import event_of, not_text
+from ..tuning import BATCH, CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT, TEXT_BYTES
+from ..watched import Fault, Violation, time_text
 from .paired import Paired
 from .plans import Plan, Token, Watch, below, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
-from .rules import FieldPath, Previous
 from .shapes import Shape, scanner, shape
 from .timed import Timed
-from .traces import event_of, not_text
-from .tuning import BATCH, CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT, TEXT_BYTES
-from .watched import Fault, Violation, time_text
 
 Match = re.Match[bytes]
 Handler = Callable[[Match, int], Any]

@@ -50,7 +50,9 @@ from avow.language.terms import (
 )
 from avow.tuning.bounds import ATOMS_MADE
 
-from .rml import (
+from ..tuning import COMPARISONS
+from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
+from .syntax import (
     FALSE,
     Calculation,
     Condition,
@@ -63,8 +65,6 @@ from .rml import (
     size,
     some,
 )
-from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
-from .tuning import COMPARISONS
 
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 

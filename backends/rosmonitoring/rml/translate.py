@@ -24,9 +24,23 @@ from avow.language.terms import Role
 from avow.ros.bags import ENVELOPE
 from avow.ros.calls import is_part
 
-from .options import Setup, same_topic
+from ..options import Setup, same_topic
+from ..rules import Choice, Constant, FieldPath, Fields, Lookup, Previous, Rule
+from ..tuning import CASES
 from .quantifiers import Eliminator
-from .rml import (
+from .symbols import (
+    Points,
+    Scalar,
+    Symbol,
+    Tracked,
+    Variant,
+    carried,
+    code,
+    components,
+    constant,
+    no_pattern,
+)
+from .syntax import (
     FALSE,
     TRUE,
     Condition,
@@ -50,20 +64,6 @@ from .rml import (
     substitute,
     write,
 )
-from .rules import Choice, Constant, FieldPath, Fields, Lookup, Previous, Rule
-from .symbols import (
-    Points,
-    Scalar,
-    Symbol,
-    Tracked,
-    Variant,
-    carried,
-    code,
-    components,
-    constant,
-    no_pattern,
-)
-from .tuning import CASES
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .rules import FieldPath
-from .tuning import SHAPE_VALUES
+from ..rules import FieldPath
+from ..tuning import SHAPE_VALUES
 
 _TOKEN = re.compile(
     rb'("[^"\\\x00-\x1f\x80-\xff]*")|(-?[0-9][0-9.eE+-]*)|(true|false)|null|([{}\[\]:,])|[ \t\r]+'

@@ -1,4 +1,4 @@
-"""The part of a compiled monitor's code (`compiled`) that looks at times: unless all is plain, the engine judges."""
+"""The part of a compiled monitor's code (`monitors`) that looks at times: unless all is plain, the engine judges."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .options import same_topic
-from .pace import SEQUENCE, Passage, Timing
+from ..options import same_topic
+from ..pace import SEQUENCE, Passage, Timing
+from ..tuning import TIMES_APART
 from .shapes import Shape
-from .tuning import TIMES_APART
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""What a running graph is to those that judge it: `ros1` and `rosbridge` are two."""
+"""What a running graph is to those that judge it: `ros1`, `dds` and `rosbridge` are three."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol
 
-from .bags import Event
-from .tuning import QUEUED_MESSAGES
+from ..bags import Event
+from ..tuning import QUEUED_MESSAGES
 
 OK, WARN, ERROR, STALE = range(4)
 """Levels of a `diagnostic_msgs/DiagnosticStatus`."""

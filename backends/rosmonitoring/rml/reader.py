@@ -10,7 +10,7 @@ from typing import Any
 
 import lark
 
-from .rml import KEYWORDS
+from .syntax import KEYWORDS
 
 PREDECLARED = frozenset(("any", "none"))
 

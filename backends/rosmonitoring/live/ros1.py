@@ -24,9 +24,9 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
 from avow.ros.listing import FAILURES, interface
 
-from .enforce import raw
+from ..enforce import raw
+from ..tuning import AGAIN_SECONDS, FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS, MASTER_ATTEMPTS, PUBLISHER_SECONDS
 from .graphs import Inbox, Status
-from .tuning import AGAIN_SECONDS, FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS, MASTER_ATTEMPTS, PUBLISHER_SECONDS
 
 CALLER = "/avow_monitor"
 HOST = "127.0.0.1"

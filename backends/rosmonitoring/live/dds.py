@@ -19,9 +19,9 @@ from avow.ros.bags import Event, enveloped
 from avow.ros.dds import dds_topic, dds_type, settings
 from avow.ros.definitions import Definitions
 
+from ..tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LIVE_PAUSE
 from .dds_types import DIAGNOSTICS, NO_DDS, Types, filled
 from .graphs import Inbox, Status
-from .tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LIVE_PAUSE
 
 
 @dataclass(slots=True)

@@ -16,16 +16,16 @@ from avow.ros.bags import LIVE
 from avow.ros.calls import is_part
 from avow.ros.dds import domain_of
 
-from .bags import Event
-from .coverage import coverage
+from ..bags import Event
+from ..coverage import coverage
+from ..enforce import RAW, filtered
+from ..session import Session
+from ..tuning import LIVE_APART, LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
+from ..watched import Violation
 from .dds import Dds
-from .enforce import RAW, filtered
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
-from .session import Session
-from .tuning import LIVE_APART, LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
-from .watched import Violation
 
 UNORDERED = (
     "nothing orders the topics of a graph: by arrival, a breach is told {} s later, where it is one whichever message "

@@ -13,9 +13,9 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 
-from .session import Session, violation_json
-from .traces import parse_event
-from .tuning import EVENT_CHARACTERS
+from ..session import Session, violation_json
+from ..traces import parse_event
+from ..tuning import EVENT_CHARACTERS
 
 HOST = "127.0.0.1"
 

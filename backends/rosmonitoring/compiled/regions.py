@@ -26,8 +26,8 @@ from avow.language.terms import (
 )
 from avow.ros.definitions import FLOATS, Scalar
 
-from .rules import Fields, Rule
-from .wires import LARGEST_SINGLE
+from ..rules import Fields, Rule
+from ..wires import LARGEST_SINGLE
 
 
 def regions(rule: Rule, formulas: Iterable[Term]) -> list[float] | None:

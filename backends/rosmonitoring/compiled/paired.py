@@ -1,4 +1,4 @@
-"""The part of a compiled monitor's code (`compiled`) for answers that are paired with their inputs (`pairing`).
+"""The part of a compiled monitor's code (`monitors`) for answers that are paired with their inputs (`pairing`).
 
 Inputs and answers are noted as the engine notes them, but for their values: of these it has the tokens, and the lines
 in which they stand, which are read where a verdict does not follow from the tokens.
@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from .engine import Monitor
-from .pairing import Asked, ticks_of
+from ..engine import Monitor
+from ..pairing import Asked, ticks_of
+from ..rules import FieldPath
+from ..tuning import TICKS
+from ..waiting_answers import asks, judges_answers_alone, speaks, sure
+from ..watched import Violation, Watched
 from .plans import Plan, Watch, below, is_seen
-from .rules import FieldPath
 from .shapes import Shape
-from .tuning import TICKS
-from .waiting_answers import asks, judges_answers_alone, speaks, sure
-from .watched import Violation, Watched
 
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))
 

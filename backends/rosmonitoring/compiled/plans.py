@@ -1,4 +1,4 @@
-"""What the events of one topic do to one monitor, as far as nothing but their values matters, for `compiled`."""
+"""What the events of one topic do to one monitor, as far as nothing but their values matters, for `monitors`."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
 from avow.ros.bags import ENVELOPE, WHOLE
 
-from .coverage import Tally
-from .engine import Monitor
+from ..coverage import Tally
+from ..engine import Monitor
+from ..rules import Choice, FieldPath, Fields, Hold, Lookup, Previous, heard_through
+from ..tuning import REMEMBERED
+from ..watched import Violation, Watched
 from .regions import regions
-from .rules import Choice, FieldPath, Fields, Hold, Lookup, Previous, heard_through
 from .shapes import Shape
-from .tuning import REMEMBERED
-from .watched import Violation, Watched
 
 Token = int
 """Stands for a variable's value: equal tokens of a variable, equal truth of every clause."""

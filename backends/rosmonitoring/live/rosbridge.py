@@ -16,8 +16,8 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import enveloped
 
+from ..tuning import FRAME_BYTES
 from .graphs import Inbox, Status
-from .tuning import FRAME_BYTES
 
 
 class Rosbridge:

@@ -30,7 +30,9 @@ from avow.language.sorts import (
 )
 from avow.ros import definitions as wires
 
-from .rml import (
+from ..rules import Constant, Fields, Hold, Previous, Rule
+from ..tuning import TRACKED_TUPLES
+from .syntax import (
     TRUE,
     Comparison,
     Condition,
@@ -42,8 +44,6 @@ from .rml import (
     every,
     some,
 )
-from .rules import Constant, Fields, Hold, Previous, Rule
-from .tuning import TRACKED_TUPLES
 
 
 @dataclass(frozen=True, slots=True)
