@@ -1,34 +1,179 @@
-"""Answers about frozen data, kept while they are few: a question about the very same object is not worked out twice."""
+"""Answers about frozen data, kept while they are few: a question about the very same object is not worked out twice.
+
+An answer about a *text* can also be kept from run to run, on a `Shelf`: it is found by the digest of all that it was
+worked out from, and lies in the user's cache under the user's seal (`avow.base.notes`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
+import contextlib
+import dataclasses
+import enum
+import io
+import pickle
+import sys
+from collections.abc import Callable, Mapping
+from functools import update_wrapper
+from pathlib import Path
+from typing import Any, Generic, ParamSpec, TypeVar, cast
+
+from avow.base.diagnostics import Span
+from avow.base.files import PART, sha256, write
+from avow.base.notes import cache_folder, sealed, unsealed
+from avow.base.records import dataclass
+from avow.tuning.sizes import SHELVES
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def by_identity(most: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
+class Remembered(Generic[P, T]):
+    """A pure function of frozen arguments that remembers what it answered."""
+
+    def __init__(self, function: Callable[P, T], most: int) -> None:
+        self.name = function.__qualname__
+        self._function = function
+        self._most = most
+        self._known: dict[tuple[int, ...], tuple[object, T]] = {}
+        """The arguments are kept with the answer: while they are alive, no other object has their place."""
+        update_wrapper(self, function)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
+        assert not kwargs
+        found = self._known.get(tuple(map(id, args)))
+        return self._learn(self._function(*args, **kwargs), args) if found is None else found[1]
+
+    def learn(self, answer: T, *args: P.args, **kwargs: P.kwargs) -> None:
+        """The answer, as it was found in an earlier run."""
+        assert not kwargs
+        self._learn(answer, args)
+
+    def _learn(self, answer: T, args: tuple[object, ...]) -> T:
+        if len(self._known) >= self._most:
+            self._known.clear()
+        self._known[tuple(map(id, args))] = (args, answer)
+        return answer
+
+
+def by_identity(most: int) -> Callable[[Callable[P, T]], Remembered[P, T]]:
     """Decorates a pure function of frozen arguments. Which objects they are is compared, not what they say: to compare
     a deep formula costs as much as to work it out again. Of more than `most` answers none is kept."""
+    return lambda function: Remembered(function, most)
 
-    def decorated(function: Callable[P, T]) -> Callable[P, T]:
-        known: dict[tuple[int, ...], tuple[object, T]] = {}
-        """The arguments are kept with the answer: while they are alive, no other object has their place."""
 
-        @wraps(function)
-        def asked(*args: P.args, **kwargs: P.kwargs) -> T:
-            assert not kwargs
-            key = tuple(map(id, args))
-            found = known.get(key)
-            if found is None:
-                if len(known) >= most:
-                    known.clear()
-                found = known[key] = (args, function(*args, **kwargs))
-            return found[1]
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Whole lines of a file, from `first` on and before `end`. What was worked out from their text is the same wherever
+    it stands, but for the places in it."""
 
-        return asked
+    file: str
+    first: int
+    end: int
+    heads: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """File → the line before which stands what the answer may name by its place, too; the answer's digest covers it."""
 
-    return decorated
+    def has(self, span: Span) -> bool:
+        return span.file == self.file and self.first <= span.line and span.end_line <= self.end
+
+
+class Shelf:
+    """What was found out of the texts of one folder, from run to run.
+
+    An answer that was edited, half-written, made by another user or found by other code is none: the file has a seal
+    that is bound to its place, and `given` (what every answer depends on) is part of every digest.
+    """
+
+    def __init__(self, folder: Path, *given: str) -> None:
+        self._path = cache_folder() / "shelves" / sha256(str(folder.absolute()))
+        self._given = (sys.version, *given)
+        data = unsealed(self._path)
+        self._kept: dict[str, dict[str, bytes]] = pickle.loads(data) if data is not None else {}
+        self._asked: dict[str, dict[str, bytes]] = {}
+        self._texts: dict[int, tuple[object, str, Stretch]] = {}
+        self._new = False
+
+    def digest(self, *texts: str) -> str:
+        """Of everything that an answer is worked out from."""
+        return sha256("".join(f"{len(text)}:{text}" for text in (*self._given, *texts)))
+
+    def answer(self, digest: str, stretch: Stretch, make: Callable[[], T], what: str = "") -> T:
+        """What `make` finds of the texts with that digest, which stand at the stretch; `what` tells several answers of
+        one digest apart. `make` uses nothing else."""
+        answers = self._asked.setdefault(digest, self._kept.get(digest, {}))
+        if what in answers:
+            return cast(T, _Placing(io.BytesIO(answers[what]), stretch).load())
+        made = make()
+        with contextlib.suppress(pickle.PicklingError, RecursionError):  # too deep, or of other places, too
+            answers[what] = _written(made, stretch)
+            self._new = True
+        return made
+
+    def is_of(self, value: object, digest: str, stretch: Stretch) -> None:
+        """The value was worked out from the texts with that digest: so is what follows from it alone."""
+        self._texts[id(value)] = (value, digest, stretch)
+
+    def recall(self, function: Remembered[[T], Any], value: T) -> None:
+        """Let the function know what it answered of that value in an earlier run, or will be asked in a later one."""
+        if id(value) in self._texts:
+            _, digest, stretch = self._texts[id(value)]
+            function.learn(self.answer(digest, stretch, lambda: function(value), function.name), value)
+
+    def keep(self) -> None:
+        """Write down what was asked for, if there is anything new in it. What was not asked for is of earlier texts."""
+        if not self._new:
+            return
+        self._new = False
+        with contextlib.suppress(OSError):  # a read-only home costs that each time
+            write(self._path, sealed(self._path, pickle.dumps(self._asked)))
+            shelves = sorted(self._path.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+            for path in shelves[: -SHELVES or None]:
+                if path.suffix != PART:
+                    path.unlink()
+
+
+def _here(line: int, column: int, end_line: int, end_column: int) -> Span:
+    """Stands for a place in the stretch, by its distance from the first line."""
+    raise NotImplementedError
+
+
+class _Written(pickle.Pickler):
+    def __init__(self, into: io.BytesIO, stretch: Stretch) -> None:
+        super().__init__(into, protocol=5)
+        self.stretch = stretch
+        self.fields: dict[type, tuple[str, ...] | None] = {}
+
+    def reducer_override(self, value: Any) -> Any:
+        kind = type(value)
+        if kind is Span:
+            first = self.stretch.first
+            if self.stretch.has(value):
+                return _here, (value.line - first, value.column, value.end_line - first, value.end_column)
+            if value.end_line >= self.stretch.heads.get(value.file, 0):
+                raise pickle.PicklingError("a place in another text")
+        if isinstance(value, enum.Enum):
+            return kind, (value.value,)
+        if kind not in self.fields:
+            every = dataclasses.fields(kind) if dataclasses.is_dataclass(kind) else None
+            self.fields[kind] = None if every is None else tuple(field.name for field in every)
+        names = self.fields[kind]
+        return NotImplemented if names is None else (kind, tuple(getattr(value, name) for name in names))
+
+
+class _Placing(pickle.Unpickler):
+    def __init__(self, data: io.BytesIO, stretch: Stretch) -> None:
+        super().__init__(data)
+        self.stretch = stretch
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) == (__name__, _here.__name__):
+            file, first = self.stretch.file, self.stretch.first
+            return lambda line, column, end, last: Span(file, first + line, column, first + end, last)
+        if module.partition(".")[0] != "avow" and (module, name) != ("fractions", "Fraction"):
+            raise pickle.UnpicklingError(f"{module}.{name} is no data of Avow's")
+        return super().find_class(module, name)
+
+
+def _written(value: object, stretch: Stretch) -> bytes:
+    into = io.BytesIO()
+    _Written(into, stretch).dump(value)
+    return into.getvalue()

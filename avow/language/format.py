@@ -15,9 +15,9 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.flat import definition_head, flat, quantifier_head
 from avow.language.lexer import Token, tokens
-from avow.language.load import clean_text, in_order, unless_torn
+from avow.language.load import clean_text, unless_torn
 from avow.language.outline import read
-from avow.language.source import Reports, Source
+from avow.language.source import Reports, Source, in_order
 from avow.language.syntax import (
     Connective,
     ConstantDeclaration,

@@ -7,7 +7,7 @@ line; on a line of its own, for the declaration, node or part of a node that fol
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from avow.base.codes import CODES
@@ -64,17 +64,41 @@ def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract 
     """Report every warning about the files, about the nodes that are sound, and (where all of it is) about the contract
     that the files declare."""
     found: list[Diagnostic] = []
-    for file in files:
-        found.extend(_about_text(file))
+    trees = [(file, tree) for file in files for tree in file.syntax.nodes]
+    for file, tree in trees:
+        found.extend(_about_text(file, tree))
     for node in nodes:
         found.extend(_about_node(node))
     if contract is not None:
-        found.extend(_spellings(contract))
-        found.extend(_defined_in_vain(files))
+        found.extend(of_all(contract, files, (spoken(tree) for _, tree in trees)))
+        for file, tree in trees:
+            found.extend(_in_vain(file, tree.definitions, spoken(tree)))
+    tell(found, files, off)
+
+
+def of_node(file: LintedFile, tree: NodeSyntax, node: Node) -> Iterator[Diagnostic]:
+    """What hangs on the text of one node and on nothing else but what it names."""
+    yield from _about_text(file, tree)
+    yield from _about_node(node)
+    yield from _in_vain(file, tree.definitions, spoken(tree))
+
+
+def of_all(contract: Contract, files: Sequence[LintedFile], of_nodes: Iterable[frozenset[str]]) -> Iterator[Diagnostic]:
+    """What hangs on all nodes together. `of_nodes`: the names that each of them speaks of."""
+    yield from _spellings(contract)
+    contexts = [(file, [d for d in file.syntax.declarations if isinstance(d, Define)]) for file in files]
+    if any(trees for _, trees in contexts):
+        named = frozenset(name for _, trees in contexts for tree in trees for name in _spoken(tree.body))
+        named = named.union(*of_nodes)
+        for file, trees in contexts:
+            yield from _in_vain(file, trees, named)
+
+
+def tell(found: Iterable[Diagnostic], files: Sequence[LintedFile], off: frozenset[str]) -> None:
+    """Report what is not switched off, and what the files' comments do not allow."""
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
-    found.extend(unknown for file in files for unknown in _no_lints(file))
-    for diagnostic in found:
+    for diagnostic in (*found, *(unknown for file in files for unknown in _no_lints(file))):
         if diagnostic.code in off or diagnostic.span is None or diagnostic.span.file not in by_name:
             continue
         line = diagnostic.span.line
@@ -90,6 +114,11 @@ def _warning(
 
 
 # --- comments that allow ---------------------------------------------------------------------------------------------
+
+
+def allows(comment: Token) -> bool:
+    """Whether it is a comment that allows something."""
+    return _ALLOW.search(comment.text) is not None
 
 
 def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
@@ -129,55 +158,51 @@ def _no_lints(file: LintedFile) -> Iterator[Diagnostic]:
 # --- about the text --------------------------------------------------------------------------------------------------
 
 
-def _about_text(file: LintedFile) -> Iterator[Diagnostic]:
+def _about_text(file: LintedFile, node: NodeSyntax) -> Iterator[Diagnostic]:
     source = file.reports.source
-    for node in file.syntax.nodes:
-        for clause in node.clauses:
-            if clause.formula is None:
-                continue
-            for reading in misreadings(clause.formula, source.text):
-                span = source.span(reading.start, reading.end)
-                yield _warning(
-                    "RCL401",
-                    f"`{reading.mixed}` beside `{reading.operator}` without parentheses: another bracketing means "
-                    "something else",
-                    span,
-                    f"it is read as `{reading.shown}`: put the parentheses that you mean",
-                )
-        for topic in node.topics.items if node.topics is not None else ():
-            name, role, matched = topic.name, topic.role, topic.port
-            if matched is not None and role is None:
-                inputs = {p.name.text for p in node.inputs.items} if node.inputs is not None else set()
-                which = "in" if matched.text in inputs else "out"
-                yield _warning(
-                    "RCL409",
-                    f"the topic `{name.text}` matches a bare `{matched.text}`",
-                    source.span(matched.start, matched.end),
-                    f"write `matches({which}.{matched.text})`",
-                )
+    for clause in node.clauses:
+        if clause.formula is None:
+            continue
+        for reading in misreadings(clause.formula, source.text):
+            span = source.span(reading.start, reading.end)
+            yield _warning(
+                "RCL401",
+                f"`{reading.mixed}` beside `{reading.operator}` without parentheses: another bracketing means "
+                "something else",
+                span,
+                f"it is read as `{reading.shown}`: put the parentheses that you mean",
+            )
+    for topic in node.topics.items if node.topics is not None else ():
+        name, role, matched = topic.name, topic.role, topic.port
+        if matched is not None and role is None:
+            inputs = {p.name.text for p in node.inputs.items} if node.inputs is not None else set()
+            which = "in" if matched.text in inputs else "out"
+            yield _warning(
+                "RCL409",
+                f"the topic `{name.text}` matches a bare `{matched.text}`",
+                source.span(matched.start, matched.end),
+                f"write `matches({which}.{matched.text})`",
+            )
 
 
-def _defined_in_vain(files: Sequence[LintedFile]) -> Iterator[Diagnostic]:
-    """Definitions and parameters that nothing speaks of."""
-    parts: list[tuple[LintedFile, NodeSyntax | None, Define]] = []
-    named: set[tuple[str, str]] = set()
-    for file in files:
-        contexts = [d for d in file.syntax.declarations if isinstance(d, Define)]
-        parts += [(file, None, tree) for tree in contexts]
-        named |= {("", name) for tree in contexts for name in _spoken(tree.body)}
-        for node in file.syntax.nodes:
-            parts += [(file, node, tree) for tree in node.definitions]
-            bodies = [*(d.body for d in node.definitions), *(c.formula for c in node.clauses if c.formula is not None)]
-            named |= {(owner, name) for body in bodies for name in _spoken(body) for owner in ("", node.name.text)}
-    for file, owner, tree in parts:
-        name, span = tree.name.text, file.reports.source.span
-        if (owner.name.text if owner is not None else "", name) not in named:
+def _in_vain(file: LintedFile, trees: Iterable[Define], named: Collection[str]) -> Iterator[Diagnostic]:
+    """Definitions that nothing speaks of (`named`: what is spoken of), and parameters."""
+    span = file.reports.source.span
+    for tree in trees:
+        name = tree.name.text
+        if name not in named:
             message = f"nothing speaks of the definition `{name}`"
             yield _warning("RCL418", message, span(tree.name.start, tree.name.end), "remove it, or use it")
         for part in tree.parameters:
             if part.name.text not in _spoken(tree.body):
                 message = f"the definition `{name}` does not speak of its parameter `{part.name.text}`"
                 yield _warning("RCL418", message, span(part.name.start, part.name.end), "remove it, or use it")
+
+
+def spoken(node: NodeSyntax) -> frozenset[str]:
+    """The names that a node's definitions and clauses speak of."""
+    bodies = [*(d.body for d in node.definitions), *(c.formula for c in node.clauses if c.formula is not None)]
+    return frozenset(name for body in bodies for name in _spoken(body))
 
 
 def _spoken(tree: Syntax) -> set[str]:

@@ -5,13 +5,13 @@ Every function reports all that is wrong at once. Nothing here raises anything b
 
 from __future__ import annotations
 
-import functools
 import stat
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.remembered import Shelf
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
@@ -22,18 +22,20 @@ from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import read
 from avow.language.parser import parse
+from avow.language.pieces import by_pieces
 from avow.language.scope import BOTH_ROLES, Defined, Scope
 from avow.language.sorts import Sort
-from avow.language.source import Reports, Source
+from avow.language.source import Reports, Source, in_order
 from avow.language.terms import Role, Term, Variable
 from avow.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 
 NOTHING = Contract((), (), (), ())
 
 
-def load_contract(paths: Sequence[Path]) -> Contract:
-    """The contract that the files declare together. Raises `Rejected` with every error of every file."""
-    contract, diagnostics = check_paths(paths)
+def load_contract(paths: Sequence[Path], shelf: Shelf | None = None) -> Contract:
+    """The contract that the files declare together. Raises `Rejected` with every error of every file. `shelf`: where it
+    is kept what their nodes say."""
+    contract, diagnostics = check_paths(paths, shelf=shelf)
     errors = tuple(d for d in diagnostics if d.is_error)
     if contract is None or errors:
         raise Rejected(*errors)
@@ -41,11 +43,11 @@ def load_contract(paths: Sequence[Path]) -> Contract:
 
 
 def check_paths(
-    paths: Iterable[Path], *, off: frozenset[str] = frozenset()
+    paths: Iterable[Path], *, off: frozenset[str] = frozenset(), shelf: Shelf | None = None
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """The contract of the files, or None, and everything there is to say about them, lints included.
 
-    `off`: codes of lints not to report. A file that cannot be read is reported too.
+    `off`: codes of lints not to report. A file that cannot be read is reported too. `shelf`: as `load_contract` has it.
     """
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
@@ -55,7 +57,7 @@ def check_paths(
             unreadable.append(source)
         else:
             sources.append(source)
-    contract, diagnostics = check_sources(sources, off=off, partial=bool(unreadable))
+    contract, diagnostics = check_sources(sources, off=off, partial=bool(unreadable), shelf=shelf)
     return (None if unreadable else contract), (*unreadable, *diagnostics)
 
 
@@ -136,10 +138,14 @@ def clean_text(text: str, file: str) -> Source | Diagnostic:
 
 
 def check_sources(
-    sources: Sequence[Source], *, off: frozenset[str] = frozenset(), partial: bool = False
+    sources: Sequence[Source],
+    *,
+    off: frozenset[str] = frozenset(),
+    partial: bool = False,
+    shelf: Shelf | None = None,
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
-    contract, diagnostics = _checked(tuple(map(_as_read, sources)), off, partial)
+    contract, diagnostics = _checked(tuple(map(_as_read, sources)), off, partial, shelf)
     return (None if any(d.is_error for d in diagnostics) else contract), diagnostics
 
 
@@ -172,15 +178,34 @@ _under: dict[tuple[str, ...], tuple[str, ...]] = {}
 """Texts checked lately → the names that they had, each its own."""
 
 
-@functools.lru_cache(maxsize=CONTRACTS_KEPT)
-def _checked(texts: tuple[_Text, ...], off: frozenset[str], partial: bool) -> tuple[Contract, tuple[Diagnostic, ...]]:
-    """Kept for a while: a run loads a contract, and then asks what there is to say of it."""
-    names = tuple(text[0] for text in texts)
-    if not off and not partial and len(set(names)) == len(names):
-        if len(_under) >= CONTRACTS_KEPT:
-            _under.clear()
-        _under[tuple(text[1] for text in texts)] = names
-    sources = [Source(*text) for text in texts]
+_lately: dict[tuple[tuple[_Text, ...], frozenset[str], bool], tuple[Contract, tuple[Diagnostic, ...]]] = {}
+"""What was checked lately: a run loads a contract, and then asks what there is to say of it."""
+
+
+def _checked(
+    texts: tuple[_Text, ...], off: frozenset[str], partial: bool, shelf: Shelf | None = None
+) -> tuple[Contract, tuple[Diagnostic, ...]]:
+    key = (texts, off, partial)
+    found = _lately.get(key)
+    if found is None:
+        names = tuple(text[0] for text in texts)
+        distinct = len(set(names)) == len(names)
+        if not off and not partial and distinct:
+            if len(_under) >= CONTRACTS_KEPT:
+                _under.clear()
+            _under[tuple(text[1] for text in texts)] = names
+        sources = [Source(*text) for text in texts]
+        if shelf is not None and distinct and not partial:
+            found = by_pieces(sources, off, shelf)
+        if found is None:
+            found = _whole(sources, off, partial)
+        if len(_lately) >= CONTRACTS_KEPT:
+            _lately.clear()
+        _lately[key] = found
+    return found
+
+
+def _whole(sources: Sequence[Source], off: frozenset[str], partial: bool) -> tuple[Contract, tuple[Diagnostic, ...]]:
     parsed: list[tuple[FileSyntax, Reports]] = []
     linted: list[LintedFile] = []
     declarations = Declarations()
@@ -255,16 +280,6 @@ def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declar
         nodes,
         tuple(entry.found for entry in declarations.definitions.values() if entry.found is not None),
     )
-
-
-def in_order(reports: Reports) -> list[Diagnostic]:
-    """What was found, by its place; at the end, that there is more than is kept."""
-    found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
-    if reports.full:
-        severity = Severity.ERROR if reports.failed else Severity.WARNING
-        message = f"there is more to say, but {len(found)} diagnostics of one file are enough"
-        found.append(Diagnostic("RCL006", message, found[-1].span, severity))
-    return found
 
 
 # --- formulas of other files -----------------------------------------------------------------------------------------

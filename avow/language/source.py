@@ -95,6 +95,16 @@ class Reports:
         return any(d.is_error for d in self.found)
 
 
+def in_order(reports: Reports) -> list[Diagnostic]:
+    """What was found, by its place; at the end, that there is more than is kept."""
+    found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
+    if reports.full:
+        severity = Severity.ERROR if reports.failed else Severity.WARNING
+        message = f"there is more to say, but {len(found)} diagnostics of one file are enough"
+        found.append(Diagnostic("RCL006", message, found[-1].span, severity))
+    return found
+
+
 def _short(message: str) -> str:
     """The message with very long names in it cut: nobody reads a hundred thousand letters."""
     return message if len(message) <= 300 else _LONG_NAME.sub(r"\1…`", message)

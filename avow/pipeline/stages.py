@@ -49,7 +49,7 @@ def stages(state: State) -> Iterator[Task]:
     for stage, doc in STAGES.items():
         yield {"basename": stage, "name": None, "doc": doc}
     for folder in state.workspace.systems():
-        surveyed = _with_ledger(state, survey(folder, state.run.offered))
+        surveyed = _with_ledger(state, survey(folder, state.run.offered, state.run.fresh))
         if isinstance(surveyed, Rejected):
             yield from _rejected(folder.name, surveyed)
         else:

@@ -12,9 +12,10 @@ from typing import Any
 from avow import __version__
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, sha256, write
-from avow.base.remembered import by_identity
+from avow.base.remembered import Shelf, by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
+from avow.pipeline.engine_code import engine_digest
 from avow.pipeline.work import Catalogue, Offered, Work, catalogue
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -41,12 +42,15 @@ class Survey:
         return {(o.id, work.method): work.keys[o.id] for work in self.catalogue.works for o in work.obligations}
 
 
-def survey(folder: Path, offered: Offered = None) -> Survey | Rejected:
+def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey | Rejected:
     """A system that cannot be read is a value here: it must not keep the others from being verified. `offered`: as
-    `method_work` has it."""
+    `method_work` has it. `fresh`: without what an earlier run found out of the nodes' texts."""
+    shelf = None if fresh else Shelf(folder, engine_digest())
     try:
-        system = load_system(folder)
+        system = load_system(folder, shelf)
         listed = catalogue(system, offered)
+        if shelf is not None:
+            shelf.keep()
     except Rejected as rejected:
         from avow.pipeline.check import of_rest
         from avow.system.faults import in_order

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.remembered import Shelf
 from avow.language.contract import Contract
 from avow.system.faults import every_fault
 from avow.system.formulas import check_formulas
@@ -24,18 +25,19 @@ from avow.tuning.sizes import SYSTEMS_WITHIN
 PLAN_FILE = "plan.yaml"
 
 
-def load_system(folder: Path) -> System:
-    """The system whose plan.yaml is in `folder`. A folder without a plan but with .rcl files is a bare system.
+def load_system(folder: Path, shelf: Shelf | None = None) -> System:
+    """The system whose plan.yaml is in `folder`. A folder without a plan but with .rcl files is a bare system. `shelf`:
+    where it is kept what the nodes say.
 
     Raises Rejected with every fault found in the plan, in the contract, and in the systems that it takes in.
     """
     try:
-        return _load(folder, (), {})
+        return _load(folder, (), {}, shelf)
     except Rejected as rejected:
         raise Rejected(*every_fault(folder, rejected.diagnostics)) from None
 
 
-def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> System:
+def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], shelf: Shelf | None) -> System:
     """`within`: the folders of the systems that take this one in; `known`: those loaded already."""
     path = folder / PLAN_FILE
     if not path.is_file():
@@ -44,13 +46,13 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
         files = sorted(folder.glob("*.rcl"))
         if not files:
             raise Rejected(Diagnostic("PLAN100", f"{folder} holds neither a {PLAN_FILE} nor an .rcl file"))
-        return load_bare(files, folder.resolve().name)
+        return load_bare(files, folder.resolve().name, shelf)
     plan, root, faults = read_plan(path)
-    contract, more = _contract(plan.contract_files)
+    contract, more = _contract(plan.contract_files, shelf)
     faults += more
     if contract is None:
         raise Rejected(*faults)
-    return _linked(folder, plan, root, faults, contract, within, known)
+    return _linked(folder, plan, root, faults, contract, within, known, shelf)
 
 
 def load_texts(path: Path, text: str, contract: Contract) -> System:
@@ -59,7 +61,7 @@ def load_texts(path: Path, text: str, contract: Contract) -> System:
     Raises Rejected, with what stops the loading.
     """
     plan, root, faults = read_plan(path, text)
-    return _linked(path.parent, plan, root, faults, contract, (), {})
+    return _linked(path.parent, plan, root, faults, contract, (), {}, None)
 
 
 def _linked(
@@ -70,6 +72,7 @@ def _linked(
     contract: Contract,
     within: tuple[Path, ...],
     known: dict[Path, System],
+    shelf: Shelf | None,
 ) -> System:
     """The system of a plan and its contract; `faults` are those of the plan's values."""
     chain = (*within, folder.resolve())
@@ -81,7 +84,7 @@ def _linked(
         if len(chain) > SYSTEMS_WITHIN:
             raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {SYSTEMS_WITHIN} levels"))
         if inner not in known:
-            known[inner] = _load(inner, chain, known)
+            known[inner] = _load(inner, chain, known, shelf)
         return known[inner]
 
     plan, contract, more = include(plan, contract, part)
@@ -109,9 +112,9 @@ def _linked(
     return system
 
 
-def load_bare(files: Sequence[Path], name: str | None = None) -> System:
+def load_bare(files: Sequence[Path], name: str | None = None, shelf: Shelf | None = None) -> System:
     """The system of some .rcl files without a plan: names link. Raises Rejected."""
-    contract, faults = _contract(tuple(files))
+    contract, faults = _contract(tuple(files), shelf)
     if contract is None:
         raise Rejected(*faults)
     plan = bare_plan(name or (files[0].stem if files else "system"), tuple(files))
@@ -126,12 +129,12 @@ def load_path(path: Path) -> System:
     return load_system(path) if path.is_dir() else load_bare((path,))
 
 
-def _contract(files: tuple[Path, ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+def _contract(files: tuple[Path, ...], shelf: Shelf | None) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     from avow.language.load import load_contract  # the grammar is slow to import
 
     if not files:
         return None, ()
     try:
-        return load_contract(files), ()
+        return load_contract(files, shelf), ()
     except Rejected as rejected:
         return None, rejected.diagnostics

@@ -113,6 +113,9 @@ ANSWERED_BY_ONE = 500
 CONTRACTS_KEPT = 8
 """Contracts that stay checked in memory: a run loads one, and then asks what there is to say of it."""
 
+SHELVES = 32
+"""Folders of which it is kept between runs what their contracts' texts say: some 25 kB a node of ten clauses."""
+
 PROGRAM_FILES = 5_000
 """Files of an outside tool that its key covers: Dafny has 60, MCAPL 3,000; a script that names a folder of the system's
 would have no end."""

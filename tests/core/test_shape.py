@@ -50,6 +50,7 @@ ELSEWHERE = {
     "avow/isolation/senses.posix.environ": PATCHED,
     "avow/isolation/senses.sqlite3.connect": PATCHED,
     "avow/isolation/tracing.traces": ONCE,
+    "avow/language/load._lately": KEPT,
     "avow/language/load._under": KEPT,
     "avow/language/parser._lark": ONCE,
     "avow/lsp/plan_completion._schema": ONCE,
