@@ -85,7 +85,7 @@ class RosMonitoringBackend(Backend):
                 problems.append(Diagnostic("MON103", message, clause.span, Severity.WARNING))
                 continue
             for variable, reason in found.hidden.items():
-                if _mentions(clause.formula, variable) and not faults:
+                if variable in _spoken(job, obligation) and not faults:
                     message = f"{clause.name} cannot be monitored: {reason}"
                     span = job.method.options.at("mapping")
                     problems.append(Diagnostic("MON103", message, span, Severity.WARNING))
@@ -107,12 +107,10 @@ class RosMonitoringBackend(Backend):
 
     def export(self, job: Job) -> Mapping[str, str]:
         from .configuration import configuration, identifier
-        from .options import setup
+        from .options import usable
         from .rml.translate import translate
 
-        found, faults = setup(job.system, job.node, job.method.options)
-        if faults:
-            raise Rejected(*faults)
+        found = usable(job.system, job.node, job.method.options)
         made = translate(found, [job.clause(o) for o in job.obligations])
         stem = identifier("", job.node.name)
         report = {
@@ -129,13 +127,12 @@ class RosMonitoringBackend(Backend):
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
         from .configuration import identifier
-        from .options import setup
+        from .ends import method_of
+        from .options import usable
         from .rml.translate import translate
 
-        options = next((m.options for m in system.plan.node(node.name).methods if m.backend == self.name), None)
-        found, faults = setup(system, node, options)
-        if faults:
-            raise Rejected(*faults)
+        options = method_of(system, node.name)
+        found = usable(system, node, options)
         made = translate(found, node.guarantees)
         hint = None if options else f"the plan has no method {self.name} for node {node.name}, whose `mapping` says how"
         missing = tuple(
@@ -201,8 +198,8 @@ def _refused(job: Job, found: Setup) -> dict[str, str]:
 
 def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: Obligation) -> Outcome:
     """A monitor is no evidence before it has watched something."""
-    formula = job.clause(obligation).formula
-    hidden = next((reason for name, reason in found.hidden.items() if _mentions(formula, name)), None)
+    spoken = _spoken(job, obligation)
+    hidden = next((reason for name, reason in found.hidden.items() if name in spoken), None)
     if hidden is not None:
         return Outcome(obligation.id, Verdict.UNKNOWN, f"not monitorable: {hidden}")
     reason = refused.get(obligation.name)
@@ -482,15 +479,3 @@ _UNPAIRED = "no evidence, since the plan does not say which input an answer answ
 def _traces(job: Job) -> list[str]:
     found = job.options.get("traces")
     return [t for t in found if isinstance(t, str)] if isinstance(found, list) else []
-
-
-def _mentions(formula: Any, qualified: str) -> bool:
-    from avow.language.terms import Variable
-
-    stack = [formula]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and term.qualified == qualified:
-            return True
-        stack.extend(term.children)
-    return False

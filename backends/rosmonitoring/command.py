@@ -140,15 +140,12 @@ class _Telling:
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
     from .configuration import of_system
-    from .ends import NAME
+    from .ends import method_of
     from .session import session
 
-    parts = []
-    for monitor in session(system, nodes).monitors:
-        node = monitor.setup.node.name
-        methods = [m for m in system.plan.node(node).methods if m.backend == NAME]
-        options: dict[str, Any] = dict(methods[0].options.data) if methods else {}
-        parts.append((monitor.setup, options))
+    setups = [monitor.setup for monitor in session(system, nodes).monitors]
+    options = [method_of(system, setup.node.name) for setup in setups]
+    parts = [(setup, {} if one is None else one.data) for setup, one in zip(setups, options, strict=True)]
     _write(path, of_system(parts))
     click.echo(f"{path}: {len(parts)} monitors")
 

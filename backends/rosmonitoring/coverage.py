@@ -58,6 +58,11 @@ class Tally:
         """Answers that were to be decided."""
         return self.published - self.supposed
 
+    def unsure(self, reason: str) -> None:
+        """Of an answer it is undecided what it answered."""
+        self.order += 1
+        self.reason = self.reason or reason
+
     def aged(self, now: float, heard: Mapping[str, float], names: Iterable[str]) -> None:
         """An answer has come; `heard`: when its inputs had, those of these names among them."""
         for name in names:

@@ -58,8 +58,7 @@ class Doubts:
         if remembers:
             if len(set(topics.values())) < 2:
                 return False
-            watched.tally.order += 1
-            watched.tally.reason = watched.tally.reason or REMEMBERS
+            watched.tally.unsure(REMEMBERS)
             return True
         own = tuple(n for n in spoken if n not in inputs)
         now, heard, known = time_of(event), monitor.heard_of(watched.names), tuple(values[n] for n in own)

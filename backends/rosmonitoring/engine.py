@@ -23,15 +23,16 @@ from avow.ros.bags import LIVE, publisher
 from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
 from .doubts import Doubts
+from .latest import judge_latest, not_met
 from .memory import SoFar, hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
 from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
 from .parts import came, finish, judge_part, own, scatter
 from .reading import Reader, reader
-from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
+from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .waiting_answers import accused, ask, doubtful, judge_answer, not_met, saw, sure, withdraw
+from .waiting_answers import accused, ask, doubtful, judge_answer, saw, sure, withdraw
 from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text, verdict_of
 from .wires import MappingError
 from .word import Message, Word, follow, word_of
@@ -56,7 +57,7 @@ class Monitor:
     catch_up: Callable[[], object] = field(default=lambda: None, repr=False)
     """Brings it up to date where events were passed over."""
     _seen: set[str] = field(default_factory=set)
-    _versions: dict[str, int] = field(default_factory=dict)
+    versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     previous: list[tuple[str, str]] = field(default_factory=list)
     clauses: dict[str, list[Watched]] = field(default_factory=dict)
@@ -120,7 +121,7 @@ class Monitor:
 
     def _observe(self) -> None:
         for name, rule in self.setup.rules.items():
-            self._versions[name] = self._versions.get(name, 0) + 1
+            self.versions[name] = self.versions.get(name, 0) + 1
             match rule:
                 case Constant(value=value):
                     self.values[name] = value
@@ -130,7 +131,7 @@ class Monitor:
                 case Fields() | Choice():
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self.values |= {} if rule.initial is None else {name: rule.initial}
-                    if rule.initial is not None and getattr(rule, "hold", Hold.LATEST) is Hold.LATEST:
+                    if rule.initial is not None and of_latest(rule):
                         self.supposed.add(name)  # of tuples seen so far, none is what was seen
         for name, source in self.previous:
             if name not in self.values and source in self.values:
@@ -207,7 +208,7 @@ class Monitor:
                 found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self.miss({name})
                 # Its value is now unknown: what needs it waits for the next good message.
-                if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
+                if of_latest(self.setup.rules[name]):
                     self.forget(name)
                 if self.kept is not None and (pairing is None or name in self.paired):
                     saw(self, self.kept, name, event, None)
@@ -219,7 +220,7 @@ class Monitor:
                 saw(self, self.kept, name, event, new)
             if old is None or new != old:
                 self.values[name] = new
-                self._versions[name] += 1
+                self.versions[name] += 1
         return updated
 
     def conclude(self, updated: Mapping[str, bool], event: Mapping[str, Any], found: list[Violation]) -> None:
@@ -263,7 +264,10 @@ class Monitor:
     def known(self, watched: Watched, answer: Answer | None) -> Mapping[str, Value]:
         """The values by which an answer is judged: the latest, but for those of the step before, and those of its own
         parts."""
-        values = {**self.values, **watched.memory} if watched.held else self.values
+        values = self.values
+        if watched.held:
+            held = {name for name, _ in watched.held}
+            values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
         return values if answer is None else {**values, **answer.values}
 
     def _aged(self, watched: Watched, event: Mapping[str, Any]) -> None:
@@ -302,7 +306,7 @@ class Monitor:
                     self.forget(name)
             elif self.values.get(name) is not value:
                 self.values[name] = value
-                self._versions[name] += 1
+                self.versions[name] += 1
 
     def passages(self, names: Set[str] | None = None) -> list[tuple[str, Passage]]:
         """What got lost on the topics that carry some variables (by default any)."""
@@ -322,7 +326,7 @@ class Monitor:
 
     def reader(self, name: str) -> Reader | None:
         """What reads a variable's messages; None of one whose value is made of several."""
-        if getattr(self.setup.rules.get(name), "hold", Hold.LATEST) is not Hold.LATEST:
+        if not of_latest(self.setup.rules.get(name)):
             return None
         return next((read for all_ in self._readers.values() for of, read in all_ if of == name), None)
 
@@ -340,7 +344,7 @@ class Monitor:
             new = read(event, old)
             if old is None or new != old:
                 self.values[name] = new
-                self._versions[name] += 1
+                self.versions[name] += 1
         if self._latest is not None:
             self._latest = max(self._latest, time_of(event))
 
@@ -355,7 +359,7 @@ class Monitor:
         if self.word is not None:
             follow(self, self.word.finish(), found)
             self.backwards = self.backwards or self.word.uneven
-        for watched in {id(w): w for all_ in self.clauses.values() for w in all_}.values():
+        for watched in self.about(self.clauses):
             self.backwards = finish(self, watched, found) or self.backwards
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
@@ -409,8 +413,12 @@ class Monitor:
         """What a clause and the assumptions speak of."""
         return (*watched.names, *(n for assumed in self.assumptions for n in assumed.names))
 
+    def about(self, names: Iterable[str]) -> tuple[Watched, ...]:
+        """The clauses that are judged when one of these variables is published."""
+        return tuple({id(w): w for name in names for w in self.clauses.get(name, ())}.values())
+
     def forget(self, name: str) -> None:
-        self._versions[name] += 1
+        self.versions[name] += 1
         self.values.pop(name, None)
 
     def _watch(self, clause: Clause) -> None:
@@ -434,44 +442,7 @@ class Monitor:
     def _judge(
         self, watched: Watched, event: Mapping[str, Any], found: list[Violation], answer: Answer | None = None
     ) -> None:
-        versions, tally = self._versions, watched.tally
-        values = self.known(watched, answer) if answer is not None else self.values
-        if watched.held:
-            held = {n for n, _ in watched.held}
-            values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
-        if any(name not in values for name in watched.names) and (
-            watched.steps is None or watched.steps.early(watched.names, values)
-        ):
-            if watched.steps is not None and watched.steps.unsaid:
-                tally.published -= 1  # what it responds to, which has no value yet, did not come about
-            else:
-                tally.early += 1
-            if watched.steps is not None and (watched.steps.answers or watched.steps.stepped):
-                self.lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
-            return
-        supposed = any(name in self.supposed for name in watched.names)
-        lost = watched.steps is not None and watched.steps.lost
-        key = (*[versions[n] for n in watched.names], supposed)
-        if watched.steps is not None:
-            watched.steps.comes(time_of(event))
-            watched.truth = watched.steps.step(watched, values, self.solver, self.events, supposed)
-        elif key != watched.key or watched.held or answer is not None:
-            watched.key = key if answer is None else None
-            watched.truth = watched.truth_of(values, self.solver)
-            if not supposed:
-                watched.note_trigger(values)
-        if self.so_far is not None:
-            self.so_far.note(watched)
-        if watched.truth is None and lost:
-            tally.forgotten += 1
-            return
-        if supposed and watched.truth is not False:
-            tally.supposed += 1
-            return
-        if watched.truth:
-            tally.judged += 1
-            return
-        not_met(self, watched, values, event, found)
+        judge_latest(self, watched, event, found, answer)
 
     def miss(self, names: Set[str]) -> None:
         """Messages of these variables were lost, or could not be read."""

@@ -55,8 +55,7 @@ class Telling(Monitor):
     def _judge(
         self, watched: Watched, event: Mapping[str, Any], found: list[Violation], answer: Answer | None = None
     ) -> None:
-        held = {n for n, _ in watched.held}
-        values = {**{n: v for n, v in self.known(watched, answer).items() if n not in held}, **watched.memory}
+        values = {**self.known(watched, answer)}
         before = replace(watched.tally)
         Monitor._judge(self, watched, event, found, answer)
         time = self._now if self.word is None else time_of(event)

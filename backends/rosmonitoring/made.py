@@ -16,7 +16,7 @@ from avow.system.paths import inside
 from .coverage import Tally
 from .engine import Monitor
 from .memory import unmonitored
-from .options import Setup, origin, setup
+from .options import Setup, origin, usable
 from .pairing import Answers
 from .traces import read_trace
 from .watched import Fault, Violation
@@ -27,9 +27,7 @@ ARRIVAL = Answers("arrival", "callbacks run one at a time, and what they publish
 def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
     """As `Backend.judge`. Which input an answer answered is by arrival, unless the options say otherwise; deadlines of
     the wire (`fresh`, `rate`) are none of a run that was made. Raises Rejected."""
-    found, faults = setup(job.system, job.node, job.method.options)
-    if faults:
-        raise Rejected(*faults)
+    found = usable(job.system, job.node, job.method.options)
     used = replace(found, answers=found.answers or ARRIVAL, fresh={}, rates={}, shared={})
     names = [o.name for o in job.obligations]
     unsaid = {name: unmonitored(used, job.node.clause(name)) or "" for name in names}
@@ -49,9 +47,7 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
 def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value], ...]]:
     """As `Backend.steps`. A step begins with an output that its answer has not had yet, or that inputs have changed
     before."""
-    found, faults = setup(job.system, job.node, job.method.options)
-    if faults:
-        raise Rejected(*faults)
+    found = usable(job.system, job.node, job.method.options)
     for name in traces:
         path = inside(job.root, name)
         if path is None:

@@ -23,7 +23,6 @@ from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
 from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending, responding
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
-from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.terms import History, Implies, Literal, Past, Quantified, Role, Term, Variable, histories, timed
 
@@ -275,9 +274,8 @@ def blamed(
     """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
     if watched.truth is None:
         return None
-    clause = watched.clause
-    said = clause.sentence or clause.text or show_term(clause.formula, "unicode")
-    if clause.kind is ClauseKind.ASSUMPTION:
+    said = watched.said
+    if watched.clause.kind is ClauseKind.ASSUMPTION:
         return Fault.ASSUMPTION, said
     for assumed in assumptions:
         if assumed.steps is not None or any(n not in values for n in assumed.names):

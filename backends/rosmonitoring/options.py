@@ -137,6 +137,14 @@ def setup(
     return made, tuple(work.faults)
 
 
+def usable(system: System, node: Node, options: Located | None) -> Setup:
+    """As `setup`. Raises Rejected for what is wrong."""
+    made, faults = setup(system, node, options)
+    if faults:
+        raise Rejected(*faults)
+    return made
+
+
 def origin(system: System) -> Origin:
     """What the plan says of message types."""
     return Origin(system.plan.ros.distro, system.plan.messages)

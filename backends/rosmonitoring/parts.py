@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
-from avow.language.printer import show_term
 
 from .pairing import ticks, time_of
 from .reading import Reader
@@ -101,8 +100,7 @@ def judge_part(
     tally.judged += 1
     if not truth:
         tally.broken += 1
-        said = watched.clause.sentence or watched.clause.text or show_term(watched.clause.formula, "unicode")
-        said += ", whatever the rest of the answer was"
+        said = f"{watched.said}, whatever the rest of the answer was"
         wrong = monitor.violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
         found.append(replace(wrong, heard={n: at for part in parts.values() for n, at in part.heard.items()}))
 
@@ -162,7 +160,7 @@ def _open(monitor: Monitor, watched: Watched, values: Mapping[str, Value]) -> bo
 def own(monitor: Monitor, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
     """Those of variables that a message carries, whoever else publishes its topic."""
     unknown = [name for name, _ in readers if monitor.setup.whose(name, event) is None]
-    for watched in {id(w): w for name in unknown for w in monitor.clauses.get(name, ())}.values():
+    for watched in monitor.about(unknown):
         watched.tally.unnamed(str(event["topic"]))
         monitor.lose(watched)
     return [(name, read) for name, read in readers if monitor.setup.whose(name, event)]

@@ -128,6 +128,11 @@ class Previous:
 Rule = Fields | Choice | Constant | Previous
 
 
+def of_latest(rule: Rule | None) -> bool:
+    """Whether a value is made of the latest message alone."""
+    return not isinstance(rule, Fields) or rule.hold is Hold.LATEST
+
+
 def heard_through(rule: Rule) -> str:
     """The variable whose messages give a rule's value; empty for what the scenario gives."""
     match rule:

@@ -17,7 +17,7 @@ from .bags import Origin, is_bag, messages
 from .blame import Blame
 from .compiled.monitors import Compiled
 from .coverage import Tally
-from .ends import NAME
+from .ends import NAME, method_of
 from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
 from .options import Setup, known_types, origin, same_topic, setup
@@ -260,8 +260,7 @@ def session(
     for name in nodes or known:
         if name not in known:
             raise Rejected(Diagnostic("MON104", f"there is no node '{name}'", hint=suggest(name, known)))
-        methods = [m for m in system.plan.node(name).methods if m.backend == NAME]
-        found, problems = setup(system, known[name], methods[0].options if methods else None, types)
+        found, problems = setup(system, known[name], method_of(system, name), types)
         faults += problems
         faults += readable(found, trace, origin(system)) if trace is not None and not problems else ()
         if not problems:

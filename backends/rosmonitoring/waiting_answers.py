@@ -12,7 +12,6 @@ from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
 from avow.ros.bags import publisher
 
-from .memory import UNSURE, blamed
 from .pairing import EARLY, Asked, Choices, Pairing, Said, ticks, time_of
 from .tuning import BREACHES_IN_DOUBT, COMBINATIONS, REMEMBERED
 from .watched import Answer, Fault, Violation, Watched
@@ -87,16 +86,16 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         tally.triggered = tally.triggered or met
         return
     cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
+    if cases == EARLY:
+        tally.early += 1
+        return
     if isinstance(cases, str):
-        tally.early += cases == EARLY
-        tally.order += cases != EARLY
-        tally.reason = tally.reason or ("" if cases == EARLY else cases)
+        tally.unsure(cases)
         return
     tally.aged(asked.seconds, asked.since, watched.paired)
     verdicts = {monitor.verdict(watched, values) for values in cases}
     if len(verdicts) > 1:
-        tally.order += 1
-        tally.reason = tally.reason or "it depends on which of its inputs the answer answered"
+        tally.unsure("it depends on which of its inputs the answer answered")
         return
     tally.judged += 1
     tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
@@ -106,7 +105,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     elif isinstance(verdict, Fault):
         tally.broken += 1
         tally.excused += verdict is Fault.EXCUSED
-        said = watched.clause.sentence or watched.clause.text or watched.clause.name
+        said = watched.said
         if verdict is Fault.EXCUSED:
             said += "; but an assumption does not hold"
         event, heard = pairing.event_of(asked), asked.heard
@@ -114,27 +113,6 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
             heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
         wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])
         found.append(replace(wrong, index=asked.index, heard=heard))
-
-
-def not_met(
-    monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation],
-    late: str = "",
-) -> None:  # fmt: skip
-    """A clause does not hold of the latest values, or nobody can tell."""
-    tally = watched.tally
-    if monitor.doubts is not None and monitor.doubts.ask(monitor, watched, values, event):
-        return
-    tally.judged += 1
-    blame = blamed(watched, monitor.assumptions, values, monitor.solver, monitor.so_far, monitor.events)
-    if blame is None:
-        tally.undecided += 1
-        tally.reason = tally.reason or UNSURE
-        return
-    tally.broken += 1
-    fault, why = blame
-    if fault is Fault.EXCUSED:
-        tally.excused += 1
-    found.append(monitor.violation(fault, watched.clause.name, event, why + late, watched, values))
 
 
 def doubtful(monitor: Monitor, watched: Watched) -> bool:

@@ -12,6 +12,7 @@ from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
+from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
 from avow.tuning.effort import JUDGE_EFFORT
 
@@ -113,6 +114,11 @@ class Watched:
     """Where it held, by tokens of values (`compiled.plans.Token`), and whether its antecedent was met there."""
     steps: Memory | None = None
     """What it remembers, where it speaks of other steps."""
+
+    @property
+    def said(self) -> str:
+        """The clause, for people."""
+        return self.clause.sentence or self.clause.text or show_term(self.clause.formula, "unicode")
 
     def truth_of(self, values: Mapping[str, Value], solver: bool) -> bool | None:
         """Whether it holds of the values; None where neither evaluation nor, if it may be asked, Z3 can tell."""

@@ -21,7 +21,7 @@ from avow.language.terms import Role, histories, timed
 from .options import Setup, same_topic
 from .pairing import Answers, Pairing, time_of
 from .reading import Reader
-from .rules import Choice, Fields, Hold, Previous
+from .rules import Choice, Fields, Previous, of_latest
 from .tuning import KEYS_KEPT
 
 if TYPE_CHECKING:
@@ -194,13 +194,12 @@ def follow(monitor: Monitor, steps: Iterable[Step], found: list[Violation]) -> N
 
 def _pass(monitor: Monitor, names: set[str]) -> None:
     """Messages with these variables are part of no step: what they left is not known."""
-    for watched in {id(w): w for name in names for w in monitor.clauses.get(name, ())}.values():
+    for watched in monitor.about(names):
         watched.tally.published += 1
-        watched.tally.order += 1
-        watched.tally.reason = watched.tally.reason or ALONE
+        watched.tally.unsure(ALONE)
         watched.memory.clear()
     for name in names | {name for name, source in monitor.previous if source in names}:
-        if getattr(monitor.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
+        if of_latest(monitor.setup.rules[name]):
             monitor.forget(name)
 
 

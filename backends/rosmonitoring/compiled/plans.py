@@ -71,7 +71,7 @@ def watch_of(monitor: Monitor) -> Watch:
     regional = {name: bounds for name, bounds in found.items() if bounds is not None}
     if monitor.pairing is not None:
         monitor.pairing.begin({name: read for name in rules if (read := monitor.reader(heard_through(rules[name])))})
-    for watched in (each for all_ in monitor.clauses.values() for each in all_):
+    for watched in monitor.about(monitor.clauses):
         watched.alike.clear()  # the tokens of a run before are others
     nothing: list[None] = [None] * len(slots)
     return Watch(monitor, slots, [*nothing], [*nothing], [*nothing], regional)
@@ -83,15 +83,14 @@ def plan_of(watch: Watch, topic: str) -> Plan | None:
     names = monitor.carried(topic)
     if not names or not monitor.by_values or not monitor.setup.shared.keys().isdisjoint(names):
         return None
-    found: dict[int, Watched] = {id(w): w for name in names for w in monitor.clauses.get(name, ())}
-    for watched in found.values():
-        if watched.held or not watched.outputs <= set(names):
-            return None
+    found = monitor.about(names)
+    if any(watched.held or not watched.outputs <= set(names) for watched in found):
+        return None
     answers = monitor.pairing.answers if monitor.pairing is not None else None
     if answers is not None and {*answers.input[:1], *answers.output[:1]} & {*ENVELOPE}:
         return None
-    due = tuple(watched for watched in found.values() if not watched.paired)
-    asked = tuple(watched for watched in found.values() if watched.paired)
+    due = tuple(watched for watched in found if not watched.paired)
+    asked = tuple(watched for watched in found if watched.paired)
     spoken = dict.fromkeys(name for watched in due for name in watched.names)
     more = dict.fromkeys((*spoken, *monitor.assumed))
     slots = watch.slots
