@@ -6,7 +6,7 @@ Every function reports all that is wrong at once. Nothing here raises anything b
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from avow.language.pieces import by_pieces
 from avow.language.scope import BOTH_ROLES, Defined, Scope
 from avow.language.sorts import Sort
 from avow.language.source import Reports, Source, in_order
+from avow.language.syntax import TermSyntax
 from avow.language.terms import Role, Term, Variable
 from avow.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 
@@ -69,12 +70,7 @@ def read_in_part(paths: Iterable[Path]) -> Contract:
 
 def syntax_faults(text: str, span: Span | None) -> tuple[Diagnostic, ...]:
     """Why a text is no formula, whatever its names mean; empty where it may be one."""
-    source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
-    reports = Reports(source)
-    found = tokens(reports)
-    if found:
-        parse("formula", found, reports, found[-1].end)
-    return tuple(in_order(reports))
+    return tuple(in_order(syntax_of(text, span)[1]))
 
 
 def check_text(
@@ -335,25 +331,10 @@ def _parse(
     remembers: bool = False,
     clause: bool = False,
 ) -> Term:
-    source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
-    reports = Reports(source)
-    found = tokens(reports)
-    if not found and not reports.failed:
-        reports.error("RCL120", "there is no formula here", 0, len(text))
-    tree = parse("formula", found, reports, found[-1].end) if found else None
+    tree, reports = syntax_of(text, span)
     term: Term | None = None
     if tree is not None:
-        bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
-        definitions = (*contract.definitions, *(node.definitions if node is not None else ()))
-        defined = {d.name: Defined(d.parameters, found=d, state="done") for d in definitions if d.name not in bound}
-        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers or clause, defined=defined)
-        if node is None:
-            scope.nodes = {n.name: n for n in contract.nodes}
-        else:
-            scope.inputs = {p.name: p for p in node.inputs}
-            scope.outputs = {p.name: p for p in node.outputs}
-            scope.node = node.name
-        checker = Checker(scope, reports)
+        checker = _checker(reports, node, contract, extra, roles, remembers=remembers or clause)
         if formula:
             term = checker.clause(tree) if clause else checker.formula(tree)
         elif sort is not None:
@@ -363,6 +344,46 @@ def _parse(
     if term is None or reports.failed:
         raise Rejected(*in_order(reports))
     return term
+
+
+def syntax_of(
+    text: str, span: Span | None, marked: Callable[[list[Token]], list[Token]] = list
+) -> tuple[TermSyntax | None, Reports]:
+    """The tree of a formula, None where it has none, and what there is to say of it. `marked` may say what else its
+    words are."""
+    source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
+    reports = Reports(source)
+    found = marked(tokens(reports))
+    if not found and not reports.failed:
+        reports.error("RCL120", "there is no formula here", 0, len(text))
+    return parse("formula", found, reports, found[-1].end) if found else None, reports
+
+
+def one_step(tree: TermSyntax, reports: Reports, contract: Contract) -> Term | None:
+    """A part of a formula's tree, as `parse_formula` without a node; None where `reports` says why."""
+    return _checker(reports, None, contract, None, BOTH_ROLES).formula(tree)
+
+
+def _checker(
+    reports: Reports,
+    node: Node | None,
+    contract: Contract,
+    extra: Mapping[str, Sort] | None,
+    roles: frozenset[Role],
+    *,
+    remembers: bool = False,
+) -> Checker:
+    bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
+    definitions = (*contract.definitions, *(node.definitions if node is not None else ()))
+    defined = {d.name: Defined(d.parameters, found=d, state="done") for d in definitions if d.name not in bound}
+    scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers, defined=defined)
+    if node is None:
+        scope.nodes = {n.name: n for n in contract.nodes}
+    else:
+        scope.inputs = {p.name: p for p in node.inputs}
+        scope.outputs = {p.name: p for p in node.outputs}
+        scope.node = node.name
+    return Checker(scope, reports)
 
 
 __all__ = ["check_paths", "check_sources", "check_text", "load_contract", "parse_formula", "parse_term"]

@@ -15,6 +15,7 @@ from avow.base.grammars import lark_of
 from avow.language.lexer import Token
 from avow.language.source import Reports
 from avow.language.syntax import (
+    Ahead,
     Application,
     Binder,
     BuiltinName,
@@ -407,6 +408,9 @@ class _Build:
         return Lasting(c[0].start, c[2].end, _deepest(c[::2]), c[1].text, c[0], None, c[2])
 
     until = since
+
+    def ahead(self, c: list[Any]) -> Ahead:
+        return Ahead(c[0].start, c[1].end, c[1].depth + 1, Name(c[0].start, c[0].end, 1, c[0].text), (c[1],))
 
     def limited_since(self, c: list[Any]) -> Lasting:
         return Lasting(c[0].start, c[3].end, _deepest((c[0], *c[2:])), c[1].text, c[0], c[2], c[3])

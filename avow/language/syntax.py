@@ -83,6 +83,11 @@ class Application(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
+class Ahead(Application):
+    """``always F``, in temporal properties only; the function is the operator's name."""
+
+
+@dataclass(frozen=True, slots=True)
 class Name(_Placed):
     text: str
 

@@ -7,18 +7,22 @@ part without temporal operators is one state formula; operators cannot stand ins
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import field, replace
 from enum import StrEnum
-from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
-from avow.language.contract import Contract
+from avow.language.contract import Contract, Node, Port
 from avow.language.definedness import unless_without_value, with_value
-from avow.language.terms import Term
+from avow.language.syntax import Ahead, Connective, Lasting, Name, Negation, Sign, unparenthesised, walk
+from avow.language.terms import TRUE, Term
 from avow.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
+
+if TYPE_CHECKING:
+    from avow.language.lexer import Token
+    from avow.language.source import Reports
+    from avow.language.syntax import Syntax, TermSyntax
 
 
 class Operator(StrEnum):
@@ -54,26 +58,18 @@ class Temporal:
 Property = State | Temporal
 
 
-_TEMPORAL = ("always", "eventually", "next", "until")
-_UNARY = ("not", "always", "eventually", "next")
-_BINARY = ("<=>", "->", "or", "and", "until")
-_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[A-Za-z_][A-Za-z0-9_\']*|<=>|->|[()\[\]{}]|[^\sA-Za-z_"]|"')
-_OPENING, _CLOSING = "([{", ")]}"
-
-
-@dataclass(frozen=True, slots=True)
-class _Token:
-    text: str
-    start: int
-    end: int
-
-
 def parse_property(text: str, contract: Contract, span: Span | None = None) -> Property:
     """A temporal property, as a claim. Raises Rejected with every fault found."""
     if len(text) > PROPERTY_LENGTH:
         raise Rejected(Diagnostic("PLAN114", "the property is too long", span))
-    parser = _Parser(text, contract, span, _tokens(text))
-    return _claimed(parser.parse(0, len(parser.tokens), 0), span)
+    from avow.language.load import syntax_of  # the grammar is slow to import
+    from avow.language.source import in_order
+
+    tree, reports = syntax_of(text, span, _marked)
+    found = None if tree is None else _property(tree, reports, contract, 0)
+    if found is None or reports.failed:
+        raise Rejected(*in_order(reports))
+    return _claimed(found, span)
 
 
 def show_property(formula: Property) -> str:
@@ -95,12 +91,6 @@ def states_of(formula: Property) -> tuple[State, ...]:
     return tuple(dict.fromkeys(state for part in formula.parts for state in states_of(part)))
 
 
-def is_temporal(text: str) -> bool:
-    """Whether a text uses a temporal operator at all."""
-    tokens = _tokens(text)
-    return any(_is_operator(tokens, k) in _TEMPORAL for k in range(len(tokens)))
-
-
 def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term:
     """A claim over a system's ports, written ``node.port``: the formula, and that it has a value. Where a node has an
     input and an output of one name, the output is meant, unless the text says ``node.in.port`` somewhere. It may speak
@@ -110,22 +100,19 @@ def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term
 
 def written_state(text: str, contract: Contract, span: Span | None = None, *, clause: bool = False) -> Term:
     """As `parse_state`, of the formula alone; one that is no `clause` is of one step."""
-    from dataclasses import replace
-
     from avow.language.load import parse_formula  # the grammar is slow to import
 
-    nodes = tuple(
-        replace(
-            node,
-            inputs=tuple(
-                port
-                for port in node.inputs
-                if port.name not in {o.name for o in node.outputs} or f"{node.name}.in.{port.name}" in text
-            ),
-        )
-        for node in contract.nodes
-    )
-    return parse_formula(text, None, replace(contract, nodes=nodes), span, clause=clause)
+    return parse_formula(text, None, _heard(text, contract), span, clause=clause)
+
+
+def _heard(text: str, contract: Contract) -> Contract:
+    """Without the inputs that have the name of an output of their node, unless the text says ``node.in.port``."""
+
+    def kept(node: Node) -> tuple[Port, ...]:
+        outputs = {port.name for port in node.outputs}
+        return tuple(p for p in node.inputs if p.name not in outputs or f"{node.name}.in.{p.name}" in text)
+
+    return replace(contract, nodes=tuple(replace(node, inputs=kept(node)) for node in contract.nodes))
 
 
 def _claimed(formula: Property, span: Span | None, positive: bool = True) -> Property:
@@ -150,95 +137,58 @@ def _mixed(part: Property) -> bool:
     return isinstance(part, State) and " " in part.text.strip()
 
 
-def _tokens(text: str) -> tuple[_Token, ...]:
-    return tuple(_Token(found[0], found.start(), found.end()) for found in _TOKEN.finditer(text))
+def _marked(found: list[Token]) -> list[Token]:
+    """RCL's tokens. `always`, `eventually` and `next` are operators, and no names, where a formula begins and before
+    one; `until` is one everywhere."""
+    for at, token in enumerate(found):
+        before = found[at - 1].type if at else "LPAR"
+        after = found[at + 1].type if at + 1 < len(found) else "LPAR"
+        if token.type == "UNTIL":
+            found[at] = token._replace(type="AHEAD_UNTIL")
+        elif token.text in ("always", "eventually", "next") and before in _BEFORE and after in _AFTER:
+            found[at] = token._replace(type="AHEAD")
+    return found
 
 
-def _is_operator(tokens: tuple[_Token, ...], at: int) -> str | None:
-    """The operator at a place. A name such as `next` is one only where an operator can stand."""
-    word = tokens[at].text
-    before = tokens[at - 1].text if at else None
-    after = tokens[at + 1].text if at + 1 < len(tokens) else None
-    if word in ("<=>", "->"):
-        return word
-    if before == ".":
-        return None
-    starts = before is None or before in "([{|" or before in _BINARY or before in _UNARY
-    if word in _UNARY:
-        operand = after is not None and (after[0].isalpha() or after[0] in '_("-' or after[0].isdigit())
-        return word if starts and operand else None
-    if word in _BINARY:
-        return None if starts else word
-    return None
+_INSIDE = ("LPAR", "LBRACE", "NOT", "AHEAD", "IF")
+_BEFORE = frozenset((*_INSIDE, "LSQUARE", "BAR", "IFF", "IMPLIES", "OR", "AND", "AHEAD_UNTIL", "THEN", "ELSE"))
+_AFTER = frozenset((*_INSIDE, "NAME", "STRING", "MINUS", "NUMBER", "FORALL", "EXISTS", "UNIQUE", "TRUE", "FALSE", "LT"))
 
 
-@dataclass(slots=True)
-class _Parser:
-    text: str
-    contract: Contract
-    span: Span | None
-    tokens: tuple[_Token, ...]
+def _property(tree: TermSyntax, reports: Reports, contract: Contract, depth: int) -> Property:
+    """Faults are reported."""
 
-    def parse(self, start: int, end: int, depth: int) -> Property:
-        if depth > PROPERTY_DEPTH:
-            raise self.fault("nested too deeply", start)
-        if start >= end:
-            raise self.fault("a formula is missing here", start)
-        if self.wrapped(start, end):
-            return self.parse(start + 1, end - 1, depth + 1)
-        if not any(_is_operator(self.tokens, k) in _TEMPORAL for k in range(start, end)):
-            return self.state(start, end)
-        for operator in _BINARY:
-            places = list(self.places(operator, start, end))
-            if not places:
-                continue
-            if operator in ("and", "or"):
-                cuts = [start - 1, *places, end]
-                parts = tuple(self.parse(a + 1, b, depth + 1) for a, b in pairwise(cuts))
-                return Temporal(Operator(operator), parts)
-            if operator == "<=>" and len(places) > 1:
-                raise self.fault("put parentheses: <=> is given more than once", places[1])
-            left = self.parse(start, places[0], depth + 1)
-            return Temporal(Operator(operator), (left, self.parse(places[0] + 1, end, depth + 1)))
-        first = _is_operator(self.tokens, start)
-        if first in _UNARY:
-            return Temporal(Operator(first), (self.parse(start + 1, end, depth + 1),))
-        raise self.fault("a temporal operator cannot stand inside a state formula or a quantifier", start)
+    def made(operator: str, *parts: TermSyntax) -> Temporal:
+        return Temporal(Operator(operator), tuple(_property(part, reports, contract, depth + 1) for part in parts))
 
-    def wrapped(self, start: int, end: int) -> bool:
-        """Whether one pair of parentheses encloses it all."""
-        if self.tokens[start].text != "(" or self.tokens[end - 1].text != ")":
-            return False
-        level = 0
-        for k in range(start, end):
-            text = self.tokens[k].text
-            level += 1 if text in _OPENING else -1 if text in _CLOSING else 0
-            if level == 0:
-                return k == end - 1
-        return False
+    tree = unparenthesised(tree)
+    if not any(isinstance(part, Ahead) or _is_until(part) for part in walk(tree)):
+        from avow.language.load import one_step
 
-    def places(self, operator: str, start: int, end: int) -> Iterator[int]:
-        """Where an operator stands outside all brackets."""
-        level = 0
-        for k in range(start, end):
-            text = self.tokens[k].text
-            if text in _OPENING:
-                level += 1
-            elif text in _CLOSING:
-                level -= 1
-                if level < 0:
-                    raise self.fault(f"{text} closes nothing", k)
-            elif level == 0 and _is_operator(self.tokens, k) == operator:
-                yield k
-        if level:
-            raise self.fault("a bracket is not closed", end - 1)
+        text = reports.source.text[tree.start : tree.end]
+        term = one_step(tree, reports, _heard(text, contract))
+        assert term is not None or reports.failed
+        return State(term or TRUE, text)
+    match tree:
+        case _ if depth > PROPERTY_DEPTH:
+            message = "nested too deeply"
+        case Ahead(function=Name(text=word), arguments=parts):
+            return made(word, *parts)
+        case Negation(body=body):
+            return made("not", body)
+        case Lasting(word=word, left=left, right=right) if _is_until(tree):
+            return made(word, left, right)
+        case Connective(sign=sign, items=items) if len(items) == 2 or sign in (Sign.AND, Sign.OR):
+            return made(sign, *items)
+        case Connective(sign=Sign.IMPLIES, items=(left, *rest)):
+            return made("->", left, replace(tree, start=rest[0].start, items=tuple(rest)))
+        case Connective():
+            message = "put parentheses: <=> is given more than once"
+        case _:  # what is of one step
+            message = "a temporal operator cannot stand inside a state formula or a quantifier"
+    reports.error("PLAN114", f"temporal property: {message}", tree.start, tree.end)
+    return State(TRUE)
 
-    def state(self, start: int, end: int) -> State:
-        first, last = self.tokens[start].start, self.tokens[end - 1].end
-        text = self.text[first:last]
-        return State(written_state(text, self.contract, self.span), text)
 
-    def fault(self, message: str, at: int) -> Rejected:
-        offset = self.tokens[min(at, len(self.tokens) - 1)].start if self.tokens else 0
-        near = self.text[offset : offset + 30]
-        return Rejected(Diagnostic("PLAN114", f"temporal property: {message}, near {near!r}", self.span))
+def _is_until(tree: Syntax) -> bool:
+    return isinstance(tree, Lasting) and tree.word == Operator.UNTIL

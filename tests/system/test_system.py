@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from avow.base.codes_plan import PLAN_CODES
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.graphs import components, cycles_in
 from avow.system.graph import dataflow
 from avow.system.load import load_bare, load_path, load_system
 from avow.system.names import renamed
 from avow.system.plan import Endpoint, System
 from avow.system.rosgraph import account, read_ros_graph
-from avow.system.temporal import Operator, State, Temporal, is_temporal, parse_property, show_property
+from avow.system.temporal import Operator, State, Temporal, parse_property, show_property
 
 ROOT = Path(__file__).parents[2]
 
@@ -83,7 +83,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("environment: {in.r: {assume: out.x > 1, because: x}}", "PLAN113", 1, "out.x", "no node provides"),
         ("requirements: {R: {text: t, supported_by: [a.g2]}}", "PLAN106", 1, "a.g2", "a.g1"),
         ("requirements: {R: {text: t, formula: a.q > 1}}", "RCL203", 1, "q", ""),
-        ("requirements: {R: {text: t, temporal: always b.y > 1) until (b.y > 2}}", "PLAN114", 1, "closes nothing", ""),
+        ("requirements: {R: {text: t, temporal: always b.y > 1) until (b.y > 2}}", "RCL120", 1, "and not `)`", ""),
         ("compose: {D: {select: [a, bb]}}", "PLAN106", 1, "'bb'", "'b'"),
         ("compose: {D: {select: [a, a]}}", "PLAN110", 1, "twice", ""),
         ("nodes: {aa: {}}", "PLAN106", 1, "'aa'", "'a'"),
@@ -254,8 +254,19 @@ def test_words_that_only_look_like_operators(tmp_path: Path) -> None:
     found = parse_property("next a.next", contract)
     assert isinstance(found, Temporal)
     assert found.operator is Operator.NEXT
-    assert not is_temporal("a.t == always")
-    assert is_temporal("eventually a.next")
+    assert isinstance(parse_property("a.t == always and a.t in {next, always}", contract), State)
+    found = parse_property("eventually a.next and a.t == next", contract)  # what comes later is no part of it
+    assert show_property(found) == "(eventually a.next) and (a.t == next)"
+
+
+def test_every_fault_of_a_property_is_told_at_its_place(tmp_path: Path) -> None:
+    contract = make(tmp_path, A + B).contract
+    with pytest.raises(Rejected) as told:
+        parse_property(
+            "always b.q > 1 and eventually forall(i in NATURAL | next b.y > i)", contract, Span("p", 3, 10, 3, 9)
+        )
+    found = [(d.code, d.span and (d.span.line, d.span.column)) for d in told.value.diagnostics]
+    assert found == [("RCL203", (3, 17)), ("PLAN114", (3, 40))]
 
 
 @pytest.mark.parametrize(
@@ -268,6 +279,7 @@ def test_words_that_only_look_like_operators(tmp_path: Path) -> None:
         "b.y > 1) until (a.x > 0",
         "b.q > 1 until b.y > 2",
         "always " * 500 + "b.y > 1",
+        "b.y > 1 -> " * 500 + "always b.y > 1",
     ],
 )
 def test_what_is_no_property(tmp_path: Path, text: str) -> None:
