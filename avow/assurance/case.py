@@ -308,6 +308,8 @@ def _views(
         return Currency.CURRENT
 
     standing = [currency(entry) for entry in entries]
+    if len(entries) == 1:  # nothing else speaks: nearly always
+        return [_view(entries[0], standing[0])]
     scored = {
         e.evidence.method: e.evidence
         for e, c in zip(entries, standing, strict=True)
@@ -330,13 +332,12 @@ def _views(
             if words in said or (_failed(entries[at]) and record.method in answered):
                 standing[at] = Currency.SUPERSEDED
             said.add(words)
-    views = []
-    for entry, found in zip(entries, standing, strict=True):
-        cut = effective(entry.evidence)
-        views.append(
-            EvidenceView(entry, found, found is Currency.CURRENT, cut if cut is not entry.evidence.verdict else None)
-        )
-    return views
+    return [_view(entry, found) for entry, found in zip(entries, standing, strict=True)]
+
+
+def _view(entry: Entry, found: Currency) -> EvidenceView:
+    cut = effective(entry.evidence)
+    return EvidenceView(entry, found, found is Currency.CURRENT, cut if cut is not entry.evidence.verdict else None)
 
 
 def _failed(entry: Entry) -> bool:
@@ -388,7 +389,8 @@ def _obligation(
         link=_link(tuple(v.entry for v in evidence if v.counts)),
         handled=handled,
     )
-    return replace(view, suggestion=suggestion_for(view, facts, facts.today))
+    suggested = suggestion_for(view, facts, facts.today)
+    return replace(view, suggestion=suggested) if suggested else view
 
 
 def _derivation(

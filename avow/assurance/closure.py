@@ -45,7 +45,12 @@ class Closure:
         self.local = {view.obligation.local_id: view.id for view in views}
         self.assumptions = {node.name: tuple(name for name, _ in node.assumptions) for node in nodes}
         self.composition = [view for view in views if view.obligation.kind is Kind.COMPOSITION]
+        self.joint: dict[str, list[str]] = {}
+        for view in self.composition:
+            if view.obligation.name.startswith("joint."):
+                self.joint.setdefault(view.obligation.name.removeprefix("joint."), []).append(view.id)
         self.known = {f"{view.obligation.node}.{view.obligation.name}": view.id for view in views if _guarantees(view)}
+        self.by: dict[str, tuple[str, ...]] = {}
         self.below: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 
     def of_requirement(self, name: str) -> Closed:
@@ -91,8 +96,8 @@ class Closure:
         """What a claim rests on beyond what it says, and assumptions that nothing discharges."""
         if _guarantees(view):
             node, about = view.obligation.node, f"{view.obligation.node}.{view.obligation.name}"
-            joint = [v.id for v in self.composition if v.obligation.name == f"joint.{about}"]
-            return self._discharged([f"{node}.{clause}" for clause in self.assumptions.get(node, ())], joint)
+            assumed = [f"{node}.{clause}" for clause in self.assumptions.get(node, ())]
+            return self._discharged(assumed, list(self.joint.get(about, ())))
         if view.obligation.kind in (Kind.COMPOSITION, Kind.REQUIREMENT):
             labels = [label for item in view.counting for label in _needed(item.entry.evidence.details)]
             found = [self.known[label] for label in labels if label in self.known]
@@ -104,7 +109,9 @@ class Closure:
     def _discharged(self, assumptions: Sequence[str], found: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
         lost = []
         for about in assumptions:
-            by = self._by(about)
+            if about not in self.by:
+                self.by[about] = self._by(about)
+            by = self.by[about]
             found += by
             if not by:
                 lost.append(about)

@@ -131,7 +131,7 @@ def facts_of_system(
         ),
         expected=plan.expected,
         accepted=plan.accepted,
-        obligations=tuple({o.id: replace(o, span=_relative(o.span, plan)) for o in obligations}.values()),
+        obligations=tuple({o.id: o.at(_relative(o.span, plan)) for o in obligations}.values()),
         planned=planned,
         entries=tuple(sorted((e for e in records if e.hash in kept), key=lambda e: (e.number, e.hash))),
         derivations=tuple(derivations),
@@ -230,7 +230,9 @@ def facts_of_case(case: Case) -> Facts:
 
 def _relative(span: Span | None, plan: Plan) -> Span | None:
     """A place relative to the workspace (the folder above ``contracts/``): a report is the same on every machine."""
-    return span if span is None else replace(span, file=_place(span.file, plan.path))
+    if span is None:
+        return None
+    return Span(_place(span.file, plan.path), span.line, span.column, span.end_line, span.end_column)
 
 
 @functools.lru_cache(maxsize=1000)

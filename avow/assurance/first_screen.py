@@ -118,7 +118,10 @@ def answers(
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
     kinds = len(weakenings)
-    ranked = [_basis(node, views, relied) for node in nodes]
+    by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
+    for view in views:
+        by_node.setdefault(view.obligation.node, []).append(view)
+    ranked = [_basis(node, by_node[node.name], relied) for node in nodes]
     basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
     owned = sum(s.owned for s in suppositions)
     return Answers(
@@ -190,11 +193,11 @@ def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
 def _basis(
     node: NodeView, views: Sequence[ObligationView], relied: Mapping[str, Relied]
 ) -> tuple[NodeBasis, tuple[int, float]]:
-    """A node's line, and how weak it is: its worst colour, then how much of it has that colour."""
-    own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
+    """A node's line, and how weak it is: its worst colour, then how much of it has that colour. `views`: the node's."""
+    own = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
-    link = linked(node.name, views)
+    link = linked(views)
     for (said, _), view in marks:
         by_object.setdefault(_examined(view, relied, link), Counter())[said] += 1
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}

@@ -5,6 +5,8 @@ An obligation's claim bears its id; a requirement's is ``requirement:REQ1``, a d
 
 from __future__ import annotations
 
+import functools
+
 from avow.evidence.obligation import Kind, Obligation
 
 ADVICE = ("not-redundant", "constrained", "determined", "needed")
@@ -70,10 +72,15 @@ def short(claim: str) -> str:
 
 def sanity_property(obligation: Obligation) -> str:
     """Which of the sanity properties an obligation is about: its name up to the clause, if it names one."""
+    return _property(obligation.name)
+
+
+@functools.lru_cache(maxsize=10_000)
+def _property(told: str) -> str:
     for name in (*FOUNDATION, *ADVICE, "not-vacuous", "not-tautological", "meetable"):
-        if obligation.name == name or (obligation.name.startswith(name) and not obligation.name[len(name)].isalnum()):
+        if told == name or (told.startswith(name) and not told[len(name)].isalnum()):
             return name
-    return obligation.name
+    return told
 
 
 def is_advice(obligation: Obligation) -> bool:

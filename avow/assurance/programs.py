@@ -21,8 +21,12 @@ def shown_by_programs(
     obligations: Sequence[Obligation], statuses: Mapping[str, Status], counting: Mapping[str, Sequence[Entry]]
 ) -> dict[str, tuple[Status, str]]:
     """Obligation → its status and, in words, which method's proofs give it."""
-    nodes = dict.fromkeys(o.node for o in obligations if o.kind is Kind.GUARANTEE)
-    methods = {node: method for node in nodes if (method := _method(node, obligations, counting)) is not None}
+    proofs: dict[str, list[set[str]]] = {}
+    for o in obligations:
+        if o.kind is Kind.GUARANTEE:
+            said = {e.evidence.method for e in counting[o.id] if _is_proof(e.evidence)}
+            proofs.setdefault(o.node, []).append(said)
+    methods = {node: method for node, of in proofs.items() if (method := _method(of)) is not None}
     sanity = [o for o in obligations if o.kind is Kind.SANITY and o.node in methods]
     allowed = {o.node for o in sanity if sanity_property(o) == "assumptions-satisfiable" and statuses[o.id].supports}
     found: dict[str, tuple[Status, str]] = {}
@@ -40,15 +44,10 @@ def shown_by_programs(
     return found
 
 
-def _method(node: str, obligations: Sequence[Obligation], counting: Mapping[str, Sequence[Entry]]) -> str | None:
-    """A method whose current records prove every guarantee of the node, unconditionally, of a program that always has
-    an output."""
-    proofs = [
-        {e.evidence.method for e in counting[o.id] if _is_proof(e.evidence)}
-        for o in obligations
-        if o.kind is Kind.GUARANTEE and o.node == node
-    ]
-    return min(set[str].intersection(*proofs), default=None) if proofs else None
+def _method(proofs: Sequence[set[str]]) -> str | None:
+    """A method whose current records prove every guarantee of a node, unconditionally, of a program that always has
+    an output; `proofs` are the methods that prove each."""
+    return min(set[str].intersection(*proofs), default=None)
 
 
 def _is_proof(record: Evidence) -> bool:

@@ -109,12 +109,12 @@ def looked_at(relied: Relied) -> Object | None:
     return relied.record.of if relied.status in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED) else None
 
 
-def linked(node: str, views: Iterable[ObligationView]) -> str:
-    """Where the node's program was held against the models that were verified in its place: how that stands, in words;
-    empty where it was not."""
+def linked(views: Iterable[ObligationView]) -> str:
+    """Where a node's program was held against the models that were verified in its place: how that stands, in words;
+    empty where it was not. `views`: the node's."""
     for view in views:
         o = view.obligation
-        if o.node == node and o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED:
+        if o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED:
             return f"program agrees: {view.standing.word}"
     return ""
 

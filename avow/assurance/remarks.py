@@ -26,6 +26,10 @@ _FIRST = ("RCL401", "RCL413", "RCL414", "RCL415", "RCL412")
 change what a verdict is about."""
 
 
+_READ = ("lints_off", "requirements", "\\")
+"""A plan without any of these has no key that is read here: a backslash may spell one otherwise."""
+
+
 def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
     """An advice for each lint of the contracts, with the guarantee or assumption that it stands in, of the plan's
     requirements, and for each remark of a method: first what changes what a verdict is about, then the methods', then
@@ -34,10 +38,12 @@ def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> t
     plans = [root for source in sources if (root := _plan(source)) is not None]
     off = _switched_off(plans)
     weighty, rest = list[OpenItem](), list[OpenItem]()
-    guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
+    clauses = _clauses(views)
     for lint in sorted(found, key=lambda d: _FIRST.index(d.code) if d.code in _FIRST else len(_FIRST)):
         if lint.span and lint.code not in off:
-            (weighty if lint.code in _FIRST else rest).append(_item(lint, lint.span, _clause(lint.span, guarantees)))
+            (weighty if lint.code in _FIRST else rest).append(
+                _item(lint, lint.span, clauses.get((lint.span.file, lint.span.line), ""))
+            )
     if contract is not None:
         weighty += [item for plan in plans for item in _of_requirements(plan, contract, views, off)]
     return (*weighty, *_of_methods(views, off), *rest)
@@ -84,7 +90,7 @@ def _checked(contracts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, t
 
 
 def _plan(source: SourceView) -> Piece | None:
-    if source.path.rpartition("/")[2] != "plan.yaml":
+    if source.path.rpartition("/")[2] != "plan.yaml" or not any(word in source.text for word in _READ):
         return None
     try:
         return read_yaml(source.text.encode("utf-8", "replace"), source.path)[0]
@@ -104,10 +110,12 @@ def _item(found: Diagnostic, span: Span, claim: str) -> OpenItem:
     return OpenItem(REMARK, claim or place, f"{found.code}, {place}{hint}", advice=True, title=found.message)
 
 
-def _clause(span: Span, guarantees: Sequence[ObligationView]) -> str:
-    """The guarantee in which the place is, if there is one."""
-    return next((v.id for v in guarantees if _within(span, v.obligation.span)), "")
-
-
-def _within(inner: Span, outer: Span | None) -> bool:
-    return outer is not None and inner.file == outer.file and outer.line <= inner.line <= outer.end_line
+def _clauses(views: Sequence[ObligationView]) -> dict[tuple[str, int], str]:
+    """File and line → the first guarantee that stands there."""
+    found: dict[tuple[str, int], str] = {}
+    for view in views:
+        span = view.obligation.span
+        if view.obligation.kind is Kind.GUARANTEE and span is not None:
+            for line in range(span.line, span.end_line + 1):
+                found.setdefault((span.file, line), view.id)
+    return found

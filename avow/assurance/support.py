@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
-from avow.assurance.model import Derivation, Handled
+from avow.assurance.model import Derivation, Handled, NodeView
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
+from avow.base.remembered import by_identity
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, in_words
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -45,6 +46,9 @@ class Names:
                 for name in (r for r in self.requirements if _belongs(o.name, r)):
                     self.own.setdefault(name, []).append(o.id)
         self.derivations = {d.name for d in facts.derivations}
+        self.saying: dict[tuple[str, ...], list[Obligation]] = {}
+        for o in self.obligations.values():
+            self.saying.setdefault((o.digest, *o.local_id.split("/")[:2]), []).append(o)
 
     def claims(self, name: str) -> tuple[str, ...] | None:
         """The claims that a name of the plan stands for; None where it stands for nothing."""
@@ -66,10 +70,7 @@ class Names:
         something else is not it; of several that say it, the one of that name is meant."""
         if hypothesis.kind is HypothesisKind.SUPPOSITION:
             return supposition_claim(hypothesis)
-        place = hypothesis.name.split("/")[:2]
-        saying = [
-            o for o in self.obligations.values() if o.digest == hypothesis.digest and o.local_id.split("/")[:2] == place
-        ]
+        saying = self.saying.get((hypothesis.digest, *hypothesis.name.split("/")[:2]), [])
         named = [o for o in saying if o.local_id == hypothesis.name]
         return next((o.id for o in (*named, *saying)), None)
 
@@ -198,10 +199,13 @@ def open_conditions(derivation: Derivation, names: Names) -> tuple[str, ...]:
 
 def criticality(obligation: Obligation, facts: Facts) -> str:
     """The node's; what belongs to no single node is as critical as the most critical of them."""
-    known: Mapping[str, str] = {node.name: node.criticality for node in facts.nodes}
-    if obligation.node in known:
-        return known[obligation.node]
-    order = ("high", "medium", "low")
+    known, highest = _criticalities(facts.nodes)
+    return known.get(obligation.node, highest if obligation.node == SYSTEM_LEVEL else "medium")
+
+
+@by_identity(16)
+def _criticalities(nodes: tuple[NodeView, ...]) -> tuple[Mapping[str, str], str]:
+    """Of each node, and the highest."""
+    known = {node.name: node.criticality for node in nodes}
     present = set(known.values())
-    highest = next((level for level in order if level in present), "medium")
-    return highest if obligation.node == SYSTEM_LEVEL else "medium"
+    return known, next((level for level in ("high", "medium", "low") if level in present), "medium")

@@ -101,19 +101,25 @@ def _misplaced(
     owners: dict[str, tuple[str, str, str]] = {}
     for entry in entries:
         record = entry.evidence
-        where = f"record {entry.number + 1} ({record.obligation}, {record.method})"
         if system is not None and record.obligation.partition("/")[0] != system:
-            yield Discrepancy(Fault.MISPLACED, record.obligation, f"{where} is of another system than {system}")
+            text = f"{_where(entry)} is of another system than {system}"
+            yield Discrepancy(Fault.MISPLACED, record.obligation, text)
         owner = (record.obligation, record.obligation_digest, record.method)
         other = owners.setdefault(record.key, owner)
         if other != owner:
-            text = f"{where} carries the key of {other[0]}, {other[2]}: it answers another question than it says"
+            text = (
+                f"{_where(entry)} carries the key of {other[0]}, {other[2]}: it answers another question than it says"
+            )
             yield Discrepancy(Fault.MISPLACED, record.obligation, text)
         now = obligations.get(record.obligation)
         is_current = keys.get((record.obligation, record.method)) == record.key
         if is_current and now is not None and now != record.obligation_digest:
-            text = f"{where} has the key of today's claim but the digest of another claim"
+            text = f"{_where(entry)} has the key of today's claim but the digest of another claim"
             yield Discrepancy(Fault.MISPLACED, record.obligation, text)
+
+
+def _where(entry: Entry) -> str:
+    return f"record {entry.number + 1} ({entry.evidence.obligation}, {entry.evidence.method})"
 
 
 _SLACK = timedelta(hours=1)
@@ -124,19 +130,23 @@ def _clock(entries: tuple[Entry, ...], now: datetime | None) -> Iterable[Discrep
     """Ages and expiries are counted by the clock: whoever sets it back makes old evidence young again."""
     latest: datetime | None = None
     for entry in entries:
-        record, where = entry.evidence, f"record {entry.number + 1} ({entry.evidence.obligation})"
+        record = entry.evidence
         started, ended = _times(record)
         if started is None or ended is None:
-            text = f"{where} does not say when it was made: '{record.started[:40]}'"
+            text = f"{_of(entry)} does not say when it was made: '{record.started[:40]}'"
             yield Discrepancy(Fault.CLOCK, record.obligation, text, serious=False)
             continue
         if now is not None and started > now + _SLACK:
-            text = f"{where} is from the future ({record.started}): the clock was set back, or the record was made up"
-            yield Discrepancy(Fault.CLOCK, record.obligation, text)
+            text = f"is from the future ({record.started}): the clock was set back, or the record was made up"
+            yield Discrepancy(Fault.CLOCK, record.obligation, f"{_of(entry)} {text}")
         if latest is not None and ended < latest - _SLACK:
-            text = f"{where} was made before the record that it follows: the clock was set back between them"
+            text = f"{_of(entry)} was made before the record that it follows: the clock was set back between them"
             yield Discrepancy(Fault.CLOCK, record.obligation, text, serious=False)
         latest = ended if latest is None else max(latest, ended)
+
+
+def _of(entry: Entry) -> str:
+    return f"record {entry.number + 1} ({entry.evidence.obligation})"
 
 
 def _times(record: Evidence) -> tuple[datetime | None, datetime | None]:

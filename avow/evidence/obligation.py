@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 from dataclasses import field
@@ -60,6 +61,12 @@ class Obligation:
     def id(self) -> str:
         """``system/node/kind/name``: for people, stable under edits of the formula."""
         return f"{self.system}/{self.node}/{self.kind}/{self.name}"
+
+    def at(self, span: Span | None) -> Obligation:
+        """The same claim, with another place in a text."""
+        other = copy.copy(self)  # there are thousands
+        object.__setattr__(other, "span", span)
+        return other
 
     @property
     def local_id(self) -> str:

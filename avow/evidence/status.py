@@ -162,6 +162,8 @@ def roll_up(current: Iterable[Evidence], *, outdated: bool = False) -> Status:
 def behind(current: Iterable[Evidence]) -> tuple[tuple[Hypothesis, ...], tuple[str, ...]]:
     """What the status rests on, and supposes in words: of the item among those that give it that supposes least."""
     items = tuple(current)
+    if not any(e.rests_on or e.hypotheses for e in items):
+        return ((), ())
     support = join(map(weigh, items)).support
     found = [
         (tuple(sorted(set(e.rests_on), key=lambda h: (h.kind, h.name, h.digest))), tuple(sorted(set(e.hypotheses))))

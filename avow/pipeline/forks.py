@@ -35,7 +35,7 @@ from typing import NoReturn
 from avow.base import process
 from avow.base.module_path import absolute_only, is_led_here
 from avow.base.process import Completed
-from avow.tuning.running import FORK_LOOK, FORK_START, FORK_STOP
+from avow.tuning.running import COLLECTED_IN_WORKS, FORK_LOOK, FORK_START, FORK_STOP
 from avow.tuning.sizes import OUTPUT_KEPT
 
 WORKER = "avow.pipeline.worker"
@@ -248,6 +248,7 @@ def _serve(control: socket.socket, cwd: Path) -> NoReturn:
         atexit._clear()
         process.forget_orphans()
         gc.freeze()  # what it comes with is never looked through, here or in its forks
+        gc.set_threshold(COLLECTED_IN_WORKS)
         from avow.pipeline import fork_server
 
         code = fork_server.serve(control)

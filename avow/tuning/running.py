@@ -60,9 +60,12 @@ LAST_DOMAIN = 232
 DRAFT_MESSAGES = 200_000
 """Messages of a bag that a draft looks at for its comments: seconds, and the ranges of what follows are no others."""
 
-COLLECTED = 100_000
-"""Objects made before Python looks for those that hold each other: at its 700, that takes a twelfth of a run with much
-to do."""
+COLLECTED = 10_000_000
+"""Objects that a run makes before Python looks for those that hold each other: nearly all that it makes stays to its
+end, and each look at 100,000 takes a tenth of what an edit costs."""
+
+COLLECTED_IN_WORKS = 100_000
+"""The same in a worker, where what is found may hold a solver's memory."""
 
 READER_SECONDS = 2
 """How long a pipe that is written to may have no reader yet: who starts both starts the reader at once."""
