@@ -9,12 +9,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, assert_never
 
 from avow.backend_kit.linked import Recorded, settled
-from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
+from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import CASE
-from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.sorts import (
     BoolSort,
@@ -139,7 +138,7 @@ class Bench:
 
     def again(self, name: str, run: list[Step], replies: Sequence[Mapping[str, Any]]) -> Broken | None:
         """What a run breaks of a guarantee, asked anew; None where it breaks nothing."""
-        other = Bench(replace(self.reading))
+        other = Bench(self.reading)
         for reply in replies:
             other.judge(run, reply)
         return other.broken.get(name)
@@ -153,7 +152,9 @@ class Bench:
             self.crash = self.crash or Broken(run[:1], (Seen({}),), f"making the node ends with {reply['crash']}")
             return
         held = self._held(answers[0], "held")
-        if not self._begins(held):
+        wrong = started(node, self.assumed, held, "the constructor")
+        if wrong is not None:
+            self.begun = self.begun or wrong
             return
         for at, step in enumerate(run):
             answer = answers[at + 1] if at + 1 < len(answers) else None
@@ -224,23 +225,6 @@ class Bench:
         wide = [name for name, data in answer["value"]["d"] if self.reading.single and not _single(data)]
         if wide:
             raise Misused(f"the adapter gives {wide[0]} as a double that is no float: numbers: float32")
-
-    def _begins(self, held: Mapping[str, Any]) -> bool:
-        """Whether what the constructor makes of memory meets what is assumed of memory alone."""
-        node = self.reading.node
-        try:
-            values = {f"in.{n}": returned(n, v, node.input(n).sort) for n, v in held.items()}
-        except NoValue as wrong:
-            self.begun = self.begun or Counterexample((), f"this is what the constructor makes of memory: {wrong}")
-            return False
-        for formula in self.assumed:
-            names = {v.qualified for v in free_variables(formula.term)}
-            if names and names <= values.keys() and formula.holds(values) is False:
-                pairs = Seen({name: values[name] for name in sorted(names)}).pairs()
-                why = f"this is what the constructor makes, and assumption {formula.name} does not hold of it"
-                self.begun = self.begun or Counterexample(pairs, why)
-                return False
-        return True
 
     def _allowed(self, case: Mapping[str, Any]) -> bool | None:
         node = self.reading.node
@@ -364,7 +348,7 @@ class Bench:
             return replace(outcome, verdict=Verdict.REFUTED, summary=self.begun.text(), counterexample=self.begun)
         if apart and refuting:
             return replace(outcome, verdict=Verdict.REFUTED, summary=apart[0].text(), counterexample=apart[0])
-        why = self._doubt(each, counts, unclear)
+        why = self._doubt(each.undecided, counts, unclear)
         if why:
             return replace(outcome, summary=why)
         unmet = [t.name for t, n in zip(each.triggers, each.hits, strict=True) if not n]
@@ -380,15 +364,15 @@ class Bench:
         )
         return replace(outcome, verdict=Verdict.TESTED, summary=summary)
 
-    def _doubt(self, each: Guarded, counts: Counts, unclear: bool) -> str:
+    def _doubt(self, undecided: int, counts: Counts, unclear: bool) -> str:
         if counts.judged < counts.kept:
             return f"only {counts.judged} of {counts.kept} runs were judged in the time given"
         if not self.steps:
             return "the assumptions are met too rarely: no step was judged"
         if unclear:
             return "libFuzzer stopped at a run that the assumptions do not allow, or that does not stop again"
-        if each.undecided:
-            return f"{each.undecided} of {self.steps} steps could not be judged"
+        if undecided:
+            return f"{undecided} of {self.steps} steps could not be judged"
         if self.undecided:
             return f"of {self.undecided} inputs it could not be told whether they meet the assumptions"
         return ""
@@ -400,8 +384,7 @@ class Bench:
             shown = faulty.shown()
             return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
         if stopped or not self.steps or counts.judged < counts.kept:
-            why = self._doubt(Guarded(Formula("", claim, None), (), []), counts, stopped)  # type: ignore[arg-type]
-            return replace(outcome, summary=why)
+            return replace(outcome, summary=self._doubt(0, counts, stopped))
         summary = f"{counts.fuzzed} runs with sanitizers of addresses and undefined behaviour, none reports a fault"
         return replace(outcome, verdict=Verdict.TESTED, summary=f"{summary} (seed {counts.seed})")
 

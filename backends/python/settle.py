@@ -13,7 +13,7 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.linked import Recorded, recorded, settled
 from avow.backend_kit.programs.cpython import Told, ask, case_of
-from avow.backend_kit.programs.judging import Formula, NoValue, Seen, meets, returned, seen
+from avow.backend_kit.programs.judging import Formula, Seen, meets, seen, started
 from avow.backend_kit.programs.samples import Drawing, beside, leaves, numbers_of, pool, shifted, written
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
@@ -22,7 +22,6 @@ from avow.base.verdict import Counterexample, Object, Outcome, Verdict
 from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, RETRY
-from avow.formulas.formula import free_variables
 from avow.formulas.values import Element, SequenceValue, Value
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import Observed
@@ -110,9 +109,10 @@ class Work:
             return self.alike(Verdict.ERROR, fault)
         if reading.step is None:
             return tuple(self.refuted(o) or Outcome(o.id, Verdict.UNKNOWN, self.refusals()) for o in job.obligations)
-        begun = self.begins(assumed)
-        if begun is not None:
-            return tuple(self.refuted(o) or replace(begun, obligation=o.id) for o in job.obligations)
+        made = {port: reading.step.start[attribute] for port, attribute in reading.step.memory.items()}
+        if (begun := started(job.node, assumed, made, "__init__")) is not None:
+            wrong = Outcome("", Verdict.REFUTED, begun.text(), begun)
+            return tuple(self.refuted(o) or replace(wrong, obligation=o.id) for o in job.obligations)
         if job.options.get("nan") == "possible" and self.reals():
             return self.apart(cases, formulas, assumed)
         still = [o for o in job.obligations if o.id not in self.broken]
@@ -184,11 +184,7 @@ class Work:
         exact numbers, what is judged are runs on fractions in which no float came in between."""
         if not cases:
             return ""
-        memory = self.reading.source.memory
-        asked = [
-            case_of({n: v for n, v in case.items() if n not in memory}, {n: v for n, v in case.items() if n in memory})
-            for case in cases
-        ]
+        asked = [case_of(*self.parted(case)) for case in cases]
         seconds = max(2.0, min(RUN_SECONDS, self.limits.seconds))
         subject = self.reading.subject
         if exactly:
@@ -208,14 +204,19 @@ class Work:
                 continue
             if allowed(case):
                 self.allowed += 1
-                found_now = seen(self.job.node, memory, case, reply)
-                self.compared += [found_now.values] if not found_now.wrong else []
-                self.judge(found_now, formulas)
+                answer = seen(self.job.node, self.reading.source.memory, case, reply)
+                self.compared += [answer.values] if not answer.wrong else []
+                self.judge(answer, formulas)
         if exactly:
             return ""
         self.ran += len(cases)
         self.said["validated"] = {"cases": self.ran, "seed": self.limits.seed}
         return self.try_all([_exactly(case) for case in cases], formulas, assumed, True) if self.reading.exact else ""
+
+    def parted(self, case: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A case's inputs, and its memory."""
+        memory = self.reading.source.memory
+        return {n: v for n, v in case.items() if n not in memory}, {n: v for n, v in case.items() if n in memory}
 
     def keep(self, found: Told) -> None:
         self.observed.update(dict.fromkeys(found.observed))
@@ -230,8 +231,7 @@ class Work:
         start = {name: coded(value) for name, value in step.start.items()}
         if reply["start"] != {**start, **{a: reply["start"].get(a) for a in step.memory.values()}}:
             return f"class and translation differ in what __init__ makes: {_short(reply['start'])}, not {_short(start)}"
-        memory = {n: v for n, v in case.items() if n in step.memory}
-        ours = run(step, {n: v for n, v in case.items() if n not in step.memory}, memory)
+        ours = run(step, *self.parted(case))
         (theirs,) = reply["steps"]
         if theirs["changed"]:
             return f"a step changes {', '.join(theirs['changed'])}, which the text does not show"
@@ -241,12 +241,9 @@ class Work:
             what = theirs.get("why", "no exception")
             return f"class and translation differ on {_short(case)}: {what}, and {ours.error or 'none'}"
         outputs = {name: coded(value) for name, value in ours.outputs.items()}
-        value = theirs["value"]
-        given = dict(value["d"]) if isinstance(value, dict) and "d" in value else None
-        same = given == outputs if given is not None else [value] == list(outputs.values())
         held = {name: coded(v) for name, v in ours.memory.items()}
-        if not same or theirs["memory"] != held:
-            return f"class and translation differ on {_short(case)}: {_short(value)}, and {_short(outputs)}"
+        if not _same(theirs["value"], outputs) or theirs["memory"] != held:
+            return f"class and translation differ on {_short(case)}: {_short(theirs['value'])}, and {_short(outputs)}"
         return ""
 
     def agrees(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> bool:
@@ -254,17 +251,14 @@ class Work:
         step = self.reading.step
         if step is None:
             return False
-        memory = {n: v for n, v in case.items() if n in step.memory}
-        ours = run(step, {n: v for n, v in case.items() if n not in step.memory}, memory, exact=True)
+        ours = run(step, *self.parted(case), exact=True)
         (theirs,) = reply["steps"]
         if ours.error or "error" in theirs:
             return bool(ours.error == theirs.get("error", ""))
         outputs = {name: coded(fraction(v)) for name, v in ours.outputs.items()}
-        value = _in_fractions(theirs["value"])
-        given = dict(value["d"]) if isinstance(value, dict) and "d" in value else None
-        same = given == outputs if given is not None else [value] == list(outputs.values())
+        ours_held = {name: coded(fraction(v)) for name, v in ours.memory.items()}
         held = {name: _in_fractions(v) for name, v in theirs["memory"].items()}
-        return same and held == {name: coded(fraction(v)) for name, v in ours.memory.items()}
+        return _same(_in_fractions(theirs["value"]), outputs) and held == ours_held
 
     def judge(self, case: Seen, formulas: Mapping[str, Formula]) -> None:
         for name, formula in formulas.items():
@@ -275,25 +269,6 @@ class Work:
             elif formula.holds(case.values) is False:
                 why = f"CPython answers so, and guarantee {formula.name} does not hold of it"
                 self.broken[name] = Counterexample(case.pairs(), why)
-
-    def begins(self, assumed: tuple[Formula, ...]) -> Outcome | None:
-        """Whether what `__init__` makes meets what is assumed of memory alone."""
-        step = self.reading.step
-        assert step is not None
-        try:
-            sorts = {port: self.job.node.input(port).sort for port in step.memory}
-            values = {f"in.{p}": returned(p, step.start[a], sorts[p]) for p, a in step.memory.items()}
-        except NoValue as wrong:
-            shown = Counterexample((), f"this is what __init__ makes of memory: {wrong}")
-            return Outcome("", Verdict.REFUTED, shown.text(), shown)
-        for formula in assumed:
-            names = {v.qualified for v in free_variables(formula.term)}
-            if names and names <= values.keys() and formula.holds(values) is False:
-                pairs = Seen({name: values[name] for name in sorted(names)}).pairs()
-                why = f"this is what __init__ makes, and assumption {formula.name} does not hold of it"
-                shown = Counterexample(pairs, why)
-                return Outcome("", Verdict.REFUTED, shown.text(), shown)
-        return None
 
     def near(self, model: Mapping[Variable, Any]) -> list[dict[str, Any]]:
         """A solver's values as cases of doubles."""
@@ -353,24 +328,21 @@ class Work:
     ) -> tuple[Outcome, ...]:
         """Where NaN and the infinities are possible: each REAL input in its turn is one, beside a few cases' others. An
         output that is no REAL breaks every guarantee."""
-        memory, allowed = self.reading.source.memory, meets(assumed)
+        allowed = meets(assumed)
         asked: list[tuple[dict[str, Any], str, str]] = []
         for case in [c for c in cases if allowed(c)][:APART]:
             for name in self.reals():
                 for special in (math.nan, math.inf, -math.inf):
                     held: Any = [special, *case[name][1:]] if isinstance(case[name], list) else special
                     asked.append(({**case, name: held}, name, str(special)))
-        texts = [
-            case_of({n: v for n, v in c.items() if n not in memory}, {n: v for n, v in c.items() if n in memory})
-            for c, _, _ in asked
-        ]
+        texts = [case_of(*self.parted(case)) for case, _, _ in asked]
         found = ask(self.reading.subject, texts, seconds=RUN_SECONDS, megabytes=self.limits.megabytes)
         self.keep(found)
         if found.fault or len(found.replies) != len(asked):
             return self.alike(Verdict.ERROR, found.fault or "the class did not answer every case")
         for (case, name, word), reply in zip(asked, found.replies, strict=True):
             zero = {**case, name: [0.0, *case[name][1:]] if isinstance(case[name], list) else 0.0}
-            answer = seen(self.job.node, memory, zero, reply)
+            answer = seen(self.job.node, self.reading.source.memory, zero, reply)
             pairs = tuple((n, word if n == f"in.{name}" else v) for n, v in answer.pairs())
             for o in self.job.obligations:
                 formula = formulas[o.id]
@@ -393,6 +365,12 @@ def _plain(value: Any) -> Any:
             return [_plain(item) for item in items]
         case _:  # a number or truth value
             return value
+
+
+def _same(value: Any, outputs: Mapping[str, Any]) -> bool:
+    """Whether what a step returned, coded, is these outputs by name, or the only one of them."""
+    given = dict(value["d"]) if isinstance(value, dict) and "d" in value else None
+    return given == outputs if given is not None else [value] == list(outputs.values())
 
 
 def _exactly(data: Any) -> Any:

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from avow.base.verdict import Counterexample
 from avow.drive.steps import plain
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
 from avow.formulas.conditions import Condition, conditions
+from avow.formulas.formula import free_variables
 from avow.formulas.values import Binary, Element, SequenceValue, Value, show
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
@@ -30,10 +32,14 @@ class Formula:
 
     @classmethod
     def of(cls, clause: Clause) -> Formula:
+        return cls.made(clause.name, clause.formula)
+
+    @classmethod
+    def made(cls, name: str, term: Term) -> Formula:
         try:
-            return cls(clause.name, clause.formula, compile_term(clause.formula))
+            return cls(name, term, compile_term(term))
         except NotEvaluable:
-            return cls(clause.name, clause.formula, None)
+            return cls(name, term, None)
 
     def holds(self, values: Mapping[str, Value]) -> bool | None:
         if self.evaluator is not None:
@@ -58,12 +64,7 @@ def triggers(clause: Clause) -> tuple[Formula, ...]:
     """The conditions under which a clause demands something: one that no case met was not tried."""
 
     def ready(condition: Condition) -> Formula:
-        term = condition.formula
-        name = show_term(term, "unicode").replace("\n", " ")
-        try:
-            return Formula(name, term, compile_term(term))
-        except NotEvaluable:
-            return Formula(name, term, None)
+        return Formula.made(show_term(condition.formula, "unicode").replace("\n", " "), condition.formula)
 
     return tuple(map(ready, conditions(clause.formula)))
 
@@ -141,6 +142,21 @@ def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: 
     except NoValue as error:
         return Seen(values, str(error))
     return Seen(values)
+
+
+def started(node: Node, assumed: Iterable[Formula], memory: Mapping[str, Any], maker: str) -> Counterexample | None:
+    """What is wrong with what a program makes of memory (by the ports' names): it is none, or not what is assumed of
+    memory alone. `maker`: what made it."""
+    try:
+        values = {f"in.{name}": returned(name, value, node.input(name).sort) for name, value in memory.items()}
+    except NoValue as wrong:
+        return Counterexample((), f"this is what {maker} makes of memory: {wrong}")
+    for formula in assumed:
+        names = {v.qualified for v in free_variables(formula.term)}
+        if names and names <= values.keys() and formula.holds(values) is False:
+            why = f"this is what {maker} makes, and assumption {formula.name} does not hold of it"
+            return Counterexample(Seen({name: values[name] for name in sorted(names)}).pairs(), why)
+    return None
 
 
 def _plain(data: Any) -> Any:
