@@ -27,22 +27,22 @@ Step = Mapping[str, Value]
 
 def models(system: System, node: str) -> tuple[Method, ...]:
     """The node's methods whose models can be run."""
-    plan = system.plan
-    found = (m for m in plan.node(node).methods if backend(m.backend, plan.plugins).runs_models)
-    return tuple(sorted(found, key=lambda m: m.id))
+    return _methods(system, node, lambda tool: tool.runs_models)
 
 
 def unrun(system: System, node: str) -> tuple[Method, ...]:
     """The node's methods whose models cannot be run."""
-    plan = system.plan
-    found = (m for m in plan.node(node).methods if backend(m.backend, plan.plugins).not_run)
-    return tuple(sorted(found, key=lambda m: m.id))
+    return _methods(system, node, lambda tool: bool(tool.not_run))
 
 
 def recordings(system: System, node: str) -> tuple[Method, ...]:
     """The node's methods to which the plan names recordings."""
+    return _methods(system, node, lambda tool: tool.records)
+
+
+def _methods(system: System, node: str, wanted: Callable[[Backend], bool]) -> tuple[Method, ...]:
     plan = system.plan
-    found = (m for m in plan.node(node).methods if backend(m.backend, plan.plugins).records)
+    found = (m for m in plan.node(node).methods if wanted(backend(m.backend, plan.plugins)))
     return tuple(sorted(found, key=lambda m: m.id))
 
 

@@ -12,7 +12,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from math import inf
 from pathlib import Path
@@ -264,8 +264,7 @@ class Bench:
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process, asked the same from its start, gives another answer: what comes of
         clock, chance or place in memory is no function of what was recorded. The first cases only."""
-        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
-        try:
+        with self._twin() as twin:
             for at in range(0, len(self._said), BATCH):
                 if self.end is not None and time.monotonic() > self.end:
                     break
@@ -276,19 +275,22 @@ class Bench:
                         return inputs
                 if len(again) < len(before):
                     return before[len(again)][0]
-        finally:
-            self._end(twin)
         return None
 
-    def _end(self, twin: SubjectProcess) -> None:
-        twin.close()
-        self.silent = self.silent or twin.silent
+    @contextlib.contextmanager
+    def _twin(self) -> Iterator[SubjectProcess]:
+        """Another process of the subject's."""
+        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        try:
+            yield twin
+        finally:
+            twin.close()
+            self.silent = self.silent or twin.silent
 
     def _asked_apart(self) -> list[Apart]:
         """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
-        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         found: dict[str, Apart] = {}
-        try:
+        with self._twin() as twin:
             for inputs, _ in self._said[:: max(1, len(self._said) // APART)][:APART]:
                 for name, (word, text) in itertools.product(inputs, SPECIAL.items()):
                     if isinstance(self.inputs_sorts[name], RealSort) and (self.end or inf) > time.monotonic():
@@ -296,8 +298,6 @@ class Bench:
                         why = self._wrong_apart(twin, asked, name, text) if self._assumed(asked) else ""
                         case = [(n, word if n == f"in.{name}" else value) for n, value in _pairs(asked, {})]
                         found.setdefault(why, (case, why))
-        finally:
-            self._end(twin)
         return [one for why, one in found.items() if why]
 
     def _wrong_apart(self, twin: SubjectProcess, asked: Inputs, name: str, text: str) -> str:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.evaluation.truth import judge
+from avow.backend_kit.programs.judging import Formula
+from avow.evaluation.evaluate import NotEvaluable
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.temporal.cell import CELL
@@ -16,30 +16,18 @@ from avow.formulas.temporal.responses import due
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable, histories
-from avow.tuning.effort import JUDGE_EFFORT
 
 from .generate import Inputs
 from .tuning import CONFIDENCE
 
 
-@dataclass(slots=True)
-class Judged:
+@dataclass(frozen=True, slots=True)
+class Judged(Formula):
     """A formula, ready to be judged of many cases."""
 
-    name: str
-    formula: Term
     text: str
-    evaluator: Evaluator | None
     ports: tuple[str, ...]
     """Inputs that it speaks of."""
-
-    def holds(self, valuation: Mapping[str, Value]) -> bool | None:
-        if self.evaluator is not None:
-            try:
-                return bool(self.evaluator(valuation))
-            except NotEvaluable:
-                pass
-        return judge(self.formula, valuation, effort=JUDGE_EFFORT)
 
 
 @dataclass(slots=True)
@@ -68,16 +56,9 @@ class Guarantee:
 
 def judged(name: str, formula: Term, text: str, records: Records) -> Judged:
     """A clause; what it remembers of other steps is among the records."""
-    return _ready(name, records.clause(formula) if histories(formula) else formula, text)
-
-
-def _ready(name: str, formula: Term, text: str) -> Judged:
-    try:
-        evaluator: Evaluator | None = compile_term(formula)
-    except NotEvaluable:
-        evaluator = None
-    ports = sorted(v.name for v in free_variables(formula) if v.role is Role.INPUT and CELL not in v.name)
-    return Judged(name, formula, text, evaluator, tuple(ports))
+    made = Formula.made(name, records.clause(formula) if histories(formula) else formula)
+    ports = sorted(v.name for v in free_variables(made.term) if v.role is Role.INPUT and CELL not in v.name)
+    return Judged(name, made.term, made.evaluator, text, tuple(ports))
 
 
 def guarantee(name: str, formula: Term, text: str, records: Records) -> Guarantee:

@@ -86,9 +86,6 @@ class SequenceBench(Bench):
         except (Malformed, ValueError, TypeError, KeyError) as error:
             raise SubjectFailed(str(error)) from error
 
-    def memory_of(self, inputs: Inputs) -> dict[str, Value]:
-        return {name: value for name, value in inputs.items() if name in self.memory}
-
     def _asked(self, subject: SubjectProcess, case: Mapping[str, Any]) -> Any:
         reply = subject.ask({"case": json.dumps(case)})
         if not isinstance(reply, str):
@@ -298,11 +295,8 @@ class SequenceBench(Bench):
 
     def _afresh(self, trace: Trace, name: str) -> Trace | None:
         """The run in a process that had no other before, if it breaks the guarantee there as well."""
-        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
-        try:
+        with self._twin() as twin:
             return self._again([inputs for inputs, _ in trace], name, twin)
-        finally:
-            self._end(twin)
 
     def _shorter(self, best: Trace, name: str, end: float) -> Trace:
         """The run without the steps that it does not take, as far as they are found one by one from its end."""
@@ -359,8 +353,7 @@ class SequenceBench(Bench):
 
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process answers otherwise."""
-        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
-        try:
+        with self._twin() as twin:
             for run in self._first:
                 self.begin(self.subject)
                 self.begin(twin)
@@ -369,8 +362,6 @@ class SequenceBench(Bench):
                         return None
                     if self._said_by(self.subject, inputs) != self._said_by(twin, inputs):
                         return inputs
-        finally:
-            self._end(twin)
         return None
 
     def _said_by(self, subject: SubjectProcess, inputs: Inputs) -> Any:
