@@ -10,7 +10,7 @@ from typing import Any
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
 from avow.base import codec
-from avow.base.codec import Unreadable
+from avow.base.codec import Unreadable, document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
 from avow.evidence.record import Evidence
@@ -96,7 +96,7 @@ def evidence_schema() -> dict[str, Any]:
 def write_schemas(folder: Path) -> None:
     """Write the published schemas (``python -m avow.assurance.codec docs/schemas``)."""
     for name, schema in (("case", case_schema()), ("evidence", evidence_schema())):
-        write(folder / f"{name}.schema.json", json.dumps(schema, indent=1) + "\n")
+        write(folder / f"{name}.schema.json", document(schema) + "\n")
 
 
 if __name__ == "__main__":

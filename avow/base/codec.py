@@ -17,6 +17,7 @@ import base64
 import dataclasses
 import json
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -49,6 +50,15 @@ _CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_asci
 """Made once: `json.dumps` makes one for each call that asks for anything but its defaults."""
 
 
+def document(value: object) -> str:
+    """JSON for people and other programs, an item a line. What is no character (half of one, which Python has for a
+    file name's byte) is shown as unreadable: no reader of JSON takes it."""
+    return _HALVES.sub("\ufffd", json.dumps(to_json(value), indent=1, ensure_ascii=False))
+
+
+_HALVES = re.compile("[\ud800-\udfff]")
+
+
 def plain(value: object) -> Any:
     """A value as JSON can hold it without loss of what it says; unknown objects become their text."""
     match value:
@@ -73,7 +83,7 @@ def to_json(value: Any) -> Any:
     kind: Any = type(value)
     if kind is str or value is None or kind is bool or kind is int:
         return value
-    if isinstance(value, tuple):
+    if kind is list or isinstance(value, tuple):
         return [to_json(item) for item in value]
     if isinstance(value, str):
         return str(value)

@@ -1,8 +1,8 @@
 """Diagnostics for people (with the source line and a caret under the place), as JSON, and as SARIF 2.1.0.
 
 Everything shown comes from files that nobody vouches for: what is not printable is made visible, never passed on to the
-terminal, and long lines are cut to what surrounds the place. The JSON follows `avow/language/check.schema.json`, flat
-and with every key, and is never read back: `avow.base.codec` would nest the place.
+terminal, and long lines are cut to what surrounds the place. The JSON is flat, and has every key, as
+`avow/language/check.schema.json` says.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
+from avow.base import codec
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
@@ -145,18 +146,10 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> dict[str, Any]:
 
 
 def _as_json(diagnostic: Diagnostic) -> dict[str, Any]:
-    span = diagnostic.span
-    return {
-        "file": _decoded(span.file) if span else None,
-        "line": span.line if span else None,
-        "column": span.column if span else None,
-        "end_line": span.end_line if span else None,
-        "end_column": span.end_column if span else None,
-        "severity": str(diagnostic.severity),
-        "code": diagnostic.code,
-        "message": _decoded(diagnostic.message),
-        "hint": _decoded(diagnostic.hint) if diagnostic.hint is not None else None,
-    }
+    told = codec.to_json(diagnostic)
+    place = told.pop("span") or dict.fromkeys(("file", "line", "column", "end_line", "end_column"))
+    del told["notes"]
+    return {key: _decoded(said) if isinstance(said, str) else said for key, said in (place | told).items()}
 
 
 def _decoded(text: str) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 
 
@@ -75,10 +74,9 @@ def command(
             click.echo(f"signed: {path}", err=True)
     if as_json:
         listed = {
-            name: {"records": count, "discrepancies": [_json(d) for d in discrepancies]}
-            for name, (discrepancies, count) in found.items()
+            name: {"records": count, "discrepancies": discrepancies} for name, (discrepancies, count) in found.items()
         }
-        click.echo(json.dumps({"systems": listed, "index": [_json(d) for d in index]}, indent=1))
+        click.echo(document({"systems": listed, "index": index}))
     else:
         for name, (discrepancies, count) in found.items():
             serious = sum(d.serious for d in discrepancies)
@@ -92,15 +90,3 @@ def command(
         if sign and bad:
             click.echo("not signed: there are discrepancies", err=True)
     return 1 if bad else 0
-
-
-def _json(discrepancy: object) -> dict[str, object]:
-    from avow.evidence.audit import Discrepancy
-
-    assert isinstance(discrepancy, Discrepancy)
-    return {
-        "fault": discrepancy.fault.value,
-        "subject": discrepancy.subject,
-        "text": discrepancy.text,
-        "serious": discrepancy.serious,
-    }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
@@ -54,9 +54,9 @@ def command(
     for folder in dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file()):
         found.extend(d for d in _of_plan(folder) if d not in found and (d.is_error or d.code not in off))
     if as_json:
-        click.echo(json.dumps(to_json(found), indent=1))
+        click.echo(document(to_json(found)))
     elif sarif:
-        click.echo(json.dumps(to_sarif(found, version=__version__, codes=_codes(found)), indent=1))
+        click.echo(document(to_sarif(found, version=__version__, codes=_codes(found))))
     else:
         tint = sys.stdout.isatty() if colour is None else colour
         if found:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.base import codec
+from avow.base.codec import document
 from avow.base.verdict import in_words
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
 from avow.cli.progress import progress
@@ -96,7 +97,7 @@ def command(
             settled.append(outcome)
     outcomes = tuple(settled)
     if as_json:
-        click.echo(json.dumps(to_json(composition, chosen, obligations, outcomes), indent=1, ensure_ascii=False))
+        click.echo(document(to_json(composition, chosen, obligations, outcomes)))
     else:
         _listing(composition, chosen, obligations, outcomes)
     fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
@@ -120,47 +121,34 @@ def to_json(
     return {
         "system": composition.frame.system.name,
         "graph": {
-            "nodes": list(graph.nodes),
+            "nodes": graph.nodes,
             "edges": [
                 {"from": str(e.source), "to": str(e.target), "delayed": e.delayed, "declared": e.declared}
                 for e in graph.edges
             ],
             "environment": [str(endpoint) for endpoint in graph.environment],
             "dangling": [str(endpoint) for endpoint in graph.dangling],
-            "findings": [{"code": f.code, "severity": str(f.severity), "message": f.message} for f in graph.findings],
+            "findings": [{"code": f.code, "severity": f.severity, "message": f.message} for f in graph.findings],
         },
         "subsystems": [
             {
                 "name": subsystem.name,
-                "nodes": list(subsystem.members),
-                "contract": list(composition.goal(subsystem.name).contract),
+                "nodes": subsystem.members,
+                "contract": composition.goal(subsystem.name).contract,
             }
             for subsystem in composition.frame.system.plan.subsystems
         ],
-        "derivations": [
-            {
-                "name": w.name,
-                "rule": w.rule,
-                "text": w.text,
-                "latex": w.latex,
-                "conclusion": w.conclusion,
-                "premises": list(w.premises),
-                "side_conditions": [{"text": c.text, "obligation": c.obligation} for c in w.side_conditions],
-                "conditional": list(w.conditional),
-                "findings": list(w.findings),
-            }
-            for w in written
-        ],
+        "derivations": [{key: told for key, told in codec.to_json(one).items() if key != "html"} for one in written],
         "obligations": [
             {
                 "id": obligation.local_id,
                 "claim": obligation.claim,
                 "formula": obligation.formula,
                 "digest": obligation.digest,
-                "verdict": str(outcome.verdict),
+                "verdict": outcome.verdict,
                 "summary": outcome.summary,
                 "vacuous": outcome.vacuous,
-                "hypotheses": list(in_words(outcome.rests_on, outcome.hypotheses)),
+                "hypotheses": in_words(outcome.rests_on, outcome.hypotheses),
                 "counterexample": dict(outcome.counterexample.values) if outcome.counterexample else None,
                 "run": [dict(step) for step in outcome.counterexample.trace] if outcome.counterexample else [],
                 "details": outcome.details,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document, to_json
 from avow.cli.options import json_option
 from avow.tuning.shown import DIFF_REASONS
 
@@ -40,22 +40,8 @@ def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on:
     if page is not None:
         _write(page, old, new, changes)
     if as_json:
-        listed = [
-            {
-                "system": s,
-                "kind": c.kind,
-                "subject": c.subject,
-                "before": c.before,
-                "after": c.after,
-                "title": c.title,
-                "why": list(c.why),
-                "worse": c.is_worse,
-                "old_formula": c.old_formula,
-                "new_formula": c.new_formula,
-            }
-            for s, c in changes
-        ]
-        click.echo(json.dumps({"changes": listed}, indent=1))
+        listed = [{"system": system, "worse": change.is_worse, **to_json(change)} for system, change in changes]
+        click.echo(document({"changes": listed}))
     elif not changes:
         click.echo("nothing changed")
     else:

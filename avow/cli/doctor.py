@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 
 
@@ -17,7 +16,7 @@ def command(as_json: bool) -> int:
 
     found = findings()
     if as_json:
-        click.echo(json.dumps({"tools": [f.json() for f in found]}, indent=1))
+        click.echo(document({"tools": [f.json() for f in found]}))
     else:
         from rich.console import Console
         from rich.markup import escape

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document
 from avow.base.diagnostics import Rejected
 from avow.cli.options import json_option
 
@@ -43,7 +43,7 @@ def command(name: str, as_json: bool) -> int:
         cases = {case.system: case for case, _ in found}.values()
         listed = [o for case in cases for o in to_json(case)["obligations"] if _id(o["obligation"]) in wanted]
         others = [{"system": system, "title": title, "lines": lines} for system, title, lines in told]
-        click.echo(json.dumps({"obligations": listed, "others": others}, indent=1))
+        click.echo(document({"obligations": listed, "others": others}))
         return 0
     for system, title, lines in told:
         click.echo(f"{system}: {title}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import stat
 import sys
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option
 from avow.tuning.sizes import CONTRACT_BYTES
 
@@ -72,7 +72,7 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
                 click.echo(f"formatted {printable(str(path))}")
     if as_json:
         told = {"changed": changed, "written": not (check or diff), "faults": to_json(faults)["diagnostics"]}
-        click.echo(json.dumps(told, indent=1, ensure_ascii=False))
+        click.echo(document(told))
     if faults:
         click.echo(render(faults), err=True)
         return 2

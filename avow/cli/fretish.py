@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
@@ -32,7 +32,7 @@ def command(file: Path, outputs: str, output: Path | None, as_json: bool) -> int
     if not made.text:
         raise Rejected(*made.faults)
     if as_json:
-        click.echo(json.dumps({"text": made.text, "left_out": [fault.message for fault in left]}, indent=1))
+        click.echo(document({"text": made.text, "left_out": [fault.message for fault in left]}))
     elif made.faults:
         click.echo(render(made.faults), err=True)
     if output is not None or not as_json:

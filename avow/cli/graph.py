@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option
 
 
@@ -37,7 +37,7 @@ def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
         raise Rejected(*errors)
     found = wiring(system, graph)
     if as_json:
-        click.echo(json.dumps({"system": system.name, **found.json()}, indent=1, ensure_ascii=False))
+        click.echo(document({"system": system.name, **found.json()}))
     elif as_svg:
         click.echo(sheet(seen(system, graph)))
     elif as_flow:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
@@ -129,7 +129,7 @@ def _workspace(directory: Path) -> None:
 
 def _told(directory: Path, system: str, next_: str, as_json: bool) -> int:
     if as_json:
-        click.echo(json.dumps({"workspace": str(directory), "systems": [system], "next": next_}, indent=1))
+        click.echo(document({"workspace": str(directory), "systems": [system], "next": next_}))
         return 0
     go = "" if directory.resolve() == Path.cwd() else f"  cd {directory}\n"
     where = system if directory.name == system else f"contracts/{system}"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option, node_option, planned_seconds_option
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def command(
             _tell(score)
     hollow = [s for s in scores if s.hollow]
     if as_json:
-        click.echo(json.dumps({"scores": [_data(score) for score in scores]}, indent=1, ensure_ascii=False))
+        click.echo(document({"scores": [_data(score) for score in scores]}))
     elif not scores:
         click.echo("no current evidence to examine: run `doit verify` first")
     if not scores:
@@ -89,7 +89,7 @@ def _data(score: Score) -> dict[str, Any]:
         "method": score.method,
         "killed": score.killed,
         "mutants": score.mutants,
-        "survivors": list(score.survivors),
+        "survivors": score.survivors,
         "not_judged": [
             {"change": change, "reason": reason} for change, reason in zip(score.unjudged, score.reasons, strict=False)
         ],

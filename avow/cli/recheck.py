@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option
 
 
@@ -90,7 +91,7 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
                 rests = f"on {rests_on} hypotheses" + (", vacuous" if true.vacuous else "")
                 click.echo(f"certified-{true.solvers}  {scope}: {called}, {rests}, key {true.key[:12]}")
     if as_json:
-        click.echo(json.dumps({"claims": told, "solvers": dict(versions())}, indent=1, ensure_ascii=False))
+        click.echo(document({"claims": told, "solvers": dict(versions())}))
     else:
         click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
     return 0 if all(claim["established"] for claim in told) else 1

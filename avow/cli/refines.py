@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
 from avow.solving.limits import from_seconds
 
@@ -58,8 +58,8 @@ def command(
     found = [refines(n, m, bounds, names) for n, m in pairs]
     good = not missing and stands is Verdict.PROVED and all(result.holds for result in found)
     if as_json:
-        document = {"refines": good, "missing": missing, "nodes": [_data(result) for result in found]}
-        click.echo(json.dumps(document | {"derivation": str(stands)}, indent=1, ensure_ascii=False))
+        nodes = [_data(result) for result in found]
+        click.echo(document({"refines": good, "missing": missing, "nodes": nodes, "derivation": stands}))
         return 0 if good else 1
     for name in missing:
         click.echo(f"{name}: not in {concrete}")
@@ -138,16 +138,16 @@ def _data(result: Refinement) -> dict[str, object]:
     return {
         "concrete": result.concrete,
         "abstract": result.abstract,
-        "verdict": "vacuous" if result.vacuous else str(result.verdict),
+        "verdict": "vacuous" if result.vacuous else result.verdict,
         "unrealizable": dict(result.unrealizable.values) if result.unrealizable else None,
         "doubt": result.doubt,
         "ports": [fault.message for fault in result.faults],
         "clauses": [
             {
                 "clause": f"{demand.node}.{demand.clause.name}",
-                "kind": str(demand.clause.kind),
-                "verdict": str(demand.verdict),
-                "needed": list(demand.needed),
+                "kind": demand.clause.kind,
+                "verdict": demand.verdict,
+                "needed": demand.needed,
                 "vacuous": demand.vacuous,
                 "counterexample": dict(demand.counterexample.values) if demand.counterexample else None,
             }

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
@@ -59,9 +59,8 @@ def _check(folder: Path, as_json: bool) -> int:
     old = stale(case, place.root) if place else ()
     if as_json:
         click.echo(
-            json.dumps(
-                {"system": case.system, "agrees": not found, "differences": list(found), "changed_since": list(old)},
-                indent=1,
+            document(
+                {"system": case.system, "agrees": not found, "differences": list(found), "changed_since": list(old)}
             )
         )
     elif found:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
@@ -31,7 +30,7 @@ def command(file: str, as_json: bool) -> int:
             }
             for r in found
         ]
-        click.echo(json.dumps({"requirements": listed}, indent=1))
+        click.echo(document({"requirements": listed}))
     else:
         click.echo(plan_section(found), nl=False)
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option, node_option, seconds_option, seed_option
 from avow.solving.limits import from_seconds
 
@@ -60,7 +60,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]
     if as_json:
-        click.echo(json.dumps({"results": [to_json(result) for result in results]}, indent=1, ensure_ascii=False))
+        click.echo(document({"results": [to_json(result) for result in results]}))
     else:
         _listing(results, everything)
     return 1 if any(result.fails or result.verdict is Verdict.ERROR for result in results) else 0
@@ -70,17 +70,17 @@ def to_json(result: SanityResult) -> dict[str, Any]:
     """One result as docs/schemas/sanity.schema.json describes it."""
     return {
         "node": result.node,
-        "property": str(result.about),
+        "property": result.about,
         "subject": result.subject,
         "name": result.name,
         "claim": result.claim,
-        "verdict": str(result.verdict),
-        "severity": str(result.severity),
-        "clauses": list(result.clauses),
+        "verdict": result.verdict,
+        "severity": result.severity,
+        "clauses": result.clauses,
         "counterexample": _counterexample(result.counterexample),
         "explanation": result.explanation,
         "conflicts": [
-            {"clauses": list(clauses), "counterexample": _counterexample(shown)} for clauses, shown in result.conflicts
+            {"clauses": clauses, "counterexample": _counterexample(shown)} for clauses, shown in result.conflicts
         ],
         "cut_short": result.cut_short,
         "because": result.because,

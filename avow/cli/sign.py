@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
@@ -22,7 +23,6 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     envelope on a line of its own (*.attestation.jsonl). Public keys in signed/keys/*.pub make only signatures by these
     keys count.
     """
-    import json
     from datetime import date, datetime
     from pathlib import Path
 
@@ -70,7 +70,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     except OSError as error:
         raise Rejected(Diagnostic("SIGN001", f"the signature cannot be written: {error.strerror}")) from None
     if as_json:
-        click.echo(json.dumps({"system": case.system, "signed": str(path), "verdict": case.answers.verdict}, indent=1))
+        click.echo(document({"system": case.system, "signed": str(path), "verdict": case.answers.verdict}))
     else:
         click.echo(case.answers.statement)
         click.echo(f"signed as {who}, until {until}: {place.relative(path)}")

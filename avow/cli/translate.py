@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.base.codec import document
 from avow.cli.options import ContractArgument, json_option, node_option
 from avow.cli.paths import PathArgument
 
@@ -129,14 +130,12 @@ def _folder(node: str, system: System) -> str:
 
 
 def _data(notation: str, files: dict[str, str], left_out: list[Diagnostic], output: Path | None) -> str:
-    import json
-
     from avow.base.rendering import to_json
 
     listed = [{"name": name, "text": text} for name, text in files.items()]
     written = None if output is None else str(output)
     whole = {"notation": notation, "files": listed, "written": written, "left_out": to_json(left_out)["diagnostics"]}
-    return json.dumps(whole, indent=1, ensure_ascii=False)
+    return document(whole)
 
 
 def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:

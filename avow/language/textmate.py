@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable
 from typing import Any
 
+from avow.base.codec import document
 from avow.language.lexer import KEYWORDS, LONG_UNITS, STEPS, SYMBOLS, UNITS
 from avow.language.operators import OPERATORS
 from avow.language.terms import Builtin, Past
@@ -72,7 +72,7 @@ def _longest(sign: str) -> tuple[int, str]:
 
 def text() -> str:
     """The grammar as the file that ships."""
-    return json.dumps(grammar(), indent=1, ensure_ascii=False) + "\n"
+    return document(grammar()) + "\n"
 
 
 if __name__ == "__main__":

@@ -2,17 +2,16 @@
 
 Further notations that need more than the language floor (SMT-LIB, a backend's own) are added by the caller:
 `avow.cli.translate` holds the whole table. The JSON is a notation too: each node's kind and sort as other programs name
-them, formulas as text besides; `avow.base.codec` tells no kinds, since it reads back by declared types.
+them, formulas as text besides. It is not read back.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable, Iterator, Mapping
-from fractions import Fraction
 from typing import Any, assert_never
 
+from avow.base.codec import document, plain
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Clause, Contract, Node, Port, Topic
 from avow.language.definitions import show_clause
@@ -23,6 +22,7 @@ from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import (
     BOOL,
     BoolSort,
+    Constructor,
     DataSort,
     EnumSort,
     FunctionSort,
@@ -217,14 +217,14 @@ def _for_people(contract: Contract, style: StyleName) -> str:
 
 def to_json(contract: Contract) -> str:
     """The contract as data: every formula as RCL text and as a tree (`"kind"` names the term, `"sort"` its sort)."""
-    return json.dumps(_contract(contract), indent=1, ensure_ascii=False) + "\n"
+    return document(_contract(contract)) + "\n"
 
 
 def _contract(contract: Contract) -> dict[str, Any]:
     return {
-        "types": [{"name": name, "sort": sort_data(sort)} for name, sort in contract.types],
+        "types": [{"name": name, "sort": _data(sort)} for name, sort in contract.types],
         "constants": [
-            {"name": n, "value": show_term(t, "rcl"), "term": term_data(t), "sort": sort_data(t.sort)}
+            {"name": n, "value": show_term(t, "rcl"), "term": _data(t), "sort": _data(t.sort)}
             for n, t in contract.constants
         ],
         "nodes": [_node(node) for node in contract.nodes],
@@ -250,7 +250,7 @@ def _node(node: Node) -> dict[str, Any]:
 
 
 def _port(port: Port) -> dict[str, Any]:
-    return {"name": port.name, "type": port.type_name, "sort": sort_data(port.sort)}
+    return {"name": port.name, "type": port.type_name, "sort": _data(port.sort)}
 
 
 def _clause(clause: Clause) -> dict[str, Any]:
@@ -258,41 +258,19 @@ def _clause(clause: Clause) -> dict[str, Any]:
         "name": clause.name,
         "sentence": clause.sentence,
         "formula": show_term(clause.formula, "rcl"),
-        "term": term_data(clause.formula),
+        "term": _data(clause.formula),
     }
 
 
-def sort_data(sort: Sort) -> dict[str, Any]:
-    """A sort as plain data."""
-    data: dict[str, Any] = {"kind": type(sort).__name__.removesuffix("Sort").lower()}
-    for item in dataclasses.fields(sort):
-        data[item.name] = _plain(getattr(sort, item.name))
-    return data
-
-
-def term_data(term: Term) -> dict[str, Any]:
-    """A term as plain data. Sorts are given by name or as they are written; exact fractions as text."""
-    data: dict[str, Any] = {"kind": type(term).__name__.lower()}
-    for item in dataclasses.fields(term):
-        value = getattr(term, item.name)
-        if item.name == "span":
-            continue
-        data[item.name] = show_sort(value) if item.name == "sort" else _plain(value)
-    return data
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Fraction):
-        return str(value)
+def _data(value: Any) -> Any:
+    """A term or a sort as plain data, with its kind. Of a term, the sort is given by name or as it is written."""
     if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if hasattr(value, "span"):
-            return term_data(value)  # type: ignore[arg-type]
-        if type(value).__name__ == "Constructor":
-            return {"name": value.name, "parameters": [sort_data(p) for p in value.parameters]}  # type: ignore[attr-defined]
-        return sort_data(value)  # type: ignore[arg-type]
-    return str(value) if not isinstance(value, bool | int | str) and value is not None else value
+        return [_data(item) for item in value]
+    if not dataclasses.is_dataclass(value):
+        return plain(value)
+    kind = {} if isinstance(value, Constructor) else {"kind": type(value).__name__.removesuffix("Sort").lower()}
+    parts = [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value) if field.name != "span"]
+    return kind | {name: show_sort(part) if name == "sort" else _data(part) for name, part in parts}
 
 
 FORMATS: dict[str, Callable[[Contract], str]] = {

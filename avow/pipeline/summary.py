@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from avow.base.codec import document
 from avow.base.verdict import said
 from avow.pipeline.results import Result
 from avow.tuning.shown import GATE_REASON
@@ -78,7 +79,7 @@ def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequ
         for r in sorted(results, key=lambda r: r.system)
     ]
     whole = {"systems": listed, "not_done": list(broken), "earlier_state": list(earlier)}
-    return json.dumps({**whole, "exit_code": 2 if broken else exit_code}, indent=1, ensure_ascii=False) + "\n"
+    return document({**whole, "exit_code": 2 if broken else exit_code}) + "\n"
 
 
 def _few(reason: str) -> str:

@@ -62,9 +62,9 @@ class Wiring:
                 }
                 for topic in self.topics
             ],
-            "links": list(self.links),
-            "environment": list(self.environment),
-            "deadlocks": [list(cycle) for cycle in self.deadlocks],
+            "links": self.links,
+            "environment": self.environment,
+            "deadlocks": self.deadlocks,
         }
 
     def text(self) -> str:

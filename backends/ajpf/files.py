@@ -3,10 +3,10 @@ of what each property stands for. Pure: the same job gives the same bytes."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 
 from avow.backend_kit.protocol import Job
+from avow.base.codec import document
 
 from . import psl
 from .ajpf_tool import jpf_file
@@ -84,4 +84,4 @@ def _claims(job: Job, setup: Setup, made: Instantiation) -> str:
             for extra, properties in made.extras
         },
     }
-    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    return document(data) + "\n"

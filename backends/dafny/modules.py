@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 
 from avow.backend_kit.stepping import stepping
+from avow.base.codec import document
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cell import CELL
@@ -158,7 +158,7 @@ def lines_map(generated: Generated) -> str:
         "ensures": {str(line): name for line, name in generated.ensures},
         "not covered": dict(generated.uncovered),
     }
-    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    return document(data) + "\n"
 
 
 def signature(variables: Sequence[Variable], words: Vocabulary) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Outcome, Verdict
 
@@ -70,7 +70,7 @@ class ExperimentBackend(Backend):
             "supposed": experiment.supposed,
             "protocol": experiment.protocol,
         }
-        return {"claim.json": json.dumps(claim, indent=2, ensure_ascii=False) + "\n"}
+        return {"claim.json": document(claim) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         judgement, logs = _settle(job)

@@ -15,7 +15,7 @@ from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.base.codec import from_json
+from avow.base.codec import document, from_json
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
@@ -99,7 +99,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     if "crash_trace" in answer:
         numbers = "exact" if exact else "float64"
         outcomes = tuple(replace(o, of=Object.SOURCE, numbers=numbers) for o in outcomes)
-    logs["result.json"] = json.dumps(answer, indent=1) + "\n"
+    logs["result.json"] = document(answer) + "\n"
     return Report(outcomes, "hypothesis", version, command, logs, observed, isolation)
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.given import existing_file, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.envelope import Opened
@@ -88,7 +88,7 @@ class ReviewBackend(Backend):
             o.name: {"claim": o.claim, "formula": o.formula, "meaning": current_meaning(job.node, o.name)}
             for o in job.obligations
         }
-        return {"to-review.json": json.dumps({"clauses": claims}, indent=2, ensure_ascii=False) + "\n"}
+        return {"to-review.json": document({"clauses": claims}) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:

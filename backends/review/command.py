@@ -6,6 +6,8 @@ import json
 
 import click
 
+from avow.base.codec import document
+
 
 @click.group()
 def command() -> None:
@@ -26,7 +28,7 @@ def stamp_command(system: str, node: str, method: str | None, as_json: bool, ren
 
     said = stamp(system_folder(system), node, method=method, renewed=renewed)
     if as_json:
-        click.echo(json.dumps({"stamped": list(said)}, indent=1, ensure_ascii=False))
+        click.echo(document({"stamped": list(said)}))
         return 0
     click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import metadata
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report, Translated
+from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
@@ -121,7 +121,7 @@ class RosMonitoringBackend(Backend):
         return {
             f"{stem}.yaml": configuration(found, job.options),
             f"{stem}.rml": made.text,
-            f"{stem}_monitor.json": json.dumps(report, indent=2, ensure_ascii=False) + "\n",
+            f"{stem}_monitor.json": document(report) + "\n",
         }
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:

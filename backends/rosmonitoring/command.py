@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import sys
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -12,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
+
+from avow.base.codec import document
 
 from .coverage import coverage
 from .tuning import VIOLATIONS_SHOWN
@@ -224,7 +225,7 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
     if telling.as_json:
         digest = "" if trace in ("-", "") else digest_trace(Path(trace))
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
-        click.echo(json.dumps(whole, indent=2, ensure_ascii=False))
+        click.echo(document(whole))
     else:
         if not telling.show_all and count > VIOLATIONS_SHOWN:
             click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")

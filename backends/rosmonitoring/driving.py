@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.base.codec import document
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -87,7 +89,7 @@ def command(
             "raised": raised,
             "different": different,
         }
-        click.echo(json.dumps(told, indent=2))
+        click.echo(document(told))
     else:
         same = ("the recording has the same",) if replay and not raised and not different else ()
         click.echo(f"{node}: {len(events)} messages heard, {len(run.said)} published")
