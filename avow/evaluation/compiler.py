@@ -10,8 +10,8 @@ from fractions import Fraction
 from itertools import product
 from typing import Any, Protocol, assert_never
 
-from avow.evaluation.disjunctions import Part
 from avow.formulas import values
+from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.operators import OPERATORS, implementation
 from avow.language.sorts import (
@@ -29,6 +29,7 @@ from avow.language.sorts import (
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -189,6 +190,8 @@ class Compiler:
             case Item(record=record, position=position):
                 inner = self.code(record)
                 return lambda env: inner(env)[position]
+            case Argument():
+                raise NotEvaluable("an argument of a value's constructor is asked for")
             case Length(sequence=sequence):
                 inner = self.code(sequence)
                 return lambda env: len(inner(env).items)

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from avow.evaluation.compiler import Candidates, Code, Compiler, Domains, Env, NotEvaluable, finite_values
-from avow.evaluation.disjunctions import Part
 from avow.evaluation.quantifier_search import Plan, Search
+from avow.formulas.disjunctions import Part
 from avow.formulas.renaming import rename_apart
 from avow.formulas.values import Value
 from avow.language.terms import (

@@ -12,8 +12,8 @@ from fractions import Fraction
 from itertools import product
 
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
-from avow.evaluation.disjunctions import Part, conjunction
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
+from avow.formulas.disjunctions import Part, conjunction
 from avow.formulas.renaming import bound_names, has_variables
 from avow.formulas.traversal import subterms
 from avow.language.operators import OPPOSITE

@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
-from avow.evaluation.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.evaluation.patterns import pattern, patterns
 from avow.evaluation.table_rows import Lookup, Step, Unrestricted, table_rows
 from avow.evaluation.unrestricted_variables import leftover_steps
+from avow.formulas.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.formulas.renaming import bound_names
 from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
-from avow.evaluation.disjunctions import Part
 from avow.evaluation.patterns import Match, patterns
+from avow.formulas.disjunctions import Part
 from avow.formulas.formula import digest
 from avow.formulas.renaming import bound_names
 from avow.language.terms import Apply, Not, Quantified, Role, Term, Variable

@@ -16,9 +16,9 @@ from itertools import pairwise
 from typing import Any
 
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
-from avow.evaluation.disjunctions import Part
 from avow.evaluation.linear_search import linear_step
 from avow.formulas import values
+from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, FunctionValue
 from avow.language.sorts import (
     IntegerSort,

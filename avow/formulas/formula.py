@@ -15,6 +15,7 @@ from avow.base.remembered import by_identity
 from avow.formulas.flattening import flattened
 from avow.formulas.traversal import Steps, run, subterms, transform
 from avow.language.contract import Clause, Node
+from avow.language.operators import OPPOSITE
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -36,6 +37,7 @@ from avow.language.terms import (
     TRUE,
     And,
     Apply,
+    Argument,
     Arithmetic,
     Builtin,
     Compare,
@@ -75,6 +77,7 @@ __all__ = [
     "negation",
     "node_digest",
     "normalise",
+    "opposite",
     "rename",
     "sort_digest",
     "substitute",
@@ -103,6 +106,11 @@ def negation(term: Term) -> Term:
     if isinstance(term, Literal) and isinstance(term.value, bool):
         return FALSE if term.value else TRUE
     return Not(term)
+
+
+def opposite(term: Term) -> Term:
+    """An equivalent of ``not term``, without a `not` in front if there is one."""
+    return Compare(OPPOSITE[term.operator], term.left, term.right) if isinstance(term, Compare) else negation(term)
 
 
 def _join(terms: tuple[Term, ...], kind: type[And] | type[Or]) -> Term:
@@ -403,6 +411,8 @@ def _head(term: Term) -> tuple[str, ...]:
             return (quantifier, *(sort_digest(v.sort) for v in variables))
         case Item(position=position):
             return ("item", str(position))
+        case Argument(constructor=constructor, position=position):
+            return ("argument", constructor, str(position))
         case SequenceTerm(sort=sort) | SequenceRange(sort=sort) | SetTerm(sort=sort) | TupleTerm(sort=sort):
             return (type(term).__name__, sort_digest(sort))
         case Operation(operator=operator, sort=sort):

@@ -32,6 +32,7 @@ from avow.language.styles import latex_escape as latex_escape
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -160,7 +161,10 @@ class _Printer:
                 return self.call(self.show(sequence, ATOM), (index,), ()), ATOM
             case Item(record=record, position=position):
                 labels = record.sort.labels if isinstance(record.sort, TupleSort) else ()
-                return f"{self.show(record, ATOM)}.{self.style.name(labels[position])}", ATOM
+                label = labels[position] if labels else str(position)
+                return f"{self.show(record, ATOM)}.{self.style.name(label)}", ATOM
+            case Argument(value=value, constructor=name, position=position):
+                return f"{self.show(value, ATOM)}.{self.style.name(name)}.{position}", ATOM
             case Length(sequence=sequence):
                 return f"{self.style.name('length')}({self.show(sequence, _LOOSEST)})", ATOM
             case Arithmetic():

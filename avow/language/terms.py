@@ -182,6 +182,29 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
+class Argument:
+    """The argument at `position` of the constructor that a value was made with: y of ``move(x, y)`` at 1; without a
+    value where it was made with another one. No contract says it: it is what `avow.formulas.one_point_rule` puts for a
+    variable, and only beside the condition that the value was made so (`made_with`)."""
+
+    value: Term
+    constructor: str
+    position: int
+    sort: Sort
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.value,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        whole = parts[0]
+        if isinstance(whole, Construct) and whole.constructor == self.constructor:
+            return whole.arguments[self.position]
+        return replace(self, value=whole)
+
+
+@dataclass(frozen=True, slots=True)
 class Widen:
     """An INTEGER or NATURAL term used where a REAL is wanted; `sort` is REAL."""
 
@@ -455,9 +478,9 @@ class History:
 
 
 Term = (
-    Literal | EnumValue | Variable | Construct | Apply | Index | Length | Item | Widen | Arithmetic | Negative
-    | TupleTerm | SequenceTerm | SequenceRange | SetTerm | Compare | In | Not | And | Or | Implies | Iff | Quantified
-    | Operation | Conditional | History
+    Literal | EnumValue | Variable | Construct | Apply | Index | Length | Item | Argument | Widen | Arithmetic
+    | Negative | TupleTerm | SequenceTerm | SequenceRange | SetTerm | Compare | In | Not | And | Or | Implies | Iff
+    | Quantified | Operation | Conditional | History
 )  # fmt: skip
 
 TRUE = Literal(True, BOOL)

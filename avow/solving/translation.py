@@ -15,10 +15,12 @@ from fractions import Fraction
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
+from avow.formulas.one_point_rule import made_with, without_points
 from avow.formulas.traversal import Steps, run
 from avow.language.operators import OPERATORS, implementation
 from avow.language.sorts import (
     INTEGER,
+    DataSort,
     FunctionSort,
     RealSort,
     SequenceSort,
@@ -28,6 +30,7 @@ from avow.language.sorts import (
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -55,7 +58,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.solving.one_point_rule import eliminate_points, expand
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported
 
@@ -111,7 +113,7 @@ class Translator(Sorts):
     ) -> Expr:
         """The Z3 expression of a term. `meanings` replaces free variables, `bound` gives bound variables of an outer
         quantifier. Raises Unsupported."""
-        return run(self._term(term, dict(bound or {}), meanings or {}))
+        return run(self._term(without_points(term), dict(bound or {}), meanings or {}))
 
     def _term(self, term: Term, bound: Mapping[Variable, Expr], meanings: Mapping[Variable, Meaning]) -> Steps[Expr]:
         match term:
@@ -131,8 +133,7 @@ class Translator(Sorts):
                 return apply(*(self._fit(a, p) for a, p in zip(arguments, sort.parameters, strict=True)))
             case Construct(constructor=name, arguments=terms, sort=data):
                 arguments = yield self._terms(terms, bound, meanings)
-                index = next(k for k, c in enumerate(data.constructors) if c.name == name)
-                parameters = data.constructors[index].parameters
+                index, parameters = _place(data, name), data.constructor(name).parameters
                 fitted = [self._fit(a, p) for a, p in zip(arguments, parameters, strict=True)]
                 return self.sort(data).constructor(index)(*fitted)
             case TupleTerm(items=items, sort=tuple_sort):
@@ -142,6 +143,9 @@ class Translator(Sorts):
             case Item(record=record, position=position):
                 value = yield self._term(record, bound, meanings)
                 return self.sort(record.sort).accessor(0, position)(value)
+            case Argument(value=inner, constructor=name, position=position):
+                value = yield self._term(inner, bound, meanings)
+                return self.sort(inner.sort).accessor(_place(inner.sort, name), position)(value)
             case Widen(term=inner):
                 value = yield self._term(inner, bound, meanings)
                 return self._real(value)
@@ -249,6 +253,11 @@ class Translator(Sorts):
             if isinstance(one, SequenceRange) and not _is_written_out(one):
                 same = yield self._same_range(one, other, bound, meanings)
                 return same if term.operator == "==" else z3.Not(same)
+        made = made_with(term)
+        if made is not None:
+            value = yield self._term(term.left, bound, meanings)
+            same = self.sort(term.left.sort).recognizer(_place(term.left.sort, made))(value)
+            return same if term.operator == "==" else z3.Not(same)
         left, right = yield self._terms((term.left, term.right), bound, meanings)
         if left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
@@ -299,13 +308,10 @@ class Translator(Sorts):
         members = [self.member(v.sort, c) for v, c in zip(term.variables, constants, strict=True)]
         allowed = [member for member in members if member is not None]
         if term.quantifier is Quantifier.FORALL:
-            left, parts = eliminate_points(constants, [*allowed, z3.Not(body)])
-            return self._every([self._all(rest, denied) for rest, denied in expand(left, parts)])
-        if term.quantifier is Quantifier.EXISTS:
-            left, parts = eliminate_points(constants, [*allowed, body])
-            options = [self._some(rest, required) for rest, required in expand(left, parts)]
-            return options[0] if len(options) == 1 else z3.Or([*options, z3.Not(self.true())])
+            return z3.ForAll(constants, z3.Implies(self._every(allowed), body) if allowed else body)
         within = self._every([*allowed, body])
+        if term.quantifier is Quantifier.EXISTS:
+            return z3.Exists(constants, within)
         if any(isinstance(variable.sort, FunctionSort) for variable in term.variables):
             raise Unsupported("unique existence of a function", term.span)
         others = [self.fresh(variable.name, variable.sort) for variable in term.variables]
@@ -313,17 +319,6 @@ class Translator(Sorts):
         equal = z3.And([one == other for one, other in zip(constants, others, strict=True)])
         exists = z3.Exists(constants, within)
         return z3.And(exists, z3.ForAll([*constants, *others], z3.Implies(z3.And(within, again), equal)))
-
-    def _all(self, constants: list[Expr], denied: list[Expr]) -> Expr:
-        """For all constants, not all that is `denied` holds: its last part as a consequence, which reads better."""
-        *conditions, last = denied or [self.true()]
-        consequence = last.arg(0) if z3.is_not(last) else z3.Not(last)
-        body = z3.Implies(self._every(conditions), consequence) if conditions else consequence
-        return z3.ForAll(constants, body) if constants else body
-
-    def _some(self, constants: list[Expr], parts: list[Expr]) -> Expr:
-        within = self._every(parts)
-        return z3.Exists(constants, within) if constants else within
 
     def _every(self, parts: list[Expr]) -> Expr:
         return self.all_of(parts) if parts else self.true()
@@ -365,6 +360,11 @@ class Translator(Sorts):
         if operator == "/" or left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
         return implementation(OPERATORS[operator].z3)(z3, left, right)
+
+
+def _place(sort: Sort, constructor: str) -> int:
+    assert isinstance(sort, DataSort)
+    return sort.constructors.index(sort.constructor(constructor))
 
 
 def _is_written_out(term: SequenceRange) -> bool:

@@ -39,6 +39,7 @@ from avow.language.sorts import (
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -221,6 +222,8 @@ class _Printer:
             case Item(record=record, position=position):
                 inner = yield self.operand(record, scope)
                 return f"{inner}.{position}", True
+            case Argument():
+                raise NotExpressible("an argument of a value's constructor", term.span)
             case Length(sequence=sequence):
                 inner, _ = yield self.term(sequence, scope)
                 return f"|{inner}|", True

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from avow.formulas.formula import conjunction, disjunction, free_variables
+from avow.formulas.formula import conjunction, disjunction, free_variables, opposite
 from avow.formulas.traversal import subterms, transform
-from avow.language.operators import OPPOSITE
 from avow.language.sorts import BOOL
 from avow.language.terms import (
     FALSE,
@@ -37,19 +36,6 @@ from avow.language.terms import (
 def simplify(term: Term) -> Term:
     """An equivalent formula, seldom longer."""
     return transform(term, _step)
-
-
-def opposite(term: Term) -> Term:
-    """An equivalent of ``not term`` without a `not` in front, if there is one."""
-    match term:
-        case Literal(value=bool(value)):
-            return FALSE if value else TRUE
-        case Not(body=body):
-            return body
-        case Compare(operator=operator, left=left, right=right):
-            return Compare(OPPOSITE[operator], left, right)
-        case _:  # no opposite of its own
-            return Not(term)
 
 
 def _step(term: Term) -> Term:

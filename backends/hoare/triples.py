@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.one_point_rule import solved
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
 from avow.language.contract import Clause, Node
@@ -250,24 +252,10 @@ def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Ter
     was_pre = conjunction(hypotheses)
     pre, post, fixed = simplify(was_pre), simplify(goal), list[tuple[Variable, Term]]()
     for constant in outer:
-        for part in _conjuncts(pre):
-            value = _determined(constant, part)
-            if value is not None:
-                pre = simplify(substitute(pre, {constant: value}))
-                post = simplify(substitute(post, {constant: value}))
-                fixed.append((constant, value))
+        for part in conjuncts(pre, True):
+            found = solved(part, (constant,)) if constant in part.children else None
+            if found is not None and not found.rest:  # a rest would widen the claim: an INTEGER is no NATURAL
+                pre, post = (simplify(substitute(term, found.values)) for term in (pre, post))
+                fixed += found.values.items()
                 break
     return pre, post, Stated(was_pre, goal, tuple(fixed))
-
-
-def _conjuncts(term: Term) -> tuple[Term, ...]:
-    return term.items if isinstance(term, And) else (term,)
-
-
-def _determined(constant: Variable, part: Term) -> Term | None:
-    if isinstance(part, Compare) and part.operator == "==":
-        for one, other in ((part.left, part.right), (part.right, part.left)):
-            # the sorts must agree: an INTEGER in place of a NATURAL would widen the claim
-            if one == constant and other.sort == constant.sort and constant not in free_variables(other):
-                return other
-    return None

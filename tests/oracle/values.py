@@ -32,6 +32,7 @@ from avow.language.terms import (
     RESPONSES,
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -239,6 +240,9 @@ class Meaning:
                 return found[at] if isinstance(found, dict) else at in found
             case Construct(constructor=constructor, arguments=arguments):
                 return (constructor, *map(of, arguments))
+            case Argument(value=whole, constructor=constructor, position=position):
+                name, *given = of(whole)
+                return given[position] if name == constructor else self._stray(term.sort)
             case TupleTerm(items=items) | SequenceTerm(items=items):
                 return tuple(map(of, items))
             case SequenceRange():

@@ -11,21 +11,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.evaluation.disjunctions import Part, alternatives, conjunction
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.cases import TooManyCases, lifted
+from avow.formulas.disjunctions import Part, alternatives, conjunction
+from avow.formulas.one_point_rule import made_with, solved
 from avow.formulas.renaming import bound_names, rename_apart
 from avow.language.operators import OPERATORS, Why
 from avow.language.sorts import (
     BOOL,
+    NATURAL,
     BoolSort,
-    IntegerSort,
-    NaturalSort,
+    DataSort,
+    FunctionSort,
     RealSort,
+    TupleSort,
 )
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Conditional,
@@ -45,6 +49,7 @@ from avow.language.terms import (
     SequenceTerm,
     SetTerm,
     Term,
+    TupleTerm,
     Variable,
     Widen,
 )
@@ -54,6 +59,7 @@ from ..tuning import COMPARISONS
 from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
 from .syntax import (
     FALSE,
+    TRUE,
     Calculation,
     Condition,
     NotRml,
@@ -69,6 +75,9 @@ from .syntax import (
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 
 Bound = Mapping[str, Symbol]
+
+_Case = tuple[Condition, list[Part], Bound]
+"""One way in which a part can hold: what says so, what has to hold besides, and what it fixes."""
 
 
 @dataclass(slots=True)
@@ -130,6 +139,12 @@ class Eliminator:
         return every([some([opposite(one), other]), some([one, opposite(other)])])
 
     def _compare(self, term: Compare, bound: Bound) -> Condition:
+        made = made_with(term)
+        if made is not None:
+            known = self._value(term.left, bound)
+            assert isinstance(known, Variant)
+            assert isinstance(term.left.sort, DataSort)
+            return compare(term.operator, known.tag, Number(Fraction(code(term.left.sort, made))))
         if term.left.sort == BOOL:
             same = self._iff(term.left, term.right, bound)
             return same if term.operator == "==" else opposite(same)
@@ -180,6 +195,11 @@ class Eliminator:
                     for c in sort.constructors
                 )
                 return Variant(Number(Fraction(code(sort, name))), rows)
+            case Argument(value=whole, constructor=name, position=position):
+                known = self._value(whole, bound)
+                assert isinstance(known, Variant)
+                assert isinstance(whole.sort, DataSort)
+                return known.arguments[code(whole.sort, name) - 1][position]
             case _:  # a number, or refused by name
                 return Scalar(self._number(term, bound))
 
@@ -193,7 +213,7 @@ class Eliminator:
                 return self._calculate("-", Number(Fraction(0)), self._number(inside, bound), term)
             case Arithmetic(operator=operator, left=left, right=right):
                 return self._calculate(operator, self._number(left, bound), self._number(right, bound), term)
-            case Variable():
+            case Variable() | Argument():
                 found = self._value(term, bound)
                 if isinstance(found, Scalar):
                     return found.number
@@ -279,88 +299,45 @@ class Eliminator:
         found = self._formula(part.term, bound)
         return found if part.positive else opposite(found)
 
-    def _binders(
-        self, part: Part, free: Mapping[str, Variable], bound: Bound
-    ) -> list[tuple[Condition, list[Part], Bound]] | None:
+    def _binders(self, part: Part, free: Mapping[str, Variable], bound: Bound) -> list[_Case] | None:
         """The ways in which a part can hold, each with what it fixes; None if the part fixes nothing."""
         match part.term:
-            case Apply(function=Variable(role=Role.INPUT | Role.OUTPUT)) if part.positive:
+            case Apply(
+                function=Variable(role=Role.INPUT | Role.OUTPUT, sort=FunctionSort(parameters=sorts)) as relation,
+                arguments=arguments,
+            ) if part.positive:
                 if self._tracked(part.term) is not None:
                     return None
-                points = self._points(part.term)
-                cases: list[tuple[Condition, list[Part], Bound]] = []
-                for holds, values in points.tuples:
-                    matched = self._match(tuple(zip(part.term.arguments, values, strict=True)), free, bound)
-                    if matched is None:
-                        return None
-                    cases.append((every([holds, matched[0]]), [], matched[1]))
-                return cases
-            case Compare(operator=operator) if operator == ("==" if part.positive else "!="):
-                for pattern, known in ((part.term.left, part.term.right), (part.term.right, part.term.left)):
-                    if pattern.sort == BOOL or _mentions(known, free):
-                        continue
-                    matched = self._match(((pattern, self._value(known, bound)),), free, bound)
-                    if matched is not None:
-                        return [(matched[0], [], matched[1])]
-                return None
-            case In(item=item, collection=SetTerm(items=items) | SequenceTerm(items=items)) if part.positive:
-                if any(_mentions(each, free) for each in items):
-                    return None
                 cases = []
-                for each in items:
-                    matched = self._match(((item, self._value(each, bound)),), free, bound)
-                    if matched is None:
-                        return None
-                    cases.append((matched[0], [], matched[1]))
-                return cases
+                for k, (holds, row) in enumerate(self._points(part.term).tuples):
+                    names = (f"{relation.qualified} row {k} {n}" for n in range(len(row)))
+                    point = tuple(Variable(Role.BOUND, name, sort) for name, sort in zip(names, sorts, strict=True))
+                    here = {**bound, **{v.name: symbol for v, symbol in zip(point, row, strict=True)}}
+                    sort = TupleSort(sorts)
+                    cases.append(self._case(TupleTerm(arguments, sort), TupleTerm(point, sort), free, here, holds))
+            case Compare(operator=operator, left=left, right=right) if left.sort != BOOL and operator == (
+                "==" if part.positive else "!="
+            ):
+                cases = [self._case(left, right, free, bound)]
+            case In(item=item, collection=SetTerm(items=items) | SequenceTerm(items=items)) if part.positive:
+                cases = [self._case(item, each, free, bound) for each in items]
             case _:  # fixes no variable
                 return None
+        found = [case for case in cases if case is not None]
+        return found if len(found) == len(cases) else None
 
-    def _match(
-        self, pairs: Sequence[tuple[Term, Symbol]], free: Mapping[str, Variable], bound: Bound
-    ) -> tuple[Condition, Bound] | None:
-        """Solve ``pattern == symbol`` for the pattern's variables; None where a pattern cannot be solved."""
-        conditions: list[Condition] = []
-        now = dict(bound)
-        waiting = list(pairs)
-        stuck = 0
-        while waiting:
-            pattern, symbol = waiting.pop(0)
-            still = {n for n in free if n not in now}
-            match pattern:
-                case _ if not _mentions(pattern, still):
-                    conditions.append(equal(self._value(pattern, now), symbol))
-                case Variable(name=name, sort=sort):
-                    now[name] = symbol
-                    if isinstance(sort, NaturalSort) and isinstance(symbol, Scalar):
-                        conditions.append(compare(">=", symbol.number, Number(Fraction(0))))
-                case Construct(constructor=constructor, arguments=arguments, sort=sort) if isinstance(symbol, Variant):
-                    at = code(sort, constructor)
-                    conditions.append(compare("==", symbol.tag, Number(Fraction(at))))
-                    waiting = [*zip(arguments, symbol.arguments[at - 1], strict=True), *waiting]
-                case Arithmetic(operator="+" | "-" as operator, left=left, right=right) if (
-                    isinstance(pattern.sort, IntegerSort | NaturalSort)
-                    and isinstance(symbol, Scalar)
-                    and not _mentions(right, still)
-                ):
-                    turned = "-" if operator == "+" else "+"
-                    other = self._number(right, now)
-                    waiting.insert(0, (left, Scalar(self._calculate(turned, symbol.number, other, pattern))))
-                case _:  # not solved yet: after the others, or not at all
-                    stuck += 1
-                    if stuck > len(waiting) + 1:
-                        return None
-                    waiting.append((pattern, symbol))
-                    continue
-            stuck = 0
-        return every(conditions), now
+    def _case(
+        self, left: Term, right: Term, free: Mapping[str, Variable], bound: Bound, holds: Condition = TRUE
+    ) -> _Case | None:
+        """That both sides are the same, where that fixes a variable."""
+        found = solved(Compare("==", left, right), free.values())
+        if found is None:
+            return None
+        naturals = (Compare(">=", v, Literal(0, NATURAL)) for v in found.values if v.sort == NATURAL)
+        more = [Part(term, True, bound_names(term)) for term in (*found.rest, *naturals)]
+        return holds, more, {**bound, **{v.name: self._value(term, bound) for v, term in found.values.items()}}
 
     def _tick(self) -> None:
         self._work += 1
         if self._work > 200_000:
             raise NotRml("the quantifiers unfold into too many cases")
-
-
-def _mentions(term: Term, names: Mapping[str, object] | set[str]) -> bool:
-
-    return any(n in names for n in bound_names(term))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from avow.formulas.formula import opposite
 from avow.formulas.renaming import bound_names
 from avow.language.operators import definition
 from avow.language.sorts import BOOL, BoolSort, FunctionSort
 from avow.language.terms import (
+    TRUE,
     And,
     Compare,
     Conditional,
@@ -49,8 +51,18 @@ def branches(
 
 def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]:
     """The conjunction that a formula is, and the variables of the existential quantifiers on the way to its parts."""
-    parts: list[Part] = []
     variables: list[Variable] = []
+    parts = [Part(part, truth, bound_names(part)) for part, truth in _apart(term, positive, variables)]
+    return parts, variables
+
+
+def conjuncts(term: Term, positive: bool) -> list[Term]:
+    """The conjunction that a formula, or its negation, is; a quantified part stays one."""
+    parts = (part if truth else opposite(part) for part, truth in _apart(term, positive, None))
+    return [part for part in parts if part != TRUE]
+
+
+def _apart(term: Term, positive: bool, variables: list[Variable] | None) -> Iterator[tuple[Term, bool]]:
     stack = [(term, positive)]
     while stack:
         term, positive = stack.pop()
@@ -63,10 +75,10 @@ def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]
                 stack.extend((item, False) for item in reversed(items))
             case Implies(left=left, right=right) if not positive:
                 stack.extend(((right, False), (left, True)))
-            case Quantified(quantifier=Quantifier.EXISTS) if positive:
+            case Quantified(quantifier=Quantifier.EXISTS) if positive and variables is not None:
                 variables.extend(term.variables)
                 stack.append((term.body, True))
-            case Quantified(quantifier=Quantifier.FORALL) if not positive:
+            case Quantified(quantifier=Quantifier.FORALL) if not positive and variables is not None:
                 variables.extend(term.variables)
                 stack.append((term.body, False))
             case Compare(operator="==" | "!=" as operator, left=left, right=Literal(value=bool() as value)):
@@ -74,8 +86,7 @@ def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]
             case Compare(operator="==" | "!=" as operator, left=Literal(value=bool() as value), right=right):
                 stack.append((right, positive is ((operator == "==") is value)))
             case _:  # a part that is judged as a whole
-                parts.append(Part(term, positive, bound_names(term)))
-    return parts, variables
+                yield term, positive
 
 
 def alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | None:

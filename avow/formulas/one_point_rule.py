@@ -1,0 +1,212 @@
+"""The one-point rule: where a quantified variable can have one value only, that value stands for it.
+
+``exists(i | c == inspect(i) and P(i))`` says that c is an `inspect`, and that P holds of what is in it: the rule goes
+through constructors, tuples, sums and differences. A whole number between two numbers that are written down has few
+values, and each stands for it in turn. The meaning stays the same, whatever the sorts: a variable's value has to be of
+its sort, which is said where that of the term is a wider one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+
+from avow.base.records import dataclass
+from avow.base.remembered import by_identity
+from avow.formulas.disjunctions import conjuncts
+from avow.formulas.formula import conjunction, disjunction, free_variables, opposite, substitute
+from avow.formulas.traversal import subterms, transform
+from avow.language.bounds import constant
+from avow.language.operators import FLIPPED
+from avow.language.sorts import INTEGER, NATURAL, REAL, IntegerSort, NaturalSort, Sort, TupleSort
+from avow.language.terms import (
+    Argument,
+    Arithmetic,
+    Compare,
+    Construct,
+    Iff,
+    Implies,
+    Item,
+    Literal,
+    Quantified,
+    Quantifier,
+    Term,
+    TupleTerm,
+    Variable,
+    Widen,
+)
+from avow.tuning.bounds import NUMBERS_WRITTEN_OUT, PARTS_SEARCHED
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """What an equation says of some variables: the `values` that they have, in terms of none of them, and the `rest`,
+    which has to hold besides."""
+
+    values: Mapping[Variable, Term]
+    rest: tuple[Term, ...]
+
+
+def solved(equation: Term, unknown: Collection[Variable]) -> Solved | None:
+    """An equation solved for those of the `unknown` variables that it determines; None where it determines none."""
+    if not isinstance(equation, Iff) and not (isinstance(equation, Compare) and equation.operator == "=="):
+        return None
+    for pattern, known in (equation.children, reversed(equation.children)):
+        if _mentions(pattern, unknown) and not _mentions(known, unknown):
+            found = _matched(pattern, known, set(unknown))
+            if found.values:
+                return found
+    return None
+
+
+def made_with(term: Term) -> str | None:
+    """The constructor of which a condition says, as `solved` does, that a value was made with it (of ``!=``: was not);
+    None of every other term."""
+    match term:
+        case Compare(operator="==" | "!=", left=left, right=Construct(constructor=name, arguments=arguments)):
+            own = (isinstance(a, Argument) and a.constructor == name and a.value == left for a in arguments)
+            return name if arguments and all(own) else None
+        case _:  # says it of nothing
+            return None
+
+
+@by_identity(10_000)
+def without_points(formula: Term) -> Term:
+    """The formula without the quantified variables that can have one value only, or few that are written down."""
+    if not any(isinstance(part, Quantified) for part in subterms(formula)):
+        return formula
+    return transform(formula, _without)
+
+
+def _mentions(term: Term, unknown: Collection[Variable]) -> bool:
+    return any(variable in unknown for variable in free_variables(term))
+
+
+def _matched(pattern: Term, known: Term, unknown: set[Variable]) -> Solved:
+    """``pattern == known`` solved; `known` mentions none of the unknown variables."""
+    values: dict[Variable, Term] = {}
+    rest: list[Term] = []
+    waiting = [(pattern, known)]
+    while waiting:
+        pattern, known = waiting.pop()
+        turned = _turned(pattern, known, unknown) if isinstance(pattern, Arithmetic) else None
+        match pattern:
+            case Variable() if pattern in unknown and (within := _within(known, pattern.sort)) is not None:
+                values[pattern] = known
+                rest += within
+                unknown.remove(pattern)
+            case Construct(constructor=name, arguments=arguments, sort=sort) if arguments and _mentions(
+                pattern, unknown
+            ):
+                parameters = enumerate(sort.constructor(name).parameters)
+                own = tuple(Argument(known, name, k, s).rebuild((known,)) for k, s in parameters)
+                rest.append(Compare("==", known, Construct(name, own, sort)))
+                waiting.extend(reversed(tuple(zip(arguments, own, strict=True))))
+            case TupleTerm(items=items) if _mentions(pattern, unknown):
+                assert isinstance(known.sort, TupleSort)
+                parts = (Item(known, k, s).rebuild((known,)) for k, s in enumerate(known.sort.items))
+                waiting.extend(reversed(tuple(zip(items, parts, strict=True))))
+            case _ if turned is not None:
+                waiting.append(turned)
+            case _:  # determines nothing as it stands
+                rest.append(Compare("==", pattern, known))
+    return Solved(values, tuple(rest))
+
+
+def _turned(pattern: Arithmetic, known: Term, unknown: Collection[Variable]) -> tuple[Term, Term] | None:
+    """``s + t == known`` as ``s == known - t``, where only s is unknown, or only t; of a difference likewise."""
+    left, right, sort = pattern.left, pattern.right, REAL if pattern.sort == REAL else INTEGER
+    if pattern.operator not in ("+", "-") or _mentions(left, unknown) == _mentions(right, unknown):
+        return None
+    if _mentions(left, unknown):
+        return left, Arithmetic("-" if pattern.operator == "+" else "+", known, right, sort)
+    if pattern.operator == "+":
+        return right, Arithmetic("-", known, left, sort)
+    return right, Arithmetic("-", left, known, sort)
+
+
+def _within(value: Term, sort: Sort) -> tuple[Term, ...] | None:
+    """What has to hold for a term's value to be of a sort; None where no formula says it."""
+    if value.sort == sort or (sort == INTEGER and value.sort == NATURAL):
+        return ()
+    return (Compare(">=", value, Literal(0, INTEGER)),) if sort == NATURAL and value.sort == INTEGER else None
+
+
+# -- quantifiers -------------------------------------------------------------------------------------------------------
+
+
+def _without(term: Term) -> Term:
+    if not isinstance(term, Quantified) or term.quantifier is Quantifier.UNIQUE:
+        return term
+    exists = term.quantifier is Quantifier.EXISTS
+    variables, parts = _eliminated(term.variables, conjuncts(term.body, exists))
+    found = list(_cases(variables, parts))
+    if len(found) == 1 and found[0][0] == term.variables:
+        return term
+    cases = [_closed(term, rest, case) for rest, case in found]
+    return disjunction(cases) if exists else conjunction(cases)
+
+
+def _eliminated(variables: tuple[Variable, ...], parts: list[Term]) -> tuple[tuple[Variable, ...], list[Term]]:
+    """Of "there are `variables` such that all `parts` hold": the variables still needed, and the parts then."""
+    while variables and len(parts) <= PARTS_SEARCHED:
+        for at, part in enumerate(parts):
+            found = solved(part, variables)
+            if found is not None:
+                variables = tuple(v for v in variables if v not in found.values)
+                left = conjunction((*found.rest, *parts[:at], *parts[at + 1 :]))
+                parts = conjuncts(substitute(left, found.values), True)
+                break
+        else:
+            break
+    return variables, parts
+
+
+def _cases(variables: tuple[Variable, ...], parts: list[Term]) -> Iterator[tuple[tuple[Variable, ...], list[Term]]]:
+    """The same for each of a variable's few values, where the parts bound a whole number by numbers."""
+    for variable in variables:
+        values = _range(variable, parts) if len(parts) <= PARTS_SEARCHED else None
+        if values is not None:
+            rest = tuple(v for v in variables if v != variable)
+            for number in values:
+                value = Literal(number, variable.sort)
+                yield from _cases(rest, [substitute(part, {variable: value}) for part in parts])
+            return
+    yield variables, parts
+
+
+def _range(variable: Variable, parts: Sequence[Term]) -> range | None:
+    if not isinstance(variable.sort, IntegerSort | NaturalSort):
+        return None
+    low: list[Fraction] = [Fraction(0)] if variable.sort == NATURAL else []
+    high: list[Fraction] = []
+    for sign, number in (bound for part in parts for bound in _bounds(part, variable)):
+        if sign in ("<", "<="):
+            high.append(Fraction(math.ceil(number) - 1) if sign == "<" else number)
+        else:
+            low.append(Fraction(math.floor(number) + 1) if sign == ">" else number)
+    if not low or not high or min(high) - max(low) >= NUMBERS_WRITTEN_OUT:
+        return None
+    return range(math.ceil(max(low)), math.floor(min(high)) + 1)
+
+
+def _bounds(part: Term, variable: Variable) -> Iterator[tuple[str, Fraction]]:
+    """``("<", 3)`` where a part says that the variable is less than 3."""
+    if isinstance(part, Compare) and part.operator in FLIPPED:
+        flipped = part.right, part.left, FLIPPED[part.operator]
+        for one, other, sign in ((part.left, part.right, part.operator), flipped):
+            inside = one.term if isinstance(one, Widen) else one
+            if inside == variable and (number := constant(other)) is not None:
+                yield sign, number
+
+
+def _closed(term: Quantified, variables: tuple[Variable, ...], parts: Sequence[Term]) -> Term:
+    """That there are such values, or (of `forall`) that there are none: its last part as the consequence of the others,
+    which reads better."""
+    if term.quantifier is Quantifier.EXISTS:
+        body = conjunction(parts)
+    else:
+        consequence = opposite(conjunction(parts[-1:]))
+        body = Implies(conjunction(parts[:-1]), consequence) if len(parts) > 1 else consequence
+    return Quantified(term.quantifier, variables, body, term.span) if variables else body
