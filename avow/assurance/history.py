@@ -1,7 +1,8 @@
 """What a report keeps of the ledger: all that can count, every refutation, and of the rest the newest few.
 
-What is left out can change no conclusion: a record with another key than the plan's is of an earlier state. The ledger
-has it, and how the case came about over the runs is computed from the ledger before anything is left out.
+What is left out can change no conclusion: a record with another key than the plan's is of an earlier state, and of
+several that say the same of the same, and stand or fall together, the newest counts. The ledger has the others, and how
+the case came about over the runs is computed from the ledger before anything is left out.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from avow.assurance.naming import is_advice
+from avow.base.codec import canonical, plain, to_json
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import Evidence
+from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, roll_up, weigh
+from avow.isolation.observed import ISOLATION, OBSERVED
 from avow.tuning.shown import OLDER_RECORDS, TREND_RUNS
 
 
@@ -43,23 +46,37 @@ def history(
 ) -> tuple[frozenset[str], History]:
     """The hashes of the records that a report keeps of a ledger, oldest first, and the history of all of them.
 
-    Kept is every record that answers the question as `planned` for (obligation, method), every refutation, and of each
-    claim and method the newest of the others. The records are to be as the ledger has them: whether one of them is of
-    an earlier state for another reason than its key may change without the ledger."""
+    Kept is every refutation (of those by the same example the newest), and of each claim and method the newest of what
+    says the same in answer to the question as `planned` for (obligation, method), and the newest of the others. The
+    records are to be as the ledger has them: whether one of them is of an earlier state for another reason than its key
+    may change without the ledger."""
     digests = {o.id: o.digest for o in obligations}
     kept: set[str] = set()
-    others: Counter[tuple[str, str]] = Counter()
+    others: Counter[tuple[object, ...]] = Counter()
     for entry in reversed(records):
         record = entry.evidence
         asked = record.obligation, record.method
         current = planned.get(asked) == record.key and digests.get(record.obligation) == record.obligation_digest
-        if not (current or record.verdict is Verdict.REFUTED or weigh(record).refuted):
-            others[asked] += 1
-            if others[asked] > OLDER_RECORDS:
-                continue
+        refuting = record.verdict is Verdict.REFUTED or weigh(record).refuted
+        alike = (*asked, *_says(record, refuting)) if current or refuting else asked
+        others[alike] += 1
+        if others[alike] > OLDER_RECORDS:
+            continue
         kept.add(entry.hash)
     claims = {o.id for o in obligations if not is_advice(o)}
     return frozenset(kept), History(sum(e.hash not in kept for e in records), _trend(records, claims))
+
+
+_STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
+"""The details by which one of two records may count and the other not."""
+
+
+def _says(record: Evidence, refuting: bool) -> tuple[object, ...]:
+    """Two current records, or refutations, of a claim and a method that have this in common count alike."""
+    details = {name: plain(item) for name, item in record.details.items() if refuting or name in _STANDS_ON}
+    left = sorted(record.outputs.items()) if "certificate" in details else []
+    shown = to_json(record.counterexample), record.key, record.obligation_digest
+    return record.backend, record.verdict, record.strength, record.vacuous, canonical([details, left, *shown])
 
 
 def _trend(records: Sequence[Entry], claims: set[str]) -> tuple[Point, ...]:

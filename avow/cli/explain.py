@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -13,6 +14,7 @@ from avow.cli.options import json_option
 
 if TYPE_CHECKING:
     from avow.assurance.model import Case
+    from avow.base.workspace import Workspace
 
 
 @click.command()
@@ -31,7 +33,7 @@ def command(name: str, as_json: bool) -> int:
 
     place = workspace()
     cases_here = reported_cases(place)
-    told = _others(cases_here, name)
+    told = [*_others(cases_here, name), *_left_out(place, cases_here, name)]
     try:
         found = find_claim(cases_here, name, unreported(place, cases_here))
     except Rejected:
@@ -71,6 +73,17 @@ def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]
             key = (title,) if title.startswith("the word ") else (case.system, title)
             found.setdefault(key, (case.system, title, lines))
     return list(found.values())
+
+
+def _left_out(place: Workspace, cases: Sequence[Case], name: str) -> Iterator[tuple[str, str, list[str]]]:
+    """As `_others`, of records that stand in the ledger alone."""
+    from avow.evidence.ledger import Ledger
+    from avow.report.identified import left_out
+
+    for case in cases:
+        with contextlib.suppress(OSError):  # what cannot be read has no record to show: `avow audit` says so
+            for title, lines in left_out(case, Ledger(place.ledger(case.system)).records(), name):
+                yield case.system, title, lines
 
 
 def _id(obligation: dict[str, str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from avow.assurance.argument import build_argument
 from avow.assurance.changes import baseline_of
@@ -42,9 +42,27 @@ def identified(case: Case, name: str) -> Iterator[Told]:
             yield f"the word {status.word}", [MEANINGS[status]]
 
 
-def _entries(case: Case) -> Iterator[Entry]:
+def entries(case: Case) -> Iterator[Entry]:
     yield from (item.entry for view in case.obligations for item in view.evidence)
     yield from case.orphans
+
+
+def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Told]:
+    """(heading, lines) of the ledger's records with that hash that the report does not quote: they stand in the ledger
+    alone."""
+    if _DIGEST.match(name):
+        kept = {entry.hash for entry in entries(case)}
+        for entry in records:
+            if entry.hash.startswith(name) and entry.hash not in kept:
+                heading, lines = of_record(entry)
+                yield (
+                    heading,
+                    [*lines, "left out of the report: what it says is of an earlier state, or said again since"],
+                )
+
+
+def of_record(entry: Entry) -> Told:
+    return f"record {entry.number + 1} of the ledger", [_line(entry), entry.evidence.summary]
 
 
 def _line(entry: Entry) -> str:
@@ -53,9 +71,7 @@ def _line(entry: Entry) -> str:
 
 
 def _of_digest(case: Case, name: str) -> Iterator[Told]:
-    for entry in _entries(case):
-        if entry.hash.startswith(name):
-            yield f"record {entry.number + 1} of the ledger", [_line(entry), entry.evidence.summary]
+    yield from (of_record(entry) for entry in entries(case) if entry.hash.startswith(name))
     for view in case.obligations:
         if view.obligation.digest.startswith(name):
             yield f"the meaning of {short(view.id)}", [view.obligation.formula or view.obligation.claim]
@@ -72,7 +88,7 @@ def _of_digest(case: Case, name: str) -> Iterator[Told]:
     if baseline_of(case).content.startswith(name):
         yield "what is signed", ["the digest of everything that this case claims (`avow sign`)"]
     paths = {path for path, mark in case.digests if mark.startswith(name)}
-    for entry in _entries(case):
+    for entry in entries(case):
         known = {**entry.evidence.inputs, **entry.evidence.outputs}
         paths |= {path for path, mark in known.items() if mark.startswith(name)}
     for path in sorted(paths):
@@ -103,14 +119,14 @@ def _of_files(case: Case, name: str) -> Iterator[Told]:
 
 def _read_by(case: Case, path: str) -> Iterator[str]:
     inside = path.rpartition("/contracts/")[2]
-    for how, entries in (
-        ("read", [e for e in _entries(case) if path in e.evidence.inputs or inside in e.evidence.inputs]),
-        ("left", [e for e in _entries(case) if path in e.evidence.outputs]),
+    for how, found in (
+        ("read", [e for e in entries(case) if path in e.evidence.inputs or inside in e.evidence.inputs]),
+        ("left", [e for e in entries(case) if path in e.evidence.outputs]),
     ):
-        for entry in entries[:RECORDS]:
+        for entry in found[:RECORDS]:
             yield f"{how} for {_line(entry)}"
-        if len(entries) > RECORDS:
-            yield f"{how} for {len(entries) - RECORDS} more records"
+        if len(found) > RECORDS:
+            yield f"{how} for {len(found) - RECORDS} more records"
 
 
 def _of_contract(case: Case, name: str) -> Iterator[Told]:

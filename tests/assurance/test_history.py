@@ -16,8 +16,9 @@ from avow.assurance.model import Case
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since
 from avow.evidence.ledger import Entry, Ledger
-from avow.evidence.record import Evidence
+from avow.evidence.record import CASE, Evidence
 from avow.evidence.status import weigh
+from avow.isolation.observed import OBSERVED
 from avow.pipeline.report_check import _ledger
 from avow.system.plan import System
 from avow.tuning.shown import OLDER_RECORDS
@@ -75,10 +76,39 @@ def test_what_can_count_every_refutation_and_the_newest_are_kept(seed: int) -> N
         record = entry.evidence
         asked = record.obligation, record.method
         digest = {o.id: o.digest for o in (G, H)}.get(record.obligation)
-        assert KEYS.get(asked) != record.key or record.obligation_digest != digest
-        assert not weigh(record).refuted
         newer = [e for e in entries[entry.number + 1 :] if (e.evidence.obligation, e.evidence.method) == asked]
+        current = KEYS.get(asked) == record.key and record.obligation_digest == digest
+        if weigh(record).refuted or current:
+            newer = [e for e in newer if e.evidence.verdict is record.verdict and e.evidence.key == record.key]
+            newer = [e for e in newer if e.evidence.obligation_digest == record.obligation_digest]
         assert sum(e.hash in kept for e in newer) >= OLDER_RECORDS
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_report_does_not_grow_with_runs_that_ask_the_same_again(verdict: Verdict) -> None:
+    def after(runs: int) -> Case:
+        return of([evidence(G, verdict, key="now", run=str(run), details={CASE: [1]}) for run in range(runs)])
+
+    few, many = after(3), after(40)
+    assert len(few.obligations[0].evidence) == len(many.obligations[0].evidence) == OLDER_RECORDS
+    assert many.history.left_out == 40 - OLDER_RECORDS
+    assert many.obligations[0].evidence[-1].entry.evidence.run == "39"
+
+
+@pytest.mark.parametrize(
+    "apart",
+    [{"observed": "another file"}, {"valid_until": "2031-01-01"}, {"certificate": {"key": "k"}}, {"retry": True}],
+)
+def test_of_records_that_may_not_count_together_none_is_left_out_for_another(apart: dict[str, object]) -> None:
+    records = [evidence(G, key="now", run=str(run)) for run in range(4)]
+    others = [replace(r, details=apart, run="x" + r.run) for r in records]
+    kept, _ = history(chain([*others, *records]), [G, H], KEYS)
+    assert len(kept) == 2 * OLDER_RECORDS
+
+
+def test_refutations_by_other_examples_are_all_kept() -> None:
+    records = [evidence(G, Verdict.REFUTED, key="now", details={CASE: [k]}) for k in range(9)]
+    assert len(history(chain(records), [G, H], KEYS)[0]) == 9
 
 
 def test_a_report_grows_with_the_claims_and_not_with_the_edits() -> None:
@@ -129,7 +159,7 @@ def test_the_count_and_the_runs_are_those_of_the_ledger(tmp_path: Path) -> None:
 
 def test_what_counts_no_more_since_a_file_changed_is_kept() -> None:
     """The file may be put back, and then it counts: the ledger alone decides what is kept."""
-    entries = chain([evidence(G, key="now") for _ in range(6)])
+    entries = chain([evidence(G, key="now", details={OBSERVED: str(k)}) for k in range(6)])
     as_of_now = [changed_since(entry) for entry in entries]
     assert len(history(entries, [G, H], KEYS)[0]) == 6
     found = build_case(subject(), [G, H], as_of_now, keys=KEYS, today=TODAY, run=RUN, recorded=entries)

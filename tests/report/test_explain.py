@@ -19,9 +19,11 @@ from avow.assurance.naming import short
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
 from avow.cli.ledgers import find_claim
+from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Kind
 from avow.report import formats
 from avow.report.explained import explained
+from avow.report.identified import left_out
 from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
 from report.test_answers_page import REPORTS
@@ -138,6 +140,19 @@ def test_every_mark_of_the_shipped_systems_reports_is_known(folder: Path) -> Non
     found = read_case(folder)
     made = {name: text for name, text in formats(found) if isinstance(text, str)}
     assert unexplained(found, made) == set()
+
+
+def test_a_record_that_the_report_leaves_out_is_found_in_the_ledger(tmp_path: Path) -> None:
+    target = guarantee("node", "a")
+    ledger = Ledger(tmp_path / "rover.jsonl")
+    entries = ledger.append_all([evidence(target, key=str(k), run=str(k)) for k in range(5)])
+    found = case(system({"node": ["a"]}), (target,), [e.evidence for e in entries])
+    assert found.history.left_out == 2
+    for entry in entries:
+        told = [*explained(found, entry.hash[:16]), *left_out(found, Ledger(ledger.path).records(), entry.hash[:16])]
+        assert [title for title, _ in told][:1] == [f"record {entry.number + 1} of the ledger"]
+        assert any("left out of the report" in line for _, lines in told for line in lines) == (entry.number < 2)
+    assert list(left_out(found, entries, "f" * 16)) == []
 
 
 def test_a_mark_that_is_nowhere_is_not_explained() -> None:
