@@ -112,11 +112,14 @@ class Shelf:
         """The value was worked out from the texts with that digest: so is what follows from it alone."""
         self._texts[id(value)] = (value, digest, stretch)
 
-    def recall(self, function: Remembered[[T], Any], value: T) -> None:
-        """Let the function know what it answered of that value in an earlier run, or will be asked in a later one."""
-        if id(value) in self._texts:
-            _, digest, stretch = self._texts[id(value)]
-            function.learn(self.answer(digest, stretch, lambda: function(value), function.name), value)
+    def recall(self, function: Remembered[[T], Any], value: T) -> bool:
+        """Let the function know what it answered of that value in an earlier run, or will be asked in a later one.
+        Whether the value was worked out from a text here."""
+        if id(value) not in self._texts:
+            return False
+        _, digest, stretch = self._texts[id(value)]
+        function.learn(self.answer(digest, stretch, lambda: function(value), function.name), value)
+        return True
 
     def keep(self) -> None:
         """Write down what was asked for, if there is anything new in it. What was not asked for is of earlier texts."""

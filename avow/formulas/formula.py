@@ -74,6 +74,7 @@ __all__ = [
     "disjunction",
     "free_variables",
     "has_nonlinear",
+    "meaning",
     "negation",
     "node_digest",
     "normalise",
@@ -207,12 +208,13 @@ def normalise(term: Term) -> Term:
 
 def digest(*terms: Term, sorts: Iterable[Sort] = ()) -> str:
     """SHA-256 of the meaning of some formulas (their order does not count) and of some sorts."""
-    keys = sorted(set(map(_meaning, terms)))
+    keys = sorted(set(map(meaning, terms)))
     return _hash("formulas", *keys, "sorts", *sorted({sort_digest(sort) for sort in sorts}))
 
 
 @by_identity(50_000)
-def _meaning(term: Term) -> str:
+def meaning(term: Term) -> str:
+    """SHA-256 of the meaning of one formula."""
     return run(_normal(term, {}, 0))[1]
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Span
+from avow.base.remembered import by_identity
 from avow.language.contract import Clause, Definition, Node
 from avow.language.printer import show_term
 from avow.language.sorts import FunctionSort
@@ -45,6 +46,7 @@ def expand(
     return put(definition.body, dict(zip(definition.parameters, given, strict=True)))
 
 
+@by_identity(20_000)
 def show_clause(clause: Clause, node: Node, style: StyleName = "unicode") -> str:
     """The clause's formula for people: what its text calls by the name of a definition has that name, and the
     definitions stand behind it."""

@@ -21,7 +21,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file, sha256
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
-from avow.base.remembered import by_identity
+from avow.base.remembered import Shelf, by_identity
 from avow.base.tools import package_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
 from avow.formulas.formula import digest, node_digest, sort_digest
@@ -316,11 +316,14 @@ class Catalogue:
         raise KeyError((node, method))
 
 
-def catalogue(system: System, offered: Offered = None) -> Catalogue:
-    """`offered`: as `method_work` has it. Raises Rejected for an unknown backend, and where the plan's formulas are
-    wrong."""
+def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = None) -> Catalogue:
+    """`offered`: as `method_work` has it. `shelf`: where it is kept what follows from the nodes' texts. Raises Rejected
+    for an unknown backend, and where the plan's formulas are wrong."""
     from avow.calculus.composition import composed
+    from avow.sanity.node_facts import recall
 
+    if shelf is not None:
+        recall(system.contract, shelf)
     composition = composed(system)
     texts = texts_digest(system)
     works = (
@@ -359,7 +362,9 @@ def _work(
 
 
 def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[str, str]:
-    return {o.id: sha256(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
+    """Of ``[id, digest, method, *parts]`` as JSON: what all have in common is written once."""
+    common = json.dumps([method, *parts])[1:]
+    return {o.id: sha256(f"{json.dumps([o.id, o.digest])[:-1]}, {common}") for o in obligations}
 
 
 def _files(tool: Backend, job: Job) -> str:

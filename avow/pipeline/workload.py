@@ -48,7 +48,7 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
     shelf = None if fresh else Shelf(folder, engine_digest())
     try:
         system = load_system(folder, shelf)
-        listed = catalogue(system, offered)
+        listed = catalogue(system, offered, shelf)
         if shelf is not None:
             shelf.keep()
     except Rejected as rejected:

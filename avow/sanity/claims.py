@@ -28,6 +28,7 @@ from enum import StrEnum
 from avow.base.diagnostics import Severity, Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port
@@ -81,6 +82,7 @@ class Claim:
         return str(self.about) if self.subject is None else f"{self.about}-{self.subject}"
 
 
+@by_identity(20_000)
 def claims(node: Node) -> tuple[Claim, ...]:
     """Every sanity claim of a node, in the order in which they are best read."""
     assumed, guaranteed = _names(node, node.assumptions), _names(node, node.guarantees)
@@ -121,6 +123,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
     return tuple(found)
 
 
+@by_identity(20_000)
 def node_key(node: Node) -> str:
     """SHA-256 of all that the answers depend on: clauses by name and meaning, ports by name and sort."""
     clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order means nothing
