@@ -54,6 +54,14 @@ def find_tool(
 
 
 @functools.cache
+def package_version(name: str) -> str:
+    """Of an installed distribution. Raises `importlib.metadata.PackageNotFoundError`."""
+    from importlib import metadata  # slow to import
+
+    return metadata.version(name)
+
+
+@functools.cache
 def package_digest(name: str) -> str:
     """SHA-256 of all files of an installed top-level package, byte code aside; empty where there is none. Nothing is
     imported. Kept, sealed, for as long as each file is the same by inode, size and times: libraries are large."""

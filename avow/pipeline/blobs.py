@@ -13,11 +13,12 @@ import dataclasses
 import enum
 import functools
 import json
+import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, cast, get_args, get_type_hints
 
 from avow.base.diagnostics import Span
 from avow.pipeline.slices import Slice
@@ -30,30 +31,34 @@ class Garbled(ValueError):  # noqa: N818 - it says what they are
     """Bytes that are not those of any value."""
 
 
-_ROW = json.JSONEncoder(sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+_quoted = json.encoder.encode_basestring
+_PLAINLY = {None: "null", True: "true", False: "false"}
+_PLAIN_KINDS = frozenset((str, bool, type(None)))
+"""Of what stands where it is used, and not in the table."""
 
 
 def encode(value: object, root: Path) -> bytes:
     """Raises TypeError for what is no data of Avow's. `root` is the system's folder."""
     table: dict[str, int] = {}
-    known: dict[int, Any] = {}
+    known: dict[int, str] = {}
     kept: list[object] = []
     """Of the parts that `known` knows by their number: alive, so that no other part gets it."""
-    stack: list[tuple[object, bool]] = [(value, False)]
+    stack: list[tuple[Any, Sequence[object] | None]] = [] if type(value) in _PLAIN_KINDS else [(value, None)]
     while stack:
-        current, ready = stack.pop()
-        if id(current) in known or _is_plain(current):
+        current, parts = stack.pop()
+        if id(current) in known:
             continue
-        if not ready:
-            stack.append((current, True))
-            stack.extend((child, False) for child in _children(current))
+        if parts is None:
+            kind: Any = type(current)
+            parts = _children(kind)(current)
+            stack.append((current, parts))
+            stack.extend([(part, None) for part in parts if type(part) not in _PLAIN_KINDS])
             continue
-        text = _ROW.encode(_entry(current, known, root))
-        known[id(current)] = table.setdefault(text, len(table))
+        text = _entry(current, [_reference(part, known) for part in parts], root)
+        known[id(current)] = str(table.setdefault(text, len(table)))
         kept.append(current)
-    head = json.dumps(_reference(value, known))
     rows = ",\n".join(table)
-    return f'{{"root":{head},"table":[\n{rows}\n]}}'.encode("utf-8", "surrogatepass")
+    return f'{{"root":{_reference(value, known)},"table":[\n{rows}\n]}}'.encode("utf-8", "surrogatepass")
 
 
 def decode(data: bytes, root: Path) -> Any:
@@ -70,57 +75,69 @@ def decode(data: bytes, root: Path) -> Any:
         raise Garbled(f"{type(error).__name__}: {error}") from error
 
 
-def _is_plain(value: object) -> bool:
-    return value is None or isinstance(value, bool) or type(value) is str
-
-
 @functools.cache
 def _fields(kind: Any) -> tuple[str, ...]:
     return tuple(f.name for f in dataclasses.fields(kind) if f.init and not _is_place(f.name))
+
+
+@functools.cache
+def _row(kind: Any) -> tuple[str, tuple[int, ...]]:
+    """How a row of the class is written, and which of its fields stand there, by name."""
+    names = _fields(kind)
+    order = sorted(range(len(names)), key=lambda at: names[at])
+    return f'{{"":"{kind.__name__}"' + "".join(f',"{names[at]}":%s' for at in order) + "}", tuple(order)
 
 
 def _is_place(name: str) -> bool:
     return name in ("span", "spans") or name.endswith("_span")
 
 
-def _children(value: Any) -> Iterable[object]:
-    kind: type = type(value)
-    if kind is _classes().get(kind.__name__):
-        return () if issubclass(kind, enum.Enum) else (getattr(value, name) for name in _fields(kind))
-    if kind in (Fraction, int, float) or isinstance(value, Path):
-        return ()
-    if isinstance(value, Mapping):
-        return (part for pair in value.items() for part in pair)
-    if isinstance(value, tuple | list):
-        return value
-    raise TypeError(f"{type(value).__name__} is no data of a work")
+@functools.cache
+def _children(kind: Any) -> Callable[[Any], Sequence[object]]:
+    """What gives the parts of a value of that class."""
+    known = kind is _classes().get(kind.__name__)
+    if known and not issubclass(kind, enum.Enum):
+        names = _fields(kind)
+        return operator.attrgetter(*names) if len(names) > 1 else lambda value: [getattr(value, n) for n in names]
+    if known or kind in (Fraction, int, float) or issubclass(kind, Path):
+        return lambda value: ()
+    if issubclass(kind, Mapping):
+        return lambda value: [part for pair in value.items() for part in pair]
+    if issubclass(kind, tuple | list):
+        return lambda value: cast(Sequence[object], value)
+    raise TypeError(f"{kind.__name__} is no data of a work")
 
 
-def _reference(value: object, known: Mapping[int, int]) -> Any:
-    return value if _is_plain(value) else known[id(value)]
+def _reference(value: Any, known: Mapping[int, str]) -> str:
+    """As JSON: the value itself where it is plain, else its place in the table."""
+    if type(value) is str:
+        return _quoted(value)
+    return known.get(id(value)) or _PLAINLY[value]
 
 
-def _entry(value: Any, known: Mapping[int, int], root: Path) -> Any:
+def _entry(value: Any, parts: list[str], root: Path) -> str:
+    """A row of the table; `parts` are the references to the value's children."""
     match value:
         case enum.Enum():
-            return ["e", type(value).__name__, value.value]
+            return f'["e",{_quoted(type(value).__name__)},{json.dumps(value.value, ensure_ascii=False)}]'
         case Fraction():
-            return ["q", str(value.numerator), str(value.denominator)]
+            return f'["q","{value.numerator}","{value.denominator}"]'
         case Path():
-            return ["p", Path(os.path.relpath(value, root)).as_posix()]
+            return f'["p",{_quoted(Path(os.path.relpath(value, root)).as_posix())}]'
         case int():
-            return ["i", str(value)]
+            return f'["i","{value}"]'
         case float():
-            return ["f", value.hex()]
+            return f'["f","{value.hex()}"]'
         case Mapping():
-            return ["m", *(_reference(part, known) for pair in value.items() for part in pair)]
+            return f'["m"{"".join([f",{part}" for part in parts])}]'
         case tuple():
-            return ["t", *(_reference(item, known) for item in value)]
+            return f'["t"{"".join([f",{part}" for part in parts])}]'
         case list():
-            return ["l", *(_reference(item, known) for item in value)]
+            return f'["l"{"".join([f",{part}" for part in parts])}]'
         case _:  # a dataclass
             kind: Any = type(value)
-            return {"": kind.__name__} | {n: _reference(getattr(value, n), known) for n in _fields(kind)}
+            row, order = _row(kind)
+            return row % tuple([parts[at] for at in order])
 
 
 def _value(reference: Any, made: list[Any]) -> Any:

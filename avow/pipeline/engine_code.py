@@ -36,12 +36,18 @@ _PACKAGE = Path(avow.__file__).parent
 @functools.cache
 def engine_digest() -> str:
     """Of the code behind the answers of the core's own engines."""
-    return _digest(tuple(_PACKAGE / room for room in _ROOMS))
+    return _digest(_of(_ROOMS))
 
 
 def backend_digest(tool: Backend) -> str:
     """Of the code behind a backend's answers: the core's, and its own package or module."""
-    return _digest((*(_PACKAGE / room for room in _ROOMS_OF_BACKENDS), *_own(tool)))
+    return _digest((*_of(_ROOMS_OF_BACKENDS), *_own(type(tool).__module__)))
+
+
+@functools.cache
+def reading_digest() -> str:
+    """Of the code behind what is kept of the nodes' texts: the core's, and that of this room."""
+    return _digest((*_of(_ROOMS), _PACKAGE / "pipeline"))
 
 
 TRUSTED = {
@@ -81,9 +87,14 @@ def trusted_parts() -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-def _own(tool: Backend) -> tuple[Path, ...]:
-    module = sys.modules.get(type(tool).__module__)
-    file = getattr(module, "__file__", None)
+@functools.cache
+def _of(rooms: tuple[str, ...]) -> tuple[Path, ...]:
+    return tuple(_PACKAGE / room for room in rooms)
+
+
+@functools.cache
+def _own(name: str) -> tuple[Path, ...]:
+    file = getattr(sys.modules.get(name), "__file__", None)
     if file is None:
         return ()
     path = Path(file)
@@ -94,9 +105,16 @@ def _own(tool: Backend) -> tuple[Path, ...]:
 def _digest(places: tuple[Path, ...]) -> str:
     total = hashlib.sha256()
     for place in places:
-        files = sorted(place.rglob("*")) if place.is_dir() else [place]
-        for file in files:
-            if "__pycache__" not in file.parts and file.is_file():
-                total.update(f"{file.relative_to(place.parent)}\0".encode())
-                total.update(hashlib.sha256(file.read_bytes()).digest())
+        for part in _parts(place):
+            total.update(part)
     return total.hexdigest()
+
+
+@functools.cache
+def _parts(place: Path) -> tuple[bytes, ...]:
+    """The names and digests of the files of a room, or of one file."""
+    found: list[bytes] = []
+    for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
+        if "__pycache__" not in file.parts and file.is_file():
+            found += [f"{file.relative_to(place.parent)}\0".encode(), hashlib.sha256(file.read_bytes()).digest()]
+    return tuple(found)

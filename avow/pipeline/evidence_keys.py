@@ -83,9 +83,9 @@ def method_options(method: Method) -> str:
     return json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str)
 
 
-def surroundings(tool: Backend, job: Job, options: str) -> str:
-    """As text; `options` are the method's, as they enter its key."""
-    named = Named.of(options, tool.files(job))
+def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | None = None) -> str:
+    """As text; `options` are the method's, as they enter its key; `files` are its files, where they are at hand."""
+    named = Named.of(options, tool.files(job) if files is None else files)
     constants = sorted([name, digest(value)] for name, value in named.constants(job.contract))
     definitions = named.definitions((*job.contract.definitions, *job.node.definitions))
     constants += sorted(

@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -15,7 +16,8 @@ from avow.base.files import is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
-from avow.pipeline.slices import MethodSlice
+from avow.language.contract import Node
+from avow.pipeline.slices import MethodSlice, whole_node
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
 from avow.tuning.running import SETTLED_NS
 
@@ -61,8 +63,26 @@ def key(work: Work) -> str:
     from avow.pipeline.blobs import encode
 
     assert work.shown is not None
-    cut = encode(work.shown(), work.system.plan.root.absolute())
-    return sha256(json.dumps([cut.decode("utf-8", "surrogatepass"), sorted(work.keys.items())]))
+    cut, root = work.shown(), work.system.plan.root.absolute()
+    assert isinstance(cut, MethodSlice)
+    given, node = work.system.contract.node(work.node), cut.system.contract.node(cut.node)
+    whole = whole_node(given)
+    if node == whole and node.definitions == whole.definitions:
+        said = whole_digest(given)
+        nodes = tuple(Node(n.name, (), (), (), (), ()) if n is node else n for n in cut.system.contract.nodes)
+        cut = replace(cut, system=replace(cut.system, contract=replace(cut.system.contract, nodes=nodes)))
+    else:
+        said = ""
+    told = [said, encode(cut, root).decode("utf-8", "surrogatepass"), sorted(work.keys.items())]
+    return sha256(json.dumps(told))
+
+
+@by_identity(20_000)
+def whole_digest(node: Node) -> str:
+    """SHA-256 of all that a method may be shown of the node."""
+    from avow.pipeline.blobs import encode
+
+    return sha256(encode(whole_node(node), Path()))
 
 
 def generated(work: Work) -> Mapping[str, str]:

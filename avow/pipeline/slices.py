@@ -6,13 +6,15 @@ slice: whoever receives one computes the keys from it again.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from avow.backend_kit.linked import beside, connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.variables import Frame
@@ -88,10 +90,13 @@ def compose_slice(system: System) -> ComposeSlice:
     return ComposeSlice(System(plan, replace(system.contract, files=())))
 
 
-def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodSlice:
-    """`sentences`: with those of the clauses, which no answer may depend on; generated files show them."""
+def method_slice(
+    tool: Backend, job: Job, files: Iterable[Path] | None = None, *, sentences: bool = False
+) -> MethodSlice:
+    """`files`: the method's, where they are at hand. `sentences`: with those of the clauses, which no answer may depend
+    on; generated files show them."""
     plan = job.system.plan
-    named = Named.of(method_options(job.method), tool.files(job))
+    named = Named.of(method_options(job.method), tool.files(job) if files is None else files)
     graph, own = dataflow(job.system), job.node.name
     upstream = upstream_of(tool, job)
     looks = connected(tool, job)
@@ -135,6 +140,17 @@ def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> 
     promised = (seen(c) for c in node.guarantees if c.name in taken | others)
     told = named.definitions(node.definitions)
     return replace(node, assumptions=tuple(map(seen, node.assumptions)), guarantees=tuple(promised), definitions=told)
+
+
+@by_identity(20_000)
+def whole_node(node: Node) -> Node:
+    """The node as a method that takes all of it on sees it, with its sentences."""
+    assumed, promised = (
+        tuple(replace(_bare_clause(clause), sentence=clause.sentence) for clause in part)
+        for part in (node.assumptions, node.guarantees)
+    )
+    told = tuple(replace(definition, text="") for definition in node.definitions)
+    return replace(node, assumptions=assumed, guarantees=promised, definitions=told)
 
 
 def _other(node: Node, upstream: Collection[str]) -> Node:

@@ -10,7 +10,6 @@ import functools
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +21,9 @@ from avow.base.files import digest_file, sha256
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
-from avow.base.tools import package_digest
+from avow.base.tools import package_digest, package_version
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
+from avow.formulas.finite import Ranges
 from avow.formulas.formula import digest, node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.definitions import show_clause
@@ -132,8 +132,16 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
         )
         for claim, digest in (*of_the_node, *of_its_providers)
     )
-    scenario = encode((cut.given, cut.ranges), Path()).decode()
+    scenario = encode((cut.given, cut.ranges), Path()).decode() if cut.given or cut.ranges != Ranges() else _no_values()
     return obligations, _keys(obligations, SANITY, engine_identity(), scenario)
+
+
+@functools.cache
+def _no_values() -> str:
+    """What a scenario says of a node to whose inputs it gives none."""
+    from avow.pipeline.blobs import encode
+
+    return encode(({}, Ranges()), Path()).decode()
 
 
 def compose_work(composition: Composition) -> Work:
@@ -163,15 +171,15 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
     tool = method_backend(system, method)
     job = method_job(system, node, method)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
-    told, tools = method_options(method), tool_identities(tool, offered)
+    told, tools, files = method_options(method), tool_identities(tool, offered), tool.files(job)
     parts = (
         tool.name,
         tool.version,
         backend_digest(tool),
         json.dumps(tools),
         told,
-        _files(tool, job),
-        surroundings(tool, job, told),
+        _files(files),
+        surroundings(tool, job, told, files),
         *_compared(system, job),
     )
     work = _work(
@@ -182,9 +190,9 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         *parts,
         engine=tool.name,
         limits=_limits(method, options),
-        cut=lambda: method_slice(tool, job),
-        shown=lambda: method_slice(tool, job, sentences=True),
-        files=tool.files(job),
+        cut=lambda: method_slice(tool, job, files),
+        shown=lambda: method_slice(tool, job, files, sentences=True),
+        files=files,
     )
     return replace(work, tools=tools)
 
@@ -199,7 +207,14 @@ def _compared(system: System, job: Job) -> tuple[str, ...]:
             continue
         other = replace(job, method=method, obligations=(), claims=())
         found.append(
-            [method.id, tool.name, tool.version, backend_digest(tool), method_options(method), _files(tool, other)]
+            [
+                method.id,
+                tool.name,
+                tool.version,
+                backend_digest(tool),
+                method_options(method),
+                _files(tool.files(other)),
+            ]
         )
     return (json.dumps(found),) if found else ()
 
@@ -367,8 +382,8 @@ def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[s
     return {o.id: sha256(f"{json.dumps([o.id, o.digest])[:-1]}, {common}") for o in obligations}
 
 
-def _files(tool: Backend, job: Job) -> str:
-    return json.dumps([[path.name, _digest(path)] for path in tool.files(job)])
+def _files(paths: Iterable[Path]) -> str:
+    return json.dumps([[path.name, _digest(path)] for path in paths])
 
 
 def texts_digest(system: System) -> str:
@@ -401,4 +416,4 @@ def _scenario(system: System) -> str:
 def engine_identity() -> str:
     """The core's engines with their solver, in every key of theirs."""
     # importing z3 to ask it would cost more than all the rest of a run with nothing to do
-    return f"avow {engine_digest()}, z3 {metadata.version('z3-solver')} {package_digest('z3')}"
+    return f"avow {engine_digest()}, z3 {package_version('z3-solver')} {package_digest('z3')}"

@@ -15,7 +15,8 @@ from avow.base.files import digest_file, sha256, write
 from avow.base.remembered import Shelf, by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
-from avow.pipeline.engine_code import engine_digest
+from avow.pipeline.engine_code import reading_digest
+from avow.pipeline.export import whole_digest
 from avow.pipeline.work import Catalogue, Offered, Work, catalogue
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -45,11 +46,13 @@ class Survey:
 def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey | Rejected:
     """A system that cannot be read is a value here: it must not keep the others from being verified. `offered`: as
     `method_work` has it. `fresh`: without what an earlier run found out of the nodes' texts."""
-    shelf = None if fresh else Shelf(folder, engine_digest())
+    shelf = None if fresh else Shelf(folder, reading_digest())
     try:
         system = load_system(folder, shelf)
         listed = catalogue(system, offered, shelf)
         if shelf is not None:
+            for node in system.contract.nodes:
+                shelf.recall(whole_digest, node)
             shelf.keep()
     except Rejected as rejected:
         from avow.pipeline.check import of_rest

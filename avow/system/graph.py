@@ -15,6 +15,7 @@ from dataclasses import field, replace
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import components, cycles_in
 from avow.base.records import dataclass
+from avow.base.remembered import by_identity
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System
@@ -85,6 +86,7 @@ class Graph:
         return tuple(dict.fromkeys(found))
 
 
+@by_identity(8)
 def dataflow(system: System) -> Graph:
     """The graph of a system. Never raises: what is wrong with it stands in `findings`."""
     nodes = system.contract.nodes

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tools import package_version
 from avow.base.verdict import Link, Verdict
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Node
@@ -76,7 +76,7 @@ class Hoare(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
+        return (Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
 
     def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
         from .model import answering

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tools import package_version
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import ProgramClaim
 
@@ -44,7 +44,7 @@ class PythonBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
+        return (Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .reading import load
