@@ -17,6 +17,7 @@ import operator
 import os
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
@@ -31,7 +32,6 @@ class Garbled(ValueError):  # noqa: N818 - it says what they are
     """Bytes that are not those of any value."""
 
 
-_quoted = json.encoder.encode_basestring
 _PLAINLY = {None: "null", True: "true", False: "false"}
 _PLAIN_KINDS = frozenset((str, bool, type(None)))
 """Of what stands where it is used, and not in the table."""
@@ -111,7 +111,7 @@ def _children(kind: Any) -> Callable[[Any], Sequence[object]]:
 def _reference(value: Any, known: Mapping[int, str]) -> str:
     """As JSON: the value itself where it is plain, else its place in the table."""
     if type(value) is str:
-        return _quoted(value)
+        return encode_basestring(value)
     return known.get(id(value)) or _PLAINLY[value]
 
 
@@ -119,11 +119,11 @@ def _entry(value: Any, parts: list[str], root: Path) -> str:
     """A row of the table; `parts` are the references to the value's children."""
     match value:
         case enum.Enum():
-            return f'["e",{_quoted(type(value).__name__)},{json.dumps(value.value, ensure_ascii=False)}]'
+            return f'["e",{encode_basestring(type(value).__name__)},{json.dumps(value.value, ensure_ascii=False)}]'
         case Fraction():
             return f'["q","{value.numerator}","{value.denominator}"]'
         case Path():
-            return f'["p",{_quoted(Path(os.path.relpath(value, root)).as_posix())}]'
+            return f'["p",{encode_basestring(Path(os.path.relpath(value, root)).as_posix())}]'
         case int():
             return f'["i","{value}"]'
         case float():

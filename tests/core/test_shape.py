@@ -17,6 +17,7 @@ PIPELINE = ROOT / "avow" / "pipeline"
 STAYS = {
     "work.engine_identity": "of the code that runs in this process",
     "engine_code.engine_digest": "of the code that runs in this process",
+    "work._no_values": "of the code that runs in this process",
     "engine_code.reading_digest": "of the code that runs in this process",
     "engine_code.trusted_parts": "of the code that runs in this process",
     "blobs._classes": "of the code that runs in this process",
