@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 
 from avow.backend_kit.protocol import Backend, lacks
+from avow.base import process
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -89,20 +90,14 @@ def _offered(plugins: tuple[str, ...]) -> Iterator[Backend]:
             yield backend(name, plugins)
 
 
-_trusted: list[bool] = []
-"""Not empty: this process may import what a plan names under ``plugins``. Of the process, as imports are: what one run
-imported is there for all."""
-
-
 def trust_plugins() -> None:
     """From now on this process imports a plan's plug-ins: said by what runs a workspace's code anyway."""
-    if not _trusted:
-        _trusted.append(True)
+    process.here.trusts_plugins = True
 
 
 def _plugins(modules: Iterable[str]) -> tuple[Backend, ...]:
     modules = tuple(modules)
-    if modules and not _trusted:
+    if modules and not process.here.trusts_plugins:
         raise Rejected(
             Diagnostic(
                 "BACKEND005",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,17 @@ from avow.base.files import digest_file, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 
 
-def lark_of(grammar: Path, name: str, **options: Any) -> Any:
-    """Lark's parser of a grammar's file. `name`: with which that of the file in which its tables are kept begins."""
+@functools.cache
+def lark_of(
+    grammar: Path, name: str, start: tuple[str, ...], build: Callable[[], object] | None = None, **options: Any
+) -> Any:
+    """Lark's LALR parser of a grammar's file, made once. `name`: with which that of the file in which its tables are
+    kept begins. `build` makes what is called for each rule."""
     from lark import Lark
 
+    options |= {"parser": "lalr", "start": list(start), "lexer": options.get("lexer", "basic")}
+    if build is not None:
+        options["transformer"] = build()
     text = grammar.read_text("utf-8")
     cache = _cache_file(f"{name}-{sha256(text)[:12]}")  # two versions on one machine keep their own
     if cache is None:

@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from avow.tuning.sizes import OUTPUT_KEPT
@@ -26,9 +26,21 @@ _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -sig
 """How a tool ends that somebody ended: a person, or a system out of memory or room. A crash of its own is none of
 them."""
 
-_running: set[int] = set()
-_ended_by_others = threading.Event()
-_lock = threading.Lock()
+
+@dataclass(slots=True)
+class _Process:
+    """What this process started, was told and may do: of it, and not of a run, as its imports are."""
+
+    running: set[int] = field(default_factory=set)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    ended_by_others: bool = False
+    adopted_since: frozenset[int] | None = None
+    """The children that it had when it began to adopt orphans; None before."""
+    trusts_plugins: bool = False
+    """It may import what a plan names under ``plugins``."""
+
+
+here = _Process()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,30 +107,30 @@ def ended_with(code: int | None) -> None:
     """A program that this process ran ended so; where that was somebody else's doing, `ended_by_others` says so. A
     program that runs another one tells of that one's signal by a code above 128."""
     if code is not None and (128 - code if code > 128 else code) in _FROM_OUTSIDE:
-        _ended_by_others.set()
+        here.ended_by_others = True
 
 
 def ended_by_others() -> bool:
     """Was a tool that this process ran ended by somebody else? Then its failure says nothing of what it was given."""
-    return _ended_by_others.is_set()
+    return here.ended_by_others
 
 
 def watch(pid: int) -> None:
     """`kill_all` is to kill this process too, with its descendants."""
-    with _lock:
-        _running.add(pid)
+    with here.lock:
+        here.running.add(pid)
 
 
 def unwatch(pid: int) -> None:
     """It has ended and was waited for: its number may be another's now."""
-    with _lock:
-        _running.discard(pid)
+    with here.lock:
+        here.running.discard(pid)
 
 
 def kill_all() -> None:
     """Kill every tool under way: called when Avow is interrupted."""
-    with _lock:
-        pids = tuple(_running)
+    with here.lock:
+        pids = tuple(here.running)
     for pid in pids:
         kill_tree(pid)
 
@@ -158,46 +170,41 @@ def _parents() -> dict[int, list[int]]:
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 _PR_SET_CHILD_SUBREAPER = 36
-_libc = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
+_LIBC = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 
 
 def die_with(parent: int) -> None:
     """Said by a new process: it must not outlive `parent`, which started it, however that dies."""
-    if _libc is not None:
-        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if _LIBC is not None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # it died before that was said
             os._exit(1)
-
-
-_adopted_since: list[frozenset[int]] = []
-"""The children that this process had when it began to adopt orphans; empty before."""
 
 
 def adopt_orphans() -> None:
     """From now on, what a descendant leaves running becomes our child, whatever session or group it moved to; and
     where the system can hide our memory and descriptors from our own user, it does. Only on Linux."""
-    if _libc is None or _adopted_since:
+    if _LIBC is None or here.adopted_since is not None:
         return
-    _libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    _libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-    _adopted_since.append(frozenset(_children(os.getpid())))
+    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    _LIBC.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    here.adopted_since = frozenset(_children(os.getpid()))
 
 
 def forget_orphans() -> None:
     """In a fork: what the process that it is a fork of adopts, runs and was told is not this one's."""
-    _adopted_since.clear()
-    _running.clear()
-    _ended_by_others.clear()
+    here.adopted_since, here.ended_by_others = None, False
+    here.running.clear()
 
 
 def end_orphans() -> bool:
     """Kill all that became our child unasked, until nothing is left; whether there was any. See `adopt_orphans`."""
-    if not _adopted_since:
+    if here.adopted_since is None:
         return False
     found = False
     for _ in range(1000):  # what is killed may leave children of its own, which become ours
-        with _lock:
-            expected = _adopted_since[0] | _running
+        with here.lock:
+            expected = here.adopted_since | here.running
         orphans = [pid for pid in _children(os.getpid()) if pid not in expected]
         if not orphans:
             return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,8 @@ from typing import Any, TypeVar
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput, UnexpectedToken
+
+from avow.base.grammars import lark_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,10 +181,10 @@ def _without_commas(text: str) -> str:
     return re.sub(r"\.(\s*)\Z", r" \1", "".join(out))
 
 
-@functools.cache
 def _lark() -> Lark:
-    grammar = (Path(__file__).parent / "fretish.lark").read_text("utf-8")
-    return Lark(grammar, parser="lalr", lexer="basic", start=["sentence", "expression"], maybe_placeholders=False)
+    grammar, starts = Path(__file__).with_name("fretish.lark"), ("sentence", "expression")
+    found: Lark = lark_of(grammar, "fretish", starts, maybe_placeholders=False)
+    return found
 
 
 def _sentence(tree: Any) -> Sentence:

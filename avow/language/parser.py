@@ -213,17 +213,8 @@ def _accepted(start: str, tokens: Iterable[Token], bad: Token) -> frozenset[str]
     return frozenset(machine.accepts())
 
 
-@functools.cache
 def _lark() -> Any:
-    return lark_of(
-        Path(__file__).with_name("grammar.lark"),
-        "rcl",
-        parser="lalr",
-        lexer="basic",
-        start=list(STARTS),
-        maybe_placeholders=False,
-        transformer=_Build(),
-    )
+    return lark_of(Path(__file__).with_name("grammar.lark"), "rcl", STARTS, _Build, maybe_placeholders=False)
 
 
 def _deepest(parts: Iterable[Any]) -> int:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import functools
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
 from avow.language.contract import Contract
 from avow.lsp.completion import Offer
+from avow.system.schema import plan_schema
 
 _KEY = re.compile(r"^(?P<indent> *)(?P<dashes>(?:- +)*)(?P<key>[A-Za-z_][\w.]*)\s*:(?P<rest>.*)$")
 _TYPING = re.compile(r"^ *(?:- +)*[\w.]*$")
@@ -70,15 +68,9 @@ def _path(lines: Sequence[str], indent: int) -> tuple[str, ...]:
     return tuple(reversed(found))
 
 
-@functools.cache
-def _schema() -> dict[str, Any]:
-    loaded: dict[str, Any] = json.loads((files("avow.system") / "plan.schema.json").read_text("utf-8"))
-    return loaded
-
-
 def _keys(path: Sequence[str]) -> Iterator[tuple[str, str]]:
     """The keys that the schema has at a path, with what they are."""
-    here = [_schema()]
+    here = [plan_schema()]
     for key in path:
         here = [inner for schema in here for inner in _under(schema, key)]
     for schema in here:
@@ -95,7 +87,7 @@ def _under(schema: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
 def _resolved(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The schema, or what it refers to, or chooses among, or lists."""
     if "$ref" in schema:
-        yield from _resolved(_schema()["$defs"][schema["$ref"].rsplit("/", 1)[-1]])
+        yield from _resolved(plan_schema()["$defs"][schema["$ref"].rsplit("/", 1)[-1]])
         return
     for inner in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
         yield from _resolved(inner)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -12,6 +11,7 @@ from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, 
 from lark.exceptions import VisitError
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.grammars import lark_of
 
 from .syntax import (
     CONS,
@@ -101,17 +101,10 @@ def parse_system(text: str, file: str) -> tuple[Program, ...]:
     return agents
 
 
-@functools.cache
 def _grammar() -> Lark:
-    text = Path(__file__).with_name("gwendolen.lark").read_text(encoding="utf-8")
-    return Lark(
-        text,
-        start=["start", "struct"],
-        parser="lalr",
-        lexer="contextual",
-        propagate_positions=True,
-        maybe_placeholders=True,
-    )
+    grammar, starts = Path(__file__).with_name("gwendolen.lark"), ("start", "struct")
+    found: Lark = lark_of(grammar, "gwendolen", starts, lexer="contextual", propagate_positions=True)
+    return found
 
 
 def _at(file: str, line: int, column: int, width: int = 1) -> Span:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from fractions import Fraction
@@ -135,17 +134,9 @@ _KEYWORDS = frozenset(
 )
 
 
-@functools.cache
 def _lark() -> Any:
-    return lark_of(
-        Path(__file__).with_name("imp.lark"),
-        "imp",
-        parser="lalr",
-        lexer="basic",
-        start=["program", "expression"],
-        propagate_positions=True,
-        maybe_placeholders=True,
-    )
+    starts = ("program", "expression")
+    return lark_of(Path(__file__).with_name("imp.lark"), "imp", starts, propagate_positions=True)
 
 
 def _too_deep(root: Any) -> Span | None:

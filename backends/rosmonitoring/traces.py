@@ -35,13 +35,13 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-_decoder = json.JSONDecoder(parse_float=Decimal, object_pairs_hook=_once)
+_DECODER = json.JSONDecoder(parse_float=Decimal, object_pairs_hook=_once)
 
 
 def parse_event(text: str) -> Event:
     """One JSON object. Raises ValueError saying what is wrong and, if it is the JSON, with the column."""
     try:
-        found = _decoder.decode(text)
+        found = _DECODER.decode(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     if not isinstance(found, dict):

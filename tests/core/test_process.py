@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -81,12 +80,12 @@ def test_environment_is_added_to() -> None:
     ("signal_name", "by_others"), [("SIGKILL", True), ("SIGTERM", True), ("SIGSEGV", False), ("SIGABRT", False)]
 )
 def test_who_ended_a_tool_is_known(monkeypatch: pytest.MonkeyPatch, signal_name: str, by_others: bool) -> None:
-    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    monkeypatch.setattr(process.here, "ended_by_others", False)
     process.run([sys.executable, "-c", f"import os, signal; os.kill(os.getpid(), signal.{signal_name})"])
     assert process.ended_by_others() is by_others
 
 
 def test_what_we_end_ourselves_was_not_ended_by_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    monkeypatch.setattr(process.here, "ended_by_others", False)
     assert process.run([sys.executable, "-c", "import time; time.sleep(60)"], seconds=0.2).timed_out
     assert not process.ended_by_others()

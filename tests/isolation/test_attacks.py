@@ -245,7 +245,7 @@ def test_a_subject_that_somebody_else_ends_is_asked_again(
 ) -> None:
     """A kill says nothing of what was given: the next run must not be content with it."""
     monkeypatch.setenv(SANDBOX, level)
-    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    monkeypatch.setattr(process.here, "ended_by_others", False)
     (tmp_path / "s.py").write_text("import time\ndef step():\n    time.sleep(60)\n")
     subject = SubjectProcess(tmp_path / "s.py", "step", 30.0)
 
@@ -266,7 +266,7 @@ def test_a_subject_that_somebody_else_ends_is_asked_again(
 def test_a_judge_tells_that_its_subject_was_ended(
     tmp_path: Path, killed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    monkeypatch.setattr(process.here, "ended_by_others", False)
     code = -signal.SIGKILL if killed else 0
     (tmp_path / "j.py").write_text(
         "import sys\nfrom avow.base import process\nfrom avow.isolation import judge\n"
@@ -282,7 +282,7 @@ def test_what_was_killed_from_outside_says_so_and_what_ended_itself_does_not(
 ) -> None:
     path = tmp_path / "s.py"
     for killed, text in ((True, "def step(x): return {}"), (False, "raise SystemExit")):
-        monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+        monkeypatch.setattr(process.here, "ended_by_others", False)
         path.write_text(text)
         subject = SubjectProcess(path, "step", 60.0)
         try:

@@ -10,6 +10,8 @@ from typing import Any
 
 import lark
 
+from avow.base.grammars import lark_of
+
 from .syntax import KEYWORDS
 
 PREDECLARED = frozenset(("any", "none"))
@@ -38,17 +40,12 @@ class Malformed(Exception):  # noqa: N818 - it is what the text is
     """The text is no RML that our writer may write; the message says where and why."""
 
 
-@functools.cache
-def _parser() -> lark.Lark:
-    text = Path(__file__).with_name("rml.lark").read_text(encoding="utf-8")
-    return lark.Lark(text, parser="lalr", propagate_positions=False, maybe_placeholders=False)
-
-
 @functools.lru_cache(maxsize=8)
 def read(text: str) -> Parsed:
     """Parse and check names; the result is shared and not to be changed. Raises Malformed."""
+    grammar = Path(__file__).with_name("rml.lark")
     try:
-        tree = _parser().parse(text)
+        tree = lark_of(grammar, "rml", ("start",), lexer="contextual", maybe_placeholders=False).parse(text)
     except lark.exceptions.UnexpectedInput as error:
         raise Malformed(f"line {error.line}, column {error.column}: {type(error).__name__}") from None
     found = Parsed()
