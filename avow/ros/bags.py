@@ -75,6 +75,14 @@ def enveloped(message: Mapping[str, Any], topic: str, time: float, by: str = "")
     return event
 
 
+def fields_of(event: Event) -> dict[str, Any]:
+    """The fields of an event's message."""
+    whole = event.get(WHOLE)
+    if isinstance(whole, Mapping):
+        return {**whole}
+    return {name: value for name, value in event.items() if name not in (*ENVELOPE, PUBLISHER, LIVE)}
+
+
 def publisher(event: Event) -> str:
     """Who published an event's message; empty where that is not known."""
     said = event.get(PUBLISHER, "")

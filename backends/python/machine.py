@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, MutableMapping
+import operator as operators
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -125,21 +126,11 @@ def _value(expression: Expr, values: MutableMapping[str, Any]) -> Any:
             return not _value(body, values)
         case Binary(operator=operator, left=left, right=right):
             one, other = _value(left, values), _value(right, values)
-            match operator:
-                case "+":
-                    return one + other
-                case "-":
-                    return one - other
-                case "*":
-                    return one * other
-                case "//":
-                    return one // other
-                case "%":
-                    return one % other
-                case _:  # a quotient
-                    return Fraction(one) / other if _EXACT in values else one / other
+            if operator == "/" and _EXACT in values:
+                return Fraction(one) / other
+            return _OPERATORS[operator](one, other)
         case Comparison(operator=operator, left=left, right=right):
-            return _compared(operator, _value(left, values), _value(right, values))
+            return bool(_OPERATORS[operator](_value(left, values), _value(right, values)))
         case Junction(operator="and", items=items):
             return all(_value(item, values) for item in items)
         case Junction(items=items):
@@ -166,20 +157,11 @@ def fraction(value: Any) -> Any:
     return Fraction(value) if isinstance(value, float) else value
 
 
-def _compared(operator: str, one: Any, other: Any) -> bool:
-    match operator:
-        case "<":
-            return bool(one < other)
-        case "<=":
-            return bool(one <= other)
-        case ">":
-            return bool(one > other)
-        case ">=":
-            return bool(one >= other)
-        case "==":
-            return bool(one == other)
-        case _:  # other than
-            return bool(one != other)
+_OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+    "+": operators.add, "-": operators.sub, "*": operators.mul, "/": operators.truediv, "//": operators.floordiv,
+    "%": operators.mod, "<": operators.lt, "<=": operators.le, ">": operators.gt, ">=": operators.ge,
+    "==": operators.eq, "!=": operators.ne,
+}  # fmt: skip
 
 
 __all__ = ["Answer", "Failed", "evaluate", "fraction", "run", "run_block"]

@@ -268,7 +268,7 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
 def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> _Run:
     """What a trace shows of the first monitor's node."""
     from .options import origin
-    from .session import Session, judge
+    from .session import Session
     from .told import readable
     from .traces import digest_trace
 
@@ -280,15 +280,13 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
         return run
     try:
         run.digest = digest_trace(path)
-        where = origin(job.system)
-        if wrong := readable(monitor.setup, path, where):
+        if wrong := readable(monitor.setup, path, origin(job.system)):
             raise Rejected(*wrong)
-        for _, found in judge(monitors, path, where, whole.told, whole.heard):
+        for _, found in whole.judged(path):
             run.note(found)
             if time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
-        run.note(whole.finish())
     except Rejected as error:
         lacking = [d for d in error.diagnostics if d.code == "MON202"]
         run.missing = "; ".join(f"{name}: {d.message}; install it with: {d.hint}" for d in lacking)

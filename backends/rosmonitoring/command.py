@@ -195,7 +195,7 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling
     from .session import session
 
     running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
-    return _told(running, _violations(running, trace, telling.mcap is None), trace, telling)
+    return _told(running, _violations(running, trace), trace, telling)
 
 
 def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Telling) -> int:
@@ -269,32 +269,9 @@ def _write(path: Path, text: str) -> None:
         raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
 
 
-def _violations(running: Session, trace: str, fast: bool) -> Iterator[tuple[int, Violation]]:
-    """With the line of the event at which each was found; the last line's where it took the whole run. `fast`: only
-    what was found is asked for, not each judgement."""
-    if trace != "-":
-        yield from running.run(Path(trace)) if fast else running.one_by_one(Path(trace))
-        return
-    if fast:
-        yield from running.read(cast(io.BufferedReader, sys.stdin.buffer).read1, "<stdin>")
-        return
-    from avow.base.diagnostics import Diagnostic, Rejected
-
-    from .traces import read_lines
-
-    def lines() -> Iterator[str]:
-        try:
-            yield from io.TextIOWrapper(sys.stdin.buffer, encoding="utf-8", newline="\n")
-        except UnicodeDecodeError:
-            raise Rejected(Diagnostic("MON204", "standard input is not UTF-8 text")) from None
-
-    line = 0
-    for recorded in read_lines(lines(), "<stdin>"):
-        line = recorded.line
-        for violation in running.step(recorded.event):
-            yield line, violation
-    for violation in running.finish():
-        yield line, violation
+def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:
+    """With the line of the event at which each was found; the last line's where it took the whole run."""
+    return running.run(Path(trace)) if trace != "-" else running.read(cast(io.BufferedReader, sys.stdin.buffer).read1)
 
 
 def _anything_judged(running: Session) -> bool:

@@ -134,12 +134,14 @@ def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
 
 def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run) -> Iterator[str]:
     """Topic by topic the first publication that is not as recorded."""
+    from avow.ros.bags import fields_of
+
     for topic in sorted(run.spoken):
         said = [event for event in run.said if event.topic == topic]
         before = [raw for event, raw in recorded if event.topic == topic]
         for number, (event, raw) in enumerate(zip(said, before, strict=False), start=1):
             if not found.said_as(topic, event.data, raw):
-                there = json.dumps({k: v for k, v in raw.items() if k not in ("topic", "time")}, default=str)
+                there = json.dumps(fields_of(raw), default=str)
                 here = next(_lines(found, (event,)))
                 yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
                 break

@@ -21,9 +21,13 @@ def method_of(system: System, node: str) -> Located | None:
     return next((m.options for m in system.plan.node(node).methods if m.backend == NAME), None)
 
 
+def said(options: Located | None) -> Mapping[str, Any]:
+    """What a method's options say; nothing of a method that is not there."""
+    return options.data if options is not None and isinstance(options.data, Mapping) else {}
+
+
 def mapping_of(options: Located | None) -> Mapping[str, Any]:
-    data = options.data if options is not None else None
-    found = data.get("mapping") if isinstance(data, Mapping) else None
+    found = said(options).get("mapping")
     return found if isinstance(found, Mapping) else {}
 
 

@@ -48,6 +48,11 @@ class Telling(Monitor):
         self._now = Fraction(0)
         Monitor.__post_init__(self)
 
+    @property
+    def by_values(self) -> bool:
+        """No event is passed over: each judgement is told."""
+        return False
+
     def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
         self._now = time_of(event)
         return Monitor.step(self, event, place)

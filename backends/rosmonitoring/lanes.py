@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,19 +18,18 @@ from avow.backend_kit.timeline import (
     joined_stretches,
     runs,
 )
-from avow.base.diagnostics import Diagnostic, Rejected
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort
 from avow.tuning.shown import TIMELINE_PORTS
 
-from .bags import Origin, is_bag
+from .bags import Origin
 from .judged import as_float
 from .options import Setup, same_topic
 from .reading import Reader, reader
 from .rules import Choice, Fields, heard_through
-from .traces import Recorded, not_text, read_lines, read_trace
+from .traces import read_trace
 from .tuning import TIMELINE_EVENTS, WORD_LENGTH
 from .watched import Fault, Violation, time_text
 from .wires import MappingError
@@ -90,7 +89,9 @@ def signals(
                 readers.setdefault(same_topic(rule.topic), []).append(one)
     found: dict[tuple[str, str], Columns[Stretch]] = {}
     start = end = ""
-    for index, recorded in _sampled(path, where, every, marks.events(), listens):
+    marked = marks.events()
+    for recorded in read_trace(path, where, listens, lambda index: _chosen(index, every) or index in marked):
+        index = recorded.index
         if index > events:
             break
         end = time_text(recorded.event.get("time"))
@@ -141,35 +142,6 @@ def _said(value: Value, sort: Sort, at: int) -> Stretch:
         return Band(at, at, number, number)
     text = show(value)
     return Word(at, at, text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…")
-
-
-def _sampled(
-    path: Path, where: Origin, every: int, marked: Set[int], listens: Callable[[str], bool]
-) -> Iterator[tuple[int, Recorded]]:
-    """About one event in so many, and those that are marked, each with its number among all."""
-    if is_bag(path):
-        for recorded in read_trace(path, where, listens):
-            if _chosen(recorded.index, every) or recorded.index in marked:
-                yield recorded.index, recorded
-        return
-    index = 0
-
-    def lines(file: Iterable[str]) -> Iterator[str]:
-        nonlocal index
-        for line in file:
-            if line and not line.isspace():
-                index += 1
-                if _chosen(index, every) or index in marked:
-                    yield line
-
-    try:
-        with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
-            for recorded in read_lines(lines(file), str(path)):
-                yield index, recorded
-    except UnicodeDecodeError:
-        raise not_text(str(path)) from None
-    except OSError as error:
-        raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
 
 
 def _chosen(index: int, every: int) -> bool:

@@ -28,7 +28,7 @@ from avow.system.schema import suggest
 from . import observing
 from .bags import Event, Origin, carried, is_bag
 from .clocks import By
-from .ends import mapping_of, method_of, published, show_entry, sources, written_out
+from .ends import mapping_of, method_of, published, said, show_entry, sources, written_out
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
@@ -114,7 +114,7 @@ def setup(
         work.port(port)
     work.shared_fields()
     filtered = work.filtered()
-    data = options.data if options is not None and isinstance(options.data, Mapping) else {}
+    data = said(options)
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
         node,
@@ -165,8 +165,7 @@ def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tu
 
 def traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
     """The traces that a method names and that are there."""
-    data = options.data if options is not None and isinstance(options.data, Mapping) else {}
-    named = data.get("traces")
+    named = said(options).get("traces")
     paths = (inside(system.plan.root, n) for n in named if isinstance(n, str)) if isinstance(named, list) else ()
     return tuple(path for path in paths if path is not None and path.exists())
 
@@ -257,8 +256,7 @@ class _Work:
 
     def filtered(self) -> frozenset[str]:
         """The topics of the outputs that are filtered: messages have to carry these."""
-        data = self.options.data if self.options is not None and isinstance(self.options.data, Mapping) else {}
-        names = data.get("filter", ())
+        names = said(self.options).get("filter", ())
         outputs = [n for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)]
         for at, name in enumerate(names):
             if self.options is not None and name not in outputs:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from avow.ros.definitions import Definitions
 from avow.system.plan import System
 from avow.system.schema import suggest
 
-from .bags import Origin, is_bag, messages
+from .bags import is_bag, messages
 from .blame import Blame
 from .compiled.monitors import Compiled
 from .coverage import Tally
@@ -23,7 +23,6 @@ from .engine import Monitor
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
 from .told import readable
-from .traces import read_trace
 from .watched import Fault, Violation
 
 
@@ -90,29 +89,25 @@ class Session:
         if topic and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + count
 
-    def one_by_one(self, path: Path) -> Iterator[tuple[int, Violation]]:
-        """As `run`, by the engine alone: no event is passed over as being like another."""
-        line = 0
-        for recorded in read_trace(path, origin(self.system), self.listens):
-            line = recorded.line
-            for violation in self.step(recorded.event):
-                yield line, violation
-        for violation in self.finish():
-            yield line, violation
-
     def run(self, path: Path) -> Iterator[tuple[int, Violation]]:
         """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
-        line = 0
-        for line, found in judge(self.monitors, path, origin(self.system), self.told, self.heard):
-            for violation in found:
-                yield line, violation
-        for violation in self.finish():
-            yield line, violation
+        return ((line, violation) for line, found in self.judged(path) for violation in found)
 
-    def read(self, read: Callable[[int], bytes], name: str) -> Iterator[tuple[int, Violation]]:
-        """Judge lines as they come, as `Compiled.lines`. Raises Rejected, OSError."""
+    def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
+        """As `run`: lines, and what was found there; often nothing, so that whoever waits can look at the clock."""
+        compiled, line = Compiled(self.monitors, self.told, self.heard), 0
+        if is_bag(path):
+            for _, found in compiled.events(messages(path, origin(self.system), self.listens)):
+                yield 0, found
+        else:
+            for line, found in compiled.run(path):
+                yield line, found
+        yield line, list(self.finish())
+
+    def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
+        """As `run`, of lines of standard input as they come, as `Compiled.lines`. Raises Rejected, OSError."""
         line = 0
-        for line, found in Compiled(self.monitors, self.told, self.heard).lines(read, name):
+        for line, found in Compiled(self.monitors, self.told, self.heard).lines(read, "<stdin>"):
             for violation in found:
                 yield line, violation
         for violation in self.finish():
@@ -221,23 +216,6 @@ class Session:
             "unknown_topics": dict(self.unheard),
             "withheld": dict(self.withheld),
         }
-
-
-def judge(
-    monitors: Sequence[Monitor],
-    path: Path,
-    where: Origin,
-    told: Callable[[list[Violation]], Iterable[Violation]] = lambda found: found,
-    heard: Callable[[str, int], None] = lambda topic, count: None,
-) -> Iterator[tuple[int, list[Violation]]]:
-    """Feed a trace to some monitors: lines, and what was found there (often nothing). `told` and `heard` are those of
-    `Compiled`. Raises Rejected."""
-    compiled = Compiled(monitors, told, heard)
-    if not is_bag(path):
-        yield from compiled.run(path)
-        return
-    for _, found in compiled.events(messages(path, where, lambda topic: any(m.listens(topic) for m in monitors))):
-        yield 0, found
 
 
 def _asked(kind: ClauseKind, tally: Tally) -> int:

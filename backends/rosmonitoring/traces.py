@@ -91,28 +91,34 @@ def not_text(name: str) -> Rejected:
     return Rejected(_fault(name, 1, 1, "the file is not UTF-8 text"))
 
 
-def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
-    """Events from lines of text; blank lines are skipped. Raises Rejected at the first line that is no event."""
+def read_lines(
+    lines: Iterable[str], name: str, chosen: Callable[[int], bool] = lambda index: True
+) -> Iterator[Recorded]:
+    """Events from lines of text, those whose numbers are chosen; blank lines are skipped. Raises Rejected at the first
+    line that is no event."""
     index = 0
     for number, line in enumerate(lines, start=1):
-        event = event_of(line, name, number)
-        if event is not None:
-            index += 1
+        index += bool(line) and not line.isspace()
+        if chosen(index) and (event := event_of(line, name, number)) is not None:
             yield Recorded(index, number, event)
 
 
 def read_trace(
-    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
+    path: Path,
+    origin: Origin = NOWHERE,
+    wanted: Callable[[str], bool] = lambda topic: True,
+    chosen: Callable[[int], bool] = lambda index: True,
 ) -> Iterator[Recorded]:
-    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag). `wanted`: the topics whose messages of a bag
-    are of interest. Raises Rejected."""
+    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag), those whose numbers are chosen. `wanted`: the
+    topics whose messages of a bag are of interest, and are counted. Raises Rejected."""
     if is_bag(path):
         for index, (event, _) in enumerate(messages(path, origin, wanted), start=1):
-            yield Recorded(index, 0, event)
+            if chosen(index):
+                yield Recorded(index, 0, event)
         return
     try:
         with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
-            yield from read_lines(file, str(path))
+            yield from read_lines(file, str(path), chosen)
     except UnicodeDecodeError:
         raise not_text(str(path)) from None
     except OSError as error:

@@ -13,6 +13,7 @@ from helpers import some
 from avow.backends.rosmonitoring.driving import command
 from avow.base.diagnostics import Rejected
 from avow.pipeline.work import method_job
+from avow.ros.bags import LIVE, PUBLISHER
 from avow.system.load import load_system
 
 CONTRACT = """\
@@ -130,6 +131,9 @@ def test_a_class_runs_as_it_is_and_its_recording_replays(tmp_path: Path, kind: s
     again = drive(folder, "watch", recording, "--replay")
     assert again.return_value == 0, again.output
     assert "the recording has the same" in again.output
+    live = tmp_path / "live.jsonl"  # as it is recorded on a running graph
+    live.write_text("".join(f"{json.dumps({**event, LIVE: True, PUBLISHER: '/n'})}\n" for event in events), "utf-8")
+    assert drive(folder, "watch", live, "--replay").return_value == 0
     changed = recording.read_text(encoding="utf-8").replace('0.500000000, "data": "red"', '0.5, "data": "green"')
     recording.write_text(changed, encoding="utf-8")
     other = drive(folder, "watch", recording, "--replay")

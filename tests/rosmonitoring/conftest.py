@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,10 @@ import pytest
 import yaml
 
 from avow.backend_kit.protocol import Job
+from avow.backends.rosmonitoring.options import origin
+from avow.backends.rosmonitoring.session import Session
+from avow.backends.rosmonitoring.traces import read_trace
+from avow.backends.rosmonitoring.watched import Violation
 from avow.evidence.obligation import Kind, Obligation
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -104,3 +108,10 @@ def job_for(system: System, name: str) -> Job:
         for g in node.guarantees
     )
     return Job(system, node, method, obligations)
+
+
+def one_by_one(running: Session, path: Path) -> Iterator[Violation]:
+    """As `Session.run`, by the engine alone: no event is passed over as being like another."""
+    for recorded in read_trace(path, origin(running.system), running.listens):
+        yield from running.step(recorded.event)
+    yield from running.finish()

@@ -20,7 +20,7 @@ from avow.pipeline.slices import method_slice
 from avow.system.load import load_system
 from avow.system.plan import System
 
-from .conftest import ARRIVAL, job_for
+from .conftest import ARRIVAL, job_for, one_by_one
 
 NODE = """node n{at} {{
   inputs( v{before} : REAL )
@@ -124,7 +124,7 @@ def test_a_planted_fault_is_found_and_followed(tmp_path: Path, seed: int) -> Non
     made = planted(tmp_path, seed, ARRIVAL)
     followed = check(made, found(made))
     one = session(made.system)
-    assert check(made, [v for _, v in one.one_by_one(made.trace)]) == followed
+    assert check(made, list(one_by_one(one, made.trace))) == followed
 
 
 @pytest.mark.parametrize("seed", some(range(100, 140), 8))

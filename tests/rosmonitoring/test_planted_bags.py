@@ -17,6 +17,8 @@ from avow.backends.rosmonitoring.watched import Fault
 from avow.system.load import load_system
 from avow.system.plan import System
 
+from .conftest import one_by_one
+
 pytest.importorskip("rosbags")
 
 RATE = "std_msgs/Header header\nfloat32 value\nuint8 LOW=0\nuint8 HIGH=2\nuint8 level\n"
@@ -176,7 +178,7 @@ def test_a_fault_is_found_and_blamed_on_whose_it_is(tmp_path: Path, form: str, f
     if fault in ("none", "value", "label", "stop", "negative", "environment"):
         assert all(tally.decided == tally.published for *_, tally in running.clauses())
     alone = session(system, (), bag)
-    assert [violation for _, violation in alone.one_by_one(bag)] == found
+    assert list(one_by_one(alone, bag)) == found
     assert alone.summary() == running.summary()
 
 

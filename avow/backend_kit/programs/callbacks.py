@@ -20,6 +20,7 @@ from avow.isolation.observed import Seen
 from avow.language.contract import Node
 from avow.language.sorts import DataSort, EnumSort
 from avow.language.terms import Role
+from avow.ros.bags import fields_of
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
 from avow.system.parameters import parameters
@@ -128,9 +129,8 @@ class Driver:
         """A recorded event's message as data; a field that is left out holds what a new message has. Raises
         Rejected."""
         kind = self.topics.heard.get(topic) or self.topics.spoken[topic]
-        fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
         try:
-            return code(Nested(kind), fields, self.known)
+            return code(Nested(kind), fields_of(event), self.known)
         except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise unusable(f"{where}: {topic} carries {kind}: {error}") from None
 
@@ -143,7 +143,7 @@ class Driver:
     def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
         """Whether a publication is what was recorded, in the fields that the recording has; one that has
         none says nothing."""
-        fields = {name: value for name, value in event.items() if name not in ("topic", "time")}
+        fields = fields_of(event)
         if not fields and data["d"]:
             return False
         said = plain_fields(data, fields)
