@@ -10,9 +10,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from avow.formulas.flattening import flattened
+from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
-from avow.language.operators import definition
+from avow.language.operators import FLIPPED
 from avow.language.sorts import BOOL, INTEGER, NATURAL, BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     FALSE,
@@ -22,7 +23,6 @@ from avow.language.terms import (
     Compare,
     Conditional,
     Iff,
-    Implies,
     In,
     Literal,
     Negative,
@@ -48,7 +48,7 @@ def shape(term: Term) -> Term:
     """The normal form of a formula. Raises TooComplex."""
     if depth(term) > FORMULA_DEPTH or _written_out(term) > PARTS:
         raise TooComplex
-    return _formula(term, True)
+    return _shaped(term)
 
 
 def _written_out(term: Term) -> int:
@@ -88,63 +88,46 @@ def _junction(items: list[Term], kind: type[And] | type[Or], unit: Term, zero: T
     return kind(tuple(flat)) if len(flat) > 1 else flat[0]
 
 
-def _formula(term: Term, positive: bool) -> Term:
+def _shaped(term: Term) -> Term:
+    return _formula(push_negations(term))
+
+
+def _formula(term: Term) -> Term:
+    """Of a formula whose negations stand at its atoms."""
     match term:
-        case Not(body=body):
-            return _formula(body, not positive)
         case And(items=items):
-            made = [_formula(i, positive) for i in items]
-            return conjunction(made) if positive else disjunction(made)
+            return conjunction([_formula(i) for i in items])
         case Or(items=items):
-            made = [_formula(i, positive) for i in items]
-            return disjunction(made) if positive else conjunction(made)
-        case Implies(left=left, right=right):
-            made = [_formula(left, not positive), _formula(right, positive)]
-            return disjunction(made) if positive else conjunction(made)
+            return disjunction([_formula(i) for i in items])
         case Iff(left=left, right=right):
-            return _equivalence(left, right, positive)
-        case Operation(sort=BoolSort()) if (defined := definition(term)) is not None:
-            return _formula(defined, positive)
+            one = disjunction([_shaped(Not(left)), _formula(right)])
+            return conjunction([one, disjunction([_formula(left), _shaped(Not(right))])])
         case Conditional(condition=condition, then=then, otherwise=otherwise):
-            yes = disjunction([_formula(condition, False), _formula(then, positive)])
-            return conjunction([yes, disjunction([_formula(condition, True), _formula(otherwise, positive)])])
+            yes = disjunction([_shaped(Not(condition)), _formula(then)])
+            return conjunction([yes, disjunction([_formula(condition), _formula(otherwise)])])
+        case Quantified(quantifier=Quantifier.UNIQUE, variables=variables, body=body):
+            return Quantified(Quantifier.UNIQUE, variables, _shaped(body), term.span)
         case Quantified(quantifier=quantifier, variables=variables, body=body):
-            if quantifier is Quantifier.UNIQUE:
-                inner = Quantified(quantifier, variables, _formula(body, True), term.span)
-                return inner if positive else Not(inner)
-            exists = (quantifier is Quantifier.EXISTS) is positive
-            return _quantified(exists, variables, _formula(body, positive))
-        case Literal(value=value) if term.sort == BOOL:
-            return TRUE if value is positive else FALSE
+            return _quantified(quantifier is Quantifier.EXISTS, variables, _formula(body))
+        case Literal():
+            return term
+        case Not(body=Compare() as body):
+            return _comparison(body, False)
+        case Not(body=body):
+            return Not(_formula(body))
         case Compare():
-            return _comparison(term, positive)
-        case In(item=item, collection=collection):
-            if isinstance(collection, SetTerm):
-                members = tuple(sorted({_value(m) for m in collection.items}, key=repr))
-                collection = SetTerm(members, collection.sort)
-            else:
-                collection = _value(collection)
-            made_in = In(_value(item), collection, term.span)
-            return made_in if positive else Not(made_in)
+            return _comparison(term, True)
+        case In(item=item, collection=SetTerm(items=items) as collection):
+            members = tuple(sorted({_value(m) for m in items}, key=repr))
+            return In(_value(item), SetTerm(members, collection.sort), term.span)
         case _:  # an atom: its terms normalised
-            value_term = _value(term)
-            return value_term if positive else Not(value_term)
-
-
-def _equivalence(left: Term, right: Term, positive: bool) -> Term:
-    one = disjunction([_formula(left, False), _formula(right, positive)])
-    other = disjunction([_formula(left, True), _formula(right, not positive)])
-    return conjunction([one, other])
+            return _value(term)
 
 
 def _comparison(term: Compare, positive: bool) -> Term:
     operator, left, right = term.operator, term.left, term.right
-    if left.sort == BOOL and operator in ("==", "!="):
-        return _equivalence(left, right, positive is (operator == "=="))
     if operator in (">", ">="):
-        operator, left, right = {">": "<", ">=": "<="}[operator], right, left
-    if operator == "!=":
-        operator, positive = "==", not positive
+        operator, left, right = FLIPPED[operator], right, left
     if not positive and operator in ("<", "<="):
         operator, left, right, positive = {"<": "<=", "<=": "<"}[operator], right, left, True
     made_left, made_right = _value(left), _value(right)
@@ -162,7 +145,7 @@ def _value(term: Term) -> Term:
         if isinstance(term.sort, IntegerSort | NaturalSort) and isinstance(term.value, int):
             return _integer(term.value)
         return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term
-    parts = tuple(_formula(p, True) if p.sort == BOOL and p.children else _value(p) for p in term.children)
+    parts = tuple(_shaped(p) if p.sort == BOOL and p.children else _value(p) for p in term.children)
     made = term.rebuild(parts)
     match made:
         case Widen(term=Literal(value=value)) if not isinstance(value, str):
