@@ -127,10 +127,11 @@ def _turned(pattern: Arithmetic, known: Term, unknown: Collection[Variable]) -> 
 
 
 def _within(value: Term, sort: Sort) -> tuple[Term, ...] | None:
-    """What has to hold for a term's value to be of a sort; None where no formula says it."""
-    if value.sort == sort or (sort == INTEGER and value.sort == NATURAL):
-        return ()
-    return (Compare(">=", value, Literal(0, INTEGER)),) if sort == NATURAL and value.sort == INTEGER else None
+    """What has to hold for a term's value to be of a sort; None where no formula says it. Of a natural it is said in
+    any case: where a solver puts something for a variable, that is known beside the formula at best."""
+    if sort == NATURAL and value.sort in (INTEGER, NATURAL):
+        return (Compare(">=", value, Literal(0, INTEGER)),)
+    return () if value.sort == sort or (sort == INTEGER and value.sort == NATURAL) else None
 
 
 # -- quantifiers -------------------------------------------------------------------------------------------------------

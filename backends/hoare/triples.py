@@ -254,7 +254,8 @@ def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Ter
     for constant in outer:
         for part in conjuncts(pre, True):
             found = solved(part, (constant,)) if constant in part.children else None
-            if found is not None and not found.rest:  # a rest would widen the claim: an INTEGER is no NATURAL
+            # the sorts must agree: an INTEGER in place of a NATURAL would widen the claim
+            if found is not None and found.values[constant].sort == constant.sort:
                 pre, post = (simplify(substitute(term, found.values)) for term in (pre, post))
                 fixed += found.values.items()
                 break

@@ -19,7 +19,6 @@ from avow.formulas.renaming import bound_names, rename_apart
 from avow.language.operators import OPERATORS, Why
 from avow.language.sorts import (
     BOOL,
-    NATURAL,
     BoolSort,
     DataSort,
     FunctionSort,
@@ -333,8 +332,7 @@ class Eliminator:
         found = solved(Compare("==", left, right), free.values())
         if found is None:
             return None
-        naturals = (Compare(">=", v, Literal(0, NATURAL)) for v in found.values if v.sort == NATURAL)
-        more = [Part(term, True, bound_names(term)) for term in (*found.rest, *naturals)]
+        more = [Part(term, True, bound_names(term)) for term in found.rest]
         return holds, more, {**bound, **{v.name: self._value(term, bound) for v, term in found.values.items()}}
 
     def _tick(self) -> None:
