@@ -12,12 +12,10 @@ from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationV
 from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.persons import one_person
-from avow.base.verdict import Link, Verdict
+from avow.base.verdict import Isolation, Link, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
-from avow.isolation.level import Isolation
-from avow.isolation.observed import ISOLATION
 from avow.tuning.shown import TOOL_WORDS
 
 

@@ -16,9 +16,8 @@ from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import RETRY, Evidence
+from avow.evidence.record import ISOLATION, OBSERVED, RETRY, Evidence
 from avow.evidence.status import Status, roll_up, weigh
-from avow.isolation.observed import ISOLATION, OBSERVED
 from avow.tuning.shown import OLDER_RECORDS, TREND_RUNS
 
 

@@ -25,9 +25,8 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
-from avow.base.verdict import Link, Object, said, unsaid
+from avow.base.verdict import Isolation, Link, Object, said, unsaid
 from avow.evidence.status import Status
-from avow.isolation.level import Isolation
 from avow.system.plan import Located, Numbers
 
 CRITICALITIES = ("high", "medium", "low")

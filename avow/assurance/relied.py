@@ -13,12 +13,10 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.base.verdict import HypothesisKind, Object, in_words
+from avow.base.verdict import HypothesisKind, Isolation, Object, in_words
 from avow.evidence.obligation import Kind, ProgramClaim
-from avow.evidence.record import Evidence
+from avow.evidence.record import ISOLATION, Evidence
 from avow.evidence.status import Status, weigh
-from avow.isolation.level import Isolation
-from avow.isolation.observed import ISOLATION
 
 WORDS = {
     Status.PROVED: "proved",

@@ -17,10 +17,9 @@ from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.tools import Tool
-from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
+from avow.base.verdict import Counterexample, Isolation, Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.formulas.values import Value
-from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Driving, Method, Source, System

@@ -95,6 +95,21 @@ class Object(StrEnum):
     """What a running node was seen to do."""
 
 
+class Isolation(StrEnum):
+    """How far what was run was kept from its judge and from this machine; weakest first."""
+
+    NONE = "none"
+    """In the process that judges, or by a tool of its own that is not kept from anything."""
+    PROCESSES = "processes"
+    """In a process of its own, with a pipe to its judge; all that it starts ends with it. It is the same user."""
+    SEALED = "sealed"
+    """Besides, without network, without sight of other processes, with a view of the files that it cannot write."""
+
+    @property
+    def rank(self) -> int:
+        return list(Isolation).index(self)
+
+
 @dataclass(frozen=True, slots=True)
 class Counterexample:
     """Why a claim is false, in the contract's own words.

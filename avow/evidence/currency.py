@@ -14,10 +14,11 @@ from pathlib import Path
 
 from avow.base.codec import from_json
 from avow.base.files import sha256
+from avow.base.verdict import Isolation
 from avow.evidence.ledger import Entry, Ledger
-from avow.evidence.record import Evidence
-from avow.isolation.level import Isolation, wanted
-from avow.isolation.observed import ISOLATION, OBSERVED, Observed, Seen, look
+from avow.evidence.record import ISOLATION, OBSERVED, Evidence
+from avow.isolation.level import wanted
+from avow.isolation.observed import Observed, Seen, look
 
 
 def stands(record: Evidence, root: Path) -> bool:

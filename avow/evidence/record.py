@@ -24,6 +24,12 @@ Nothing fails for it, but who reads the answer should know."""
 SIGNED_BY = "signed_by"
 """Among a review's details: the public key, in hexadecimal, that signed its record."""
 
+OBSERVED = "observed"
+"""Among a record's details: what the subject was seen to look at, as (kind, path, digest)."""
+
+ISOLATION = "isolation"
+"""Among a record's details: how far the subject was kept from its judge."""
+
 CASE = "case"
 """Among the details of a refutation: its inputs as data of the backend's own, to be tried first on every later run."""
 

@@ -8,27 +8,13 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
+
+from avow.base.verdict import Isolation
 
 SANDBOX = "AVOW_SANDBOX"
 """Environment: ``required`` (`avow verify --sandbox`) runs subjects sealed or not at all, ``off`` never seals them.
 Otherwise they are sealed wherever this machine can."""
-
-
-class Isolation(StrEnum):
-    """Weakest first."""
-
-    NONE = "none"
-    """In the process that judges, or by a tool of its own that is not kept from anything."""
-    PROCESSES = "processes"
-    """In a process of its own, with a pipe to its judge; all that it starts ends with it. It is the same user."""
-    SEALED = "sealed"
-    """Besides, without network, without sight of other processes, with a view of the files that it cannot write."""
-
-    @property
-    def rank(self) -> int:
-        return list(Isolation).index(self)
 
 
 class Unavailable(Exception):  # noqa: N818 - it names a state

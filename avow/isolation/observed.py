@@ -145,10 +145,3 @@ def interpreter() -> Observed:
     """The Python that runs a subject."""
     path = os.path.realpath(sys.executable)
     return Observed(Seen.READ, path, look(Seen.READ, path))
-
-
-OBSERVED = "observed"
-"""Among a record's details: what the subject was seen to look at, as (kind, path, digest)."""
-
-ISOLATION = "isolation"
-"""Among a record's details: how far the subject was kept from its judge."""

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from avow.base import process
-from avow.isolation.level import Isolation, available, sealed
+from avow.base.verdict import Isolation
+from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed, interpreter, recorded, variables
 from avow.isolation.tracing import Trace, traces
 

@@ -14,14 +14,12 @@ from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.codec import canonical, to_json
 from avow.base.files import digest_file, is_intact, sha256, write
-from avow.base.verdict import Link, Object, Outcome, Verdict
+from avow.base.verdict import Isolation, Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
 from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import CASE, RETRY, Evidence
-from avow.isolation.level import Isolation
-from avow.isolation.observed import ISOLATION, OBSERVED
+from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import asking
 from avow.pipeline.answers_file import earlier
 from avow.pipeline.export import folder

@@ -19,8 +19,9 @@ from typing import Any
 
 from avow.base import process
 from avow.base.codec import to_json
+from avow.base.verdict import Isolation
 from avow.isolation import judge
-from avow.isolation.level import Isolation, available, sealed
+from avow.isolation.level import available, sealed
 from avow.isolation.program import Program
 from avow.isolation.subject import SubjectFailed
 from avow.tuning.running import SUBJECT_PATIENCE

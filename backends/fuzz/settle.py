@@ -21,11 +21,11 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import ToolMissing
-from avow.base.verdict import Object, Outcome, Verdict
+from avow.base.verdict import Isolation, Object, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import ProgramClaim
 from avow.isolation import judge
-from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 
 from . import building

@@ -19,11 +19,11 @@ from avow.base.codec import document, from_json
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
-from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
+from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.isolation import judge
-from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Node
 from avow.solving.questions import opaque_sorts

@@ -22,12 +22,12 @@ from avow.backend_kit.programs.cpython import Told
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report
 from avow.backend_kit.registry import judge_of_runs
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.verdict import Counterexample, Object, Outcome, Verdict
+from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import show
-from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.ros.sources import message_files
 from avow.system.plan import Driving

@@ -18,12 +18,12 @@ from avow.backend_kit.programs.samples import Drawing, beside, leaves, numbers_o
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.process import ToolMissing
-from avow.base.verdict import Counterexample, Object, Outcome, Verdict
+from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, RETRY
 from avow.formulas.values import Element, SequenceValue, Value
-from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.language.sorts import RealSort, SequenceSort
 from avow.language.terms import Variable

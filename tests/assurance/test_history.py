@@ -16,9 +16,8 @@ from avow.assurance.model import Case
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since
 from avow.evidence.ledger import Entry, Ledger
-from avow.evidence.record import CASE, Evidence
+from avow.evidence.record import CASE, OBSERVED, Evidence
 from avow.evidence.status import weigh
-from avow.isolation.observed import OBSERVED
 from avow.pipeline.report_check import _ledger
 from avow.system.plan import System
 from avow.tuning.shown import OLDER_RECORDS

@@ -15,9 +15,9 @@ from hoare.systems import make_job, sensor
 from avow.backend_kit.protocol import Limits, Report
 from avow.backends.hypothesis import BACKEND
 from avow.base import process
-from avow.base.verdict import Verdict
+from avow.base.verdict import Isolation, Verdict
 from avow.isolation import judge
-from avow.isolation.level import SANDBOX, Isolation, seals
+from avow.isolation.level import SANDBOX, seals
 from avow.isolation.observed import Seen
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 

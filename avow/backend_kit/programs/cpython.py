@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.codec import from_json, to_json
+from avow.base.verdict import Isolation
 from avow.drive.steps import coded
 from avow.isolation import judge
-from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 
 
