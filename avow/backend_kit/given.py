@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system.paths import inside
+
+
+def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:
+    """The JSON schema (2020-12) of a method's options, which takes no others; `more` is what else is asked of them."""
+    closed = {"properties": dict(properties), "required": [*required], "additionalProperties": False}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "type": "object", **closed, **more}
+
+
+def text(what: str) -> dict[str, Any]:
+    """An option that is any text."""
+    return {"type": "string", "description": what}
+
+
+def file(what: str) -> dict[str, Any]:
+    """An option that names a file."""
+    return text(f"{what}, relative to the system's folder")
+
+
+def whole_number(what: str, most: int, default: int) -> dict[str, Any]:
+    """An option that is a number from 1 to `most`."""
+    return {"type": "integer", "minimum": 1, "maximum": most, "default": default, "description": what}
+
+
+NAN = {"const": "possible", "description": "a REAL input may be NaN or an infinity: what goes wrong then refutes"}
+"""The option `nan` of a method that runs or reads a program."""
 
 
 def file_path(job: Job, key: str) -> Path | None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-PATH = {"type": "string", "description": "a field of the message: pose.position.x, ranges[0]"}
+from avow.backend_kit.given import text
+
+PATH = text("a field of the message: pose.position.x, ranges[0]")
 DURATION = {
     "type": "string",
     "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
@@ -19,11 +21,11 @@ ARGUMENT = {
             "additionalProperties": False,
             "required": ["table", "key", "by", "column"],
             "properties": {
-                "table": {"type": "string", "description": "a table of the plan's scenario"},
-                "key": {"type": "string", "description": "the message's field that names the row"},
-                "by": {"type": "string", "description": "the table's column that the key is looked up in"},
-                "column": {"type": "string", "description": "the column of the value"},
-                "as": {"type": "string", "description": "the type in which the node holds the value: float64"},
+                "table": text("a table of the plan's scenario"),
+                "key": text("the message's field that names the row"),
+                "by": text("the table's column that the key is looked up in"),
+                "column": text("the column of the value"),
+                "as": text("the type in which the node holds the value: float64"),
             },
         },
     ]
@@ -91,11 +93,11 @@ READING: dict[str, Any] = {
                 {
                     "type": "object",
                     "properties": {
-                        "topic": {"type": "string", "description": "a topic's name, if not the contract's"},
-                        "type": {"type": "string", "description": "the topic's ROS type, if not in the contract"},
+                        "topic": text("a topic's name, if not the contract's"),
+                        "type": text("the topic's ROS type, if not in the contract"),
                         "field": PATH,
                         "fields": {"type": "array", "items": PATH, "minItems": 1},
-                        "each": {"type": "string", "description": "a field that holds a list of tuples"},
+                        "each": text("a field that holds a list of tuples"),
                         "hold": {
                             "enum": ["latest", "seen"],
                             "description": "a relation holds at the latest message's tuples (default), or at all "
@@ -115,8 +117,8 @@ READING: dict[str, Any] = {
                         "inf": {"const": "none", "description": "an infinity is no reading"},
                         "initial": {"description": "the value before the first message"},
                         "scenario": {"const": True, "description": "the plan's interpretation, at all times"},
-                        "previous": {"type": "string", "description": "an output's value of the step before"},
-                        "constructor": {"type": "string", "description": "the field that names the constructor"},
+                        "previous": text("an output's value of the step before"),
+                        "constructor": text("the field that names the constructor"),
                         "arguments": {
                             "type": "object",
                             "additionalProperties": {"type": "array", "items": ARGUMENT},

@@ -15,15 +15,14 @@ drawn for ever, then draws that contain the percept never cease. Nothing is fair
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-import jsonschema
-
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
+from avow.system.schema import violations
 from avow.system.strict_yaml import read_yaml
 
 from .parser import parse_fact
@@ -157,21 +156,10 @@ def read_environment(path: Path, shown: str | None = None) -> Environment:
     if problems:
         raise Rejected(*problems)
     located = piece.located()
-    faults = [
-        Diagnostic("AJPF110", f"{'.'.join(map(str, e.absolute_path)) or 'environment'}: {_short(e)}", _span(located, e))
-        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(located.data)
-    ]
+    faults = [replace(fault, code="AJPF110") for fault in violations(located, SCHEMA, "environment")]
     if faults:
         raise Rejected(*faults)
     return _read(located)
-
-
-def _short(error: jsonschema.ValidationError) -> str:
-    return error.message if len(error.message) <= 200 else error.message[:200] + "…"
-
-
-def _span(located: Located, error: jsonschema.ValidationError) -> Span:
-    return located.at(*error.absolute_path)
 
 
 def _read(located: Located) -> Environment:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
-
-import jsonschema
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
@@ -19,6 +17,7 @@ from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
 from avow.language.terms import Not, Quantified, Role, Term, Variable
 from avow.system.paths import inside
+from avow.system.schema import violations
 
 from .environment import Environment, read_environment
 from .interpreter import Semantics
@@ -78,12 +77,8 @@ class Setup:
 def read(job: Job) -> Setup:
     """Raises Rejected with every problem."""
     options = job.method.options
-    odd = [
-        Diagnostic(
-            "AJPF119", f"{'.'.join(map(str, e.absolute_path)) or 'options'}: {e.message}"[:300], options.at(*e.path)
-        )
-        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(job.options)
-    ]
+    own = replace(options, data=job.options)
+    odd = [replace(fault, code="AJPF119") for fault in violations(own, SCHEMA, "options")]
     if odd:
         raise Rejected(*odd)
     reader = _OptionsReader(job)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from avow.backend_kit.given import file, schema, text
+
 _TEXT = {"type": "string"}
 _RANGES: dict[str, Any] = {
     "type": "object",
@@ -15,13 +17,11 @@ _RANGES: dict[str, Any] = {
         ]
     },
 }
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "properties": {
-        "program": {**_TEXT, "description": "the Gwendolen program (.gwen), relative to the system's folder"},
-        "agent": {**_TEXT, "description": "the agent's name, as the properties use it"},
-        "environment": {**_TEXT, "description": "how percepts are drawn (YAML)"},
+SCHEMA = schema(
+    {
+        "program": file("the Gwendolen program (.gwen)"),
+        "agent": text("the agent's name, as the properties use it"),
+        "environment": text("how percepts are drawn (YAML)"),
         "predicates": {
             "type": "object",
             "additionalProperties": _TEXT,
@@ -47,7 +47,7 @@ SCHEMA: dict[str, Any] = {
                         "type": "object",
                         "properties": {
                             "psl": _TEXT,
-                            "guarantee": {**_TEXT, "description": "whose verdict it belongs to"},
+                            "guarantee": text("whose verdict it belongs to"),
                             "counts": {"type": "boolean", "description": "false: listed only; default true"},
                             "instances": {**_RANGES, "description": "narrower ranges than the method's"},
                             "forbids": {
@@ -71,6 +71,5 @@ SCHEMA: dict[str, Any] = {
             "description": "AJPF only: the Java class of the environment",
         },
     },
-    "required": ["program", "environment", "predicates"],
-    "additionalProperties": False,
-}
+    *("program", "environment", "predicates"),
+)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.given import existing_file, file_path, told
+from avow.backend_kit.given import existing_file, file, file_path, schema, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
 from avow.backend_kit.runs import unsaid
 from avow.base import process
@@ -24,19 +23,6 @@ from .runner import INSTALL, dafny
 from .scanner import Scan, scan
 from .tuning import PROGRAM_BYTES
 
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "properties": {
-        "implementation": {
-            "type": "string",
-            "description": "the Dafny file that refines the generated specification, relative to the system's folder",
-        },
-    },
-    "required": ["implementation"],
-    "additionalProperties": False,
-}
-
 
 class DafnyBackend(Backend):
     """See `docs/backends/dafny.md`."""
@@ -51,7 +37,9 @@ class DafnyBackend(Backend):
     not_run = "a Dafny method would have to be compiled, which the Dafny that Debian has does for .NET alone"
     portable = True
     link = Link.GENERATED
-    options_schema = SCHEMA
+    options_schema = schema(
+        {"implementation": file("the Dafny file that refines the generated specification")}, "implementation"
+    )
     codes = CODES
     translations = {"dafny": "Dafny types, predicates, a specification and a skeleton for each node"}
     green_means = (

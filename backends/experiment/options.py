@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
+from avow.backend_kit.given import file, schema, text
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
@@ -19,20 +19,18 @@ from .bound import Bound, upper_bound
 from .expression import Expression, Malformed, parse
 from .quantity import conversion, decimal, figure, show
 
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "properties": {
-        "data": {"type": "string", "description": "CSV file, one row a run, relative to the system's folder"},
-        "summary": {"type": "string", "description": "YAML file of printed figures, where the runs are not published"},
-        "measure": {"type": "string", "description": "a column, or an expression over columns; never negative"},
+SCHEMA = schema(
+    {
+        "data": file("CSV file, one row a run"),
+        "summary": text("YAML file of printed figures, where the runs are not published"),
+        "measure": text("a column, or an expression over columns; never negative"),
         "within": {
             "type": ["number", "string"],
             "description": "the greatest measure of a run that succeeds: the contract's number, as in the guarantee or "
             "as a constant's name",
         },
-        "unit": {"type": "string", "description": "the unit of the measure and of numbers without one"},
-        "run_column": {"type": "string", "description": "the column that names a run (default: run, or id)"},
+        "unit": text("the unit of the measure and of numbers without one"),
+        "run_column": text("the column that names a run (default: run, or id)"),
         "confidence": {
             "type": ["number", "string"],
             "description": "of the statistical statement: 0.9 or more, default 0.95",
@@ -42,12 +40,11 @@ SCHEMA: dict[str, Any] = {
             "description": "the claimed probability of success, no less than the criticality asks for; without it no "
             "run at all may fail",
         },
-        "protocol": {"type": "string", "description": "how the runs were made, for the report"},
+        "protocol": text("how the runs were made, for the report"),
     },
-    "required": ["within"],
-    "oneOf": [{"required": ["data", "measure"]}, {"required": ["summary"]}],
-    "additionalProperties": False,
-}
+    "within",
+    oneOf=[{"required": ["data", "measure"]}, {"required": ["summary"]}],
+)
 
 ID_COLUMNS = ("run", "id")
 """Where the names of runs are looked for, unless the plan says otherwise."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from avow.backend_kit.given import NAN, schema, whole_number
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
@@ -28,32 +29,15 @@ class FuzzBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     uses_source = True
-    options_schema = {
-        "type": "object",
-        "properties": {
-            "runs": {
-                "type": "integer",
-                "minimum": 1,
-                "maximum": 100_000_000,
-                "default": 20_000,
-                "description": "how many runs libFuzzer makes",
-            },
-            "steps": {
-                "type": "integer",
-                "minimum": 1,
-                "maximum": 1_000,
-                "default": 8,
-                "description": "how many steps a run has at most",
-            },
+    options_schema = schema(
+        {
+            "runs": whole_number("how many runs libFuzzer makes", 100_000_000, 20_000),
+            "steps": whole_number("how many steps a run has at most", 1_000, 8),
             "sources": {**_LISTED, "description": "further files to compile, relative to the system's folder"},
             "include": {**_LISTED, "description": "folders in which included files are looked for"},
-            "nan": {
-                "const": "possible",
-                "description": "a REAL input may be NaN or an infinity: what goes wrong then refutes",
-            },
-        },
-        "additionalProperties": False,
-    }
+            "nan": NAN,
+        }
+    )
     codes = CODES
     green_means = (
         "libFuzzer made so many runs of the compiled source without a report of a sanitizer; on those of them that are "

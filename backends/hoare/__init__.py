@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from avow.backend_kit.given import file, schema
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -15,7 +16,6 @@ from avow.language.contract import Clause, Node
 
 from .codes import CODES
 
-_FILE = {"type": "string", "description": "the program's file, relative to the system's folder"}
 _TABLE = {
     "type": "object",
     "description": "an input, output or relation of the contract (in.r, out.done(i)) and what it is in the program; "
@@ -57,17 +57,15 @@ class Hoare(Backend):
     portable = True
     runs_models = True
     link = Link.GENERATED
-    options_schema = {
-        "type": "object",
-        "properties": {
-            "program": _FILE,
+    options_schema = schema(
+        {
+            "program": file("the program's file"),
             "variables": _TABLE,
             "termination": _TERMINATION,
             "invariants": _INVARIANTS,
         },
-        "required": ["program"],
-        "additionalProperties": False,
-    }
+        "program",
+    )
     codes = CODES
     green_means = (
         "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "

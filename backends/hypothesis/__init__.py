@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
+from avow.backend_kit.given import file, schema, whole_number
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.backend_kit.reading import READING
 from avow.backend_kit.runs import unsaid
@@ -15,12 +16,8 @@ from avow.language.contract import Clause, Node
 
 from .codes import CODES
 
-_SUBJECT = {
-    "type": "string",
-    "pattern": "^.+:[^:]+$",
-    "description": "file.py:function, or file.py:Class with a method `step`, relative to the system's folder",
-}
-_CASES = {"type": "integer", "minimum": 1, "maximum": 1_000_000, "default": 500, "description": "how many cases"}
+_SUBJECT = {**file("file.py:function, or file.py:Class with a method `step`"), "pattern": "^.+:[^:]+$"}
+_CASES = whole_number("how many cases", 1_000_000, 500)
 _NUMBERS = {
     "enum": ["exact", "float64", "float64-with-nan"],
     "default": "exact",
@@ -40,11 +37,7 @@ class HypothesisBackend(Backend):
     remembers = True
     uses_source = True
     link = Link.GENERATED
-    options_schema = {
-        "type": "object",
-        "properties": {"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS, **READING},
-        "additionalProperties": False,
-    }
+    options_schema = schema({"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS, **READING})
     codes = CODES
     green_means = (
         "On so many generated inputs that meet the assumptions the function returned outputs that meet the guarantee, "

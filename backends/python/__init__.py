@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from avow.backend_kit.given import NAN, schema
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import package_version
@@ -26,16 +27,7 @@ class PythonBackend(Backend):
     uses_wiring = False
     uses_source = True
     claims = (ProgramClaim.LINKED,)
-    options_schema = {
-        "type": "object",
-        "properties": {
-            "nan": {
-                "const": "possible",
-                "description": "a REAL input may be NaN or an infinity: it is tried, and what goes wrong refutes",
-            }
-        },
-        "additionalProperties": False,
-    }
+    options_schema = schema({"nan": NAN})
     codes = CODES
     green_means = (
         "Every call of this file's `step`, from any state that its assumptions allow and on any finite inputs, gives "

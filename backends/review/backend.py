@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.given import existing_file, told
+from avow.backend_kit.given import existing_file, file, schema, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -23,21 +22,11 @@ from .freshness import current_meaning, stale_clause, stale_files
 from .record import CONCLUSIONS, Judged, Record, read_record
 from .signature import signature_path, signed
 
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "description": "the record's path, or the record's path under the key 'record'",
-    "type": ["object", "string"],
-    "properties": {
-        "record": {"type": "string", "description": "YAML record of the review, relative to the system's folder"},
-        "key": {
-            "type": ["string", "array"],
-            "items": {"type": "string"},
-            "minItems": 1,
-            "description": "public keys (PEM, in the system's folder), one of which has to have signed the record",
-        },
-    },
-    "required": ["record"],
-    "additionalProperties": False,
+_KEY = {
+    "type": ["string", "array"],
+    "items": {"type": "string"},
+    "minItems": 1,
+    "description": "public keys (PEM, in the system's folder), one of which has to have signed the record",
 }
 
 
@@ -53,7 +42,12 @@ class ReviewBackend(Backend):
     portable = True
     remembers = True  # a person judges; no formula is read
     link = Link.GUIDED
-    options_schema = SCHEMA
+    options_schema = schema(
+        {"record": file("YAML record of the review"), "key": _KEY},
+        "record",
+        type=["object", "string"],
+        description="the record's path, or the record's path under the key 'record'",
+    )
     codes = CODES
     green_means = (
         "A named person read exactly these files, answered every question of the checklist and accepted this "

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from avow.backend_kit.given import schema, text
 from avow.backend_kit.reading import DURATION, READING
 
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "additionalProperties": False,
-    "properties": {
+SCHEMA = schema(
+    {
         "traces": {
             "type": "array",
             "items": {"type": "string"},
@@ -94,8 +90,8 @@ SCHEMA: dict[str, Any] = {
             "description": "outputs whose messages --enforce and the ROS monitor pass on only while nothing is broken",
         },
         "ordered": {**DURATION, "description": "the ROS monitor sorts by time what comes within so long"},
-        "package": {"type": "string", "description": "the ROS package of the node, for instrumentation"},
-        "path": {"type": "string", "description": "the launch file of the node, for instrumentation"},
+        "package": text("the ROS package of the node, for instrumentation"),
+        "path": text("the launch file of the node, for instrumentation"),
         **READING,
-    },
-}
+    }
+)
