@@ -7,8 +7,8 @@ import random
 from collections.abc import Sequence
 
 import pytest
+from drawn.memory import formula, response, run_of
 from oracle.values import Step, broken, value
-from temporal.test_cells import formula, response, run_of
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.dafny.modules import Generated, generate

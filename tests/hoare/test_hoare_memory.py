@@ -8,10 +8,9 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from drawn.memory import A, B, N, clause, formula
 from helpers import some
 from oracle.values import breaks, keeps
-from temporal.test_cells import A, B, N, formula
-from temporal.test_systems import clause as drawn_clause
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits
@@ -189,7 +188,7 @@ def text_of(table: dict[tuple[int, bool], tuple[bool, int]]) -> str:
 @pytest.mark.parametrize("seed", some(range(200), 4))
 def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
-    promised, assumed = drawn_clause(rng), substitute(formula(rng, 1), {B: A, N: Literal(1, NATURAL)})
+    promised, assumed = clause(rng), substitute(formula(rng, 1), {B: A, N: Literal(1, NATURAL)})
     states = range(rng.choice((1, 2, 2, 3)))
     table = {(s, a): (rng.random() < 0.8, rng.choice(states)) for s in states for a in (False, True)}
     said = [show_term(t, "rcl") for t in (assumed, promised)]

@@ -10,11 +10,10 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from drawn.memory import A, B, N, clause, formula
 from helpers import some
 from hoare.systems import make_job
 from oracle.values import breaks, keeps
-from temporal.test_cells import A, B, N, formula
-from temporal.test_systems import clause as drawn_clause
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits, Report
@@ -209,7 +208,7 @@ def shortest(table: Mapping[tuple[int, bool], tuple[bool, int]], assumed: Term, 
 @pytest.mark.parametrize("seed", some(range(200), 12))
 def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
-    promised, assumed = drawn_clause(rng), substitute(formula(rng, 1), {B: A, N: Literal(1, NATURAL)})
+    promised, assumed = clause(rng), substitute(formula(rng, 1), {B: A, N: Literal(1, NATURAL)})
     states = range(rng.choice((1, 2, 3)))
     table = {(s, a): (rng.random() < 0.7, rng.choice(states)) for s in states for a in (False, True)}
     ports = "inputs( a : BOOL ) outputs( b : BOOL ) topics()"

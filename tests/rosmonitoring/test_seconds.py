@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
+from drawn.memory import TIMED_NODE, B, timed_formula, timed_response, word_of
 from oracle.seconds import InSeconds, Word
-from temporal.test_clock import A, B, X, formula, word_of
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup
@@ -20,8 +19,7 @@ from avow.base.diagnostics import Rejected
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, REAL
-from avow.language.terms import History, Implies, Limit, Literal, Past, Term, histories, timed
+from avow.language.terms import Implies, Past, Term, histories, timed
 
 from .test_other_steps import Make, found, made
 
@@ -170,19 +168,21 @@ def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
     """How many clauses of a random word were judged; of which of them the monitor tells the first breach, or its time,
     otherwise than the definitions over all positions."""
     depth, singly = rng.choice((1, 2, 2, 3)), rng.random() < 0.5
-    term, trigger, word, topics = formula(rng, depth), formula(rng, depth - 1), word_of(rng), ["io"] * 7
+    term, word, topics = timed_formula(rng, depth), word_of(rng), ["io"] * 7
     if singly:
         word, topics = by_message(rng, word)
-    operator = rng.choice((Past.WITHIN, Past.FOR, Past.UNTIL))
-    limit = None if operator is Past.UNTIL else Limit("", Literal(Fraction(rng.randrange(4)), REAL), False)
-    wanted = tuple(formula(rng, 1) for _ in range(2 if operator is Past.UNTIL else 1))
-    response = History(operator, wanted, BOOL, limit)
+    trigger, response = timed_response(rng, depth - 1)
     meaning, judged, wrong = InSeconds(word), 0, list[str]()
     for whole in (term, Implies(trigger, response)):
         about, asked = free_variables(whole), free_variables(trigger)
-        of_inputs = whole is not term and bool(asked) and asked <= {A, X}
+        of_inputs = whole is not term and bool(asked) and asked <= {p.variable for p in TIMED_NODE.inputs}
         every = of_inputs or any(h.operator is Past.ARRIVED for h in histories(whole))
-        if timed(whole) is None or B not in about or not about & {A, X} or every != singly:
+        if (
+            timed(whole) is None
+            or B not in about
+            or not about & {p.variable for p in TIMED_NODE.inputs}
+            or every != singly
+        ):
             continue
         monitor = Monitor(replace(known, node=replace(known.node, guarantees=(_guarantee(whole),))))
         told: list[Violation] = []

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from drawn.memory import formula, response, run_of
 from helpers import some
 from oracle.values import Step, broken, value
-from temporal.test_cells import formula, response, run_of
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND, engine

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
 
 import pytest
+from drawn.memory import A, B, N, formula, response, run_of
 from oracle.values import Step, broken, value
 
 from avow.evaluation.evaluate import evaluate
@@ -25,81 +25,15 @@ from avow.language.terms import (
     And,
     Compare,
     History,
-    Iff,
     Implies,
     Limit,
     Literal,
     Not,
     Or,
     Past,
-    Role,
     Term,
-    Variable,
     histories,
 )
-
-A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
-N = Variable(Role.INPUT, "n", NATURAL)
-_RELATIONS = ("<=", "<", ">=", ">")
-
-
-def formula(rng: random.Random, depth: int, *, past: bool = True) -> Term:
-    """A random formula over `A`, `B` and `N`."""
-    if depth == 0:
-        return rng.choice((A, B, A, B, Compare("<=", N, Literal(rng.randrange(3), NATURAL)), TRUE, FALSE))
-    inner = lambda: formula(rng, depth - 1, past=past)  # noqa: E731
-    kind = rng.randrange(8) if past else rng.randrange(3)
-    match kind:
-        case 0:
-            return Not(inner())
-        case 1:
-            return rng.choice((And, Or))((inner(), inner()))
-        case 2:
-            return rng.choice((Implies, Iff))(inner(), inner())
-        case _:  # a record
-            return record(rng, inner)
-
-
-def record(rng: random.Random, inner: Callable[[], Term]) -> Term:
-    """A random formula that speaks of the past."""
-
-    def limit(relation: str = "") -> Limit:
-        amount = N if rng.random() < 0.15 else Literal(rng.randrange(4), NATURAL)
-        return Limit(relation, amount, True)
-
-    match rng.randrange(11):
-        case 0:
-            return History(Past.PREVIOUS, (inner(), inner()), BOOL)
-        case 1:
-            return History(rng.choice((Past.ROSE, Past.FELL, Past.CHANGED)), (inner(),), BOOL)
-        case 2:
-            return History(Past.CHANGED, (N,), BOOL)
-        case 3:
-            return Compare("==", N, History(Past.PREVIOUS, (N, rng.choice((N, Literal(2, NATURAL)))), NATURAL))
-        case 4 | 5:
-            bound = limit() if rng.random() < 0.6 else None
-            return History(rng.choice((Past.ONCE, Past.HISTORICALLY)), (inner(),), BOOL, bound)
-        case 6 | 7:
-            return History(Past.HELD, (inner(),), BOOL, limit())
-        case 8:
-            counted = History(Past.COUNTED, (inner(), inner()), NATURAL)
-            return Compare(rng.choice(_RELATIONS), counted, Literal(rng.randrange(4), NATURAL))
-        case _:  # since, the most intricate
-            bound = limit(rng.choice(_RELATIONS)) if rng.random() < 0.75 else None
-            return History(Past.SINCE, (inner(), inner()), BOOL, bound)
-
-
-def response(rng: random.Random) -> tuple[Term, History]:
-    """A random trigger, which may speak of the past, and a response to it."""
-    trigger, wanted = formula(rng, 1), formula(rng, 1)
-    operator = rng.choice((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL))
-    bound = Limit("", Literal(rng.randrange(4), NATURAL), True) if operator in (Past.WITHIN, Past.FOR) else None
-    arguments = (wanted, formula(rng, 1)) if operator is Past.UNTIL else (wanted,)
-    return trigger, History(operator, arguments, BOOL, bound)
-
-
-def run_of(rng: random.Random, length: int = 9) -> list[Step]:
-    return [{"in.a": rng.random() < 0.6, "out.b": rng.random() < 0.5, "in.n": rng.randrange(4)} for _ in range(length)]
 
 
 def judged(term: Term, run: list[Step]) -> list[Value]:

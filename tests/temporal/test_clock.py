@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import pytest
+from drawn.memory import timed_formula, timed_response, word_of
 from oracle.seconds import InSeconds, Word
 
 from avow.evaluation.evaluate import evaluate
@@ -17,79 +18,13 @@ from avow.formulas.temporal.cell import Unsaid
 from avow.formulas.temporal.clock import Timed
 from avow.formulas.values import Value
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, NATURAL, REAL
+from avow.language.sorts import BOOL
 from avow.language.terms import (
     FALSE,
-    And,
-    Compare,
-    History,
-    Iff,
     Implies,
-    Limit,
-    Literal,
-    Not,
-    Or,
-    Past,
-    Role,
     Term,
-    Variable,
     timed,
 )
-
-A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
-X = Variable(Role.INPUT, "x", REAL)
-_RELATIONS = ("<=", "<", ">=", ">")
-
-
-def seconds(rng: random.Random, relation: str = "") -> Limit:
-    amount: Term = X if rng.random() < 0.15 else Literal(Fraction(rng.randrange(4)), REAL)
-    return Limit(relation, amount, False)
-
-
-def formula(rng: random.Random, depth: int) -> Term:
-    """A random formula over positions."""
-    if depth == 0:
-        return rng.choice((A, B, A, B, Compare("<=", X, Literal(Fraction(1), REAL)), FALSE))
-    inner = lambda: formula(rng, depth - 1)  # noqa: E731
-    state = lambda: formula(rng, 0)  # noqa: E731
-    match rng.randrange(13):
-        case 0:
-            return Not(inner())
-        case 1 | 2:
-            return rng.choice((And, Or))((inner(), inner()))
-        case 3:
-            return rng.choice((Implies, Iff))(inner(), inner())
-        case 4:
-            return History(rng.choice((Past.ROSE, Past.FELL, Past.CHANGED)), (state(),), BOOL)
-        case 5:
-            return History(Past.PREVIOUS, (inner(), inner()), BOOL)
-        case 6:
-            return History(Past.ARRIVED, (A,), BOOL)
-        case 7:
-            bound = Limit("", Literal(rng.randrange(3), NATURAL), True)
-            return History(rng.choice((Past.ONCE, Past.HISTORICALLY, Past.HELD)), (inner(),), BOOL, bound)
-        case 8:
-            counted = History(Past.COUNTED, (inner(), inner()), NATURAL)
-            return Compare(rng.choice(_RELATIONS), counted, Literal(rng.randrange(4), NATURAL))
-        case 9 | 10:
-            operator = rng.choice((Past.ONCE, Past.HISTORICALLY, Past.HELD))
-            bound = seconds(rng) if operator is Past.HELD or rng.random() < 0.7 else None
-            return History(operator, (inner(),), BOOL, bound)
-        case _:  # since, the most intricate
-            bound = seconds(rng, rng.choice(_RELATIONS)) if rng.random() < 0.8 else None
-            return History(Past.SINCE, (inner(), inner()), BOOL, bound)
-
-
-def word_of(rng: random.Random, length: int = 7) -> Word:
-    steps = [
-        {"in.a": rng.random() < 0.6, "out.b": rng.random() < 0.5, "in.x": Fraction(rng.randrange(4)),
-         "in.arrived a": rng.random() < 0.5}
-        for _ in range(length)
-    ]  # fmt: skip
-    times = [0]
-    for _ in range(length - 1):
-        times.append(times[-1] + rng.choice((0, 1, 1, 2, 3)))
-    return Word(steps, times)
 
 
 def ports(word: Word, k: int) -> dict[str, Value]:
@@ -125,12 +60,8 @@ def along(
 
 def disagreement(rng: random.Random, depth: int) -> str | None:
     """A formula of which cells and definition say something else somewhere in a word; empty where it is not said."""
-    term, word = formula(rng, depth), word_of(rng)
-    trigger = formula(rng, depth - 1)
-    operator = rng.choice((Past.WITHIN, Past.FOR, Past.UNTIL))
-    limit = Limit("", Literal(Fraction(rng.randrange(4)), REAL), False) if operator is not Past.UNTIL else None
-    wanted = (formula(rng, 1), formula(rng, 1)) if operator is Past.UNTIL else (formula(rng, 1),)
-    response = History(operator, wanted, BOOL, limit)
+    term, word = timed_formula(rng, depth), word_of(rng)
+    trigger, response = timed_response(rng, depth - 1)
     meaning = InSeconds(word)
     for whole in (term, Implies(trigger, response)):
         if timed(whole) is None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import random
 
 import pytest
+from drawn.formulas import NATURAL as NUMBER
+from drawn.formulas import Formulas, checked
 from helpers import some
 from oracle.values import Meaning, Step, plain
 
@@ -13,49 +15,35 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
 from avow.formulas.values import FunctionValue, SequenceValue, Value
-from avow.language.load import check_text
+from avow.language.load import check_text, parse_formula
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, NATURAL, FunctionSort, SequenceSort
-from avow.language.terms import Apply, Compare, In, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.language.sorts import NATURAL
+from avow.language.terms import Term
 from avow.tuning.bounds import INSTANCES
 from temporal import test_cells
-from temporal.test_cells import A, N, record
 
-K, L = (Variable(Role.BOUND, name, NATURAL) for name in "kl")
-F = Variable(Role.INPUT, "f", FunctionSort((NATURAL,), BOOL))
-G = Variable(Role.INPUT, "g", FunctionSort((NATURAL,), NATURAL))
-P = Variable(Role.INPUT, "p", FunctionSort((NATURAL, NATURAL), BOOL))
-S = Variable(Role.INPUT, "s", SequenceSort(NATURAL))
+PORTS = "a : BOOL, n : NATURAL, f : NATURAL --> BOOL, g : NATURAL --> NATURAL, p : NATURAL x NATURAL --> BOOL"
+NODE = checked(f"node n {{ inputs( {PORTS}, s : <NATURAL> ) outputs( b : BOOL ) topics() guarantee( TRUE ) }}").nodes[0]
 NAMED, ALL = 4, 7
 """Steps speak of numbers below the one; the definitions look at those below the other."""
 
 
-def atom(rng: random.Random, bound: tuple[Variable, ...]) -> Term:
-    i, j = rng.choice(bound), rng.choice(bound)
-    return rng.choice(
-        (
-            A,
-            Apply(F, (i,), BOOL),
-            Apply(F, (i,), BOOL),
-            Apply(P, (i, j), BOOL),
-            Compare(rng.choice(("==", "<=", ">")), Apply(G, (i,), NATURAL), N),
-            Compare("==", i, N),
-            In(i, S),
-        )
-    )
-
-
 def quantified(rng: random.Random, depth: int) -> Term:
-    bound = rng.choice(((K,), (K, L)))
-    variables = frozenset(bound)
+    bound, made = rng.choice((("k",), ("k", "l"))), Formulas(rng)
 
-    def inside(depth: int) -> Term:
+    def inside(depth: int) -> str:
         if depth == 0:
-            return atom(rng, bound)
-        return record(rng, lambda: inside(depth - 1)) if rng.random() < 0.7 else Not(inside(depth - 1))
+            i, j = rng.choice(bound), rng.choice(bound)
+            order = rng.choice(("==", "<=", ">"))
+            return rng.choice(
+                ("a", f"f({i})", f"f({i})", f"p({i}, {j})", f"g({i}) {order} in.n", f"{i} == in.n", f"{i} in s")
+            )
+        if rng.random() < 0.7:
+            return made.past(lambda: inside(depth - 1), {"in.n": NUMBER})
+        return f"not ({inside(depth - 1)})"
 
-    kind = rng.choice((Quantifier.FORALL, Quantifier.EXISTS))
-    return Quantified(kind, tuple(v for v in bound if v in variables), inside(depth))
+    text = f"{rng.choice(('forall', 'exists'))}({', '.join(bound)} in NATURAL | {inside(depth)})"
+    return parse_formula(text, NODE, remembers=True)
 
 
 def run_of(rng: random.Random, length: int = 6) -> list[Step]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from drawn.memory import clause
 from helpers import some
 
 from avow.base.diagnostics import Rejected
@@ -22,33 +23,20 @@ from avow.cli.compose import command as compose_command
 from avow.cli.simulate import command as simulate
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
-from avow.formulas.formula import substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cells import CELL, Records
 from avow.formulas.temporal.clock import Timed
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
-from avow.language.sorts import NATURAL
-from avow.language.terms import Implies, Literal, Term
+from avow.language.terms import Term
 from avow.system.load import load_system
-from temporal.test_cells import N, formula, response
 
 Step = Mapping[str, Value]
 STATES = 400
 PLAN = """requirements:
   R: {{text: "R", formula: "{}", supported_by: [a, b]}}
 """
-
-
-def clause(rng: random.Random) -> Term:
-    """A random clause with few states."""
-    if rng.random() < 0.5:
-        trigger, wanted = response(rng)
-        found: Term = Implies(trigger, wanted)
-    else:
-        found = formula(rng, rng.randrange(1, 3))
-    return substitute(found, {N: Literal(1, NATURAL)})
 
 
 class Enumeration:

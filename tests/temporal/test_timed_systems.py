@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from drawn.memory import X, timed_formula
 from helpers import some
 
 from avow.base.verdict import Verdict
@@ -19,7 +20,6 @@ from avow.language.load import check_text
 from avow.language.sorts import REAL
 from avow.language.terms import Implies, Literal, Past, Term, histories, timed
 from avow.sanity.viability import viable
-from temporal.test_clock import X, formula
 from temporal.test_systems import Enumeration, system, verdicts
 
 STOPPER = """
@@ -91,9 +91,9 @@ def test_known_answers(clauses: str, expected: Verdict) -> None:
 def clause(rng: random.Random) -> Term:
     """A random clause with few states, without events of messages; every other one has a limit in seconds."""
     while True:
-        found = formula(rng, 2)
+        found = timed_formula(rng, 2)
         if rng.random() < 0.4:
-            found = Implies(formula(rng, 1), found)
+            found = Implies(timed_formula(rng, 1), found)
         found = substitute(found, {X: Literal(Fraction(1), REAL)})
         if all(h.operator is not Past.ARRIVED for h in histories(found)) and (timed(found) or rng.random() < 0.3):
             return found

@@ -7,6 +7,7 @@ import random
 from dataclasses import replace
 
 import pytest
+from drawn.memory import N, clause, formula
 from helpers import some
 from oracle.runs import environment_wins, runs
 from oracle.values import breaks
@@ -21,8 +22,6 @@ from avow.language.terms import Literal, Not, Term, Variable
 from avow.sanity.analysis import analyse
 from avow.sanity.viability import viable
 from avow.system.formulas import ports_of
-from temporal.test_cells import N, formula
-from temporal.test_systems import clause
 
 DEPTH = 5
 
