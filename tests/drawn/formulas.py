@@ -56,6 +56,7 @@ class Knobs:
     terms: int = 1
     """How deep terms are."""
     arithmetic: bool = True
+    """Sums, and quantifiers over numbers."""
     builtin: bool = True
     """min, mod, if …, of numbers."""
     partial: bool = True
@@ -144,11 +145,13 @@ class Formulas:
         known = list(self._known(of, depth, names))
         if known and self.random.random() < 0.6:
             return choice(known)()
+        if depth > 0 and self.knobs.builtin and of != BOOL and of not in NUMBERS and self.random.random() < 0.08:
+            return self._either(of, depth, names)
         match of.kind:
             case "REAL" | "INTEGER" | "NATURAL":
                 return self._number(of, depth, names)
             case "BOOL":
-                return f"({self.formula(depth - 1, names)})" if depth > 0 else choice(("TRUE", "FALSE"))
+                return f"({self.formula(depth - 1, names, depth - 1)})" if depth > 0 else choice(("TRUE", "FALSE"))
             case "STRING":
                 return choice(_WILD_TEXTS if self.knobs.wild else _TEXTS)
             case "enum":
@@ -171,7 +174,7 @@ class Formulas:
             if t == of:
                 yield from [lambda name=name: name] * 2  # type: ignore[misc]
             elif t.kind == "fun" and depth > 0 and t.parts[-1] == of and not t.opaque:
-                yield lambda name=name, t=t: self._applied(name, t, depth, names)  # type: ignore[misc]
+                yield from [lambda name=name, t=t: self._applied(name, t, depth, names)] * 2  # type: ignore[misc]
             elif t.kind == "seq" and t.parts[0] == of and self.knobs.partial:
                 yield lambda name=name: f"{name}({self._small(names)})"  # type: ignore[misc]
 
@@ -191,13 +194,17 @@ class Formulas:
         naturals = [name for name, t in names.items() if t == NATURAL]
         return self.random.choice(["0", "1", "2", *naturals, *naturals])
 
+    def _either(self, of: Type, depth: int, names: Names) -> str:
+        one, other = (self.term(of, depth - 1, names) for _ in range(2))
+        return f"(if {self.formula(depth - 1, names, depth - 1)} then {one} else {other})"
+
     def _number(self, of: Type, depth: int, names: Names) -> str:
         choice = self.random.choice
         forms = ["literal", "literal", "narrow"]
         if any(t.kind == "seq" for t in names.values()):
             forms.append("length")
         if depth > 0 and self.knobs.arithmetic:
-            forms += ["sum", "sum", "sum", "negative", "quotient"]
+            forms += ["sum", "sum", "sum", "negative", "quotient", "quotient"]
         if depth > 0 and self.knobs.builtin:
             forms += ["if", "builtin"]
 
@@ -215,9 +222,10 @@ class Formulas:
             case "negative" if of != NATURAL:
                 return f"-({inner()})"
             case "quotient" if of == REAL:
-                return f"({inner()} / {inner() if self.knobs.partial else choice((2, 3, 7, '2.5'))})"
+                divisor = inner() if self.knobs.partial else "0"
+                return f"({inner()} / {choice((2, 3, 7, '2.5')) if divisor == '0' else divisor})"
             case "if":
-                return f"(if {self.formula(depth - 1, names)} then {inner()} else {inner()})"
+                return self._either(of, depth, names)
             case "builtin":
                 whole = inner(choice((INTEGER, NATURAL)) if of != NATURAL else NATURAL)
                 calls = [f"{choice(('min', 'max'))}({inner()}, {inner()})", f"abs({inner()})"]
@@ -226,30 +234,37 @@ class Formulas:
 
     # -- formulas ------------------------------------------------------------------------------------------------------
 
-    def atom(self, names: Names) -> str:
-        choice, depth = self.random.choice, self.knobs.terms
+    def atom(self, names: Names, depth: int) -> str:
+        """A formula without connectives; its terms are so deep."""
+        choice = self.random.choice
         spoken = [t for t in names.values() if t.kind != "fun"]
         spoken += [t.parts[-1] for t in names.values() if t.kind == "fun"] if depth else []
         spoken += [t.parts[0] for t in names.values() if t.kind == "seq"]
         of = choice([*spoken, self.basic()] if self.knobs.wild or not spoken else spoken)
+        of = choice(NUMBERS) if self.knobs.wild and self.random.random() < 0.3 else of
         if of.opaque:
             same = [n for n, t in names.items() if t == of]
             return f"{choice(same)} {choice(('==', '!='))} {choice(same)}" if same else "TRUE"
         form = self.random.random()
-        if not depth and not of.opaque:
+        if not self.knobs.terms:
             return self._plain(of, names)
         if of == BOOL and form < 0.75:
             return self.term(BOOL, depth, names)
         one = self.term(of, depth, names)
         if of in NUMBERS and form < 0.7:
-            other = self.term(choice((of, INTEGER, REAL)) if depth else of, depth, names)
+            other = self._another(one, choice((of, INTEGER, REAL)), depth, names)
             if form < 0.15:
                 first, second = choice((("<", "<="), (">", ">="), ("==", "<"), ("<=", "=="), ("<=", "<")))
                 return f"{self.term(INTEGER, 0, names)} {first} {one} {second} {other}"
             return f"{one} {choice((*ORDERS, '==', '!='))} {other}"
         if depth and form > 0.8:
-            return f"{one} {choice(('in', '!in', 'in'))} {self._among(of, names)}"
-        return f"{one} {choice(('==', '==', '!='))} {self.term(of, depth, names)}"
+            return f"{one} {choice(('in', '!in', 'in'))} {self._among(of, depth, names)}"
+        return f"{one} {choice(('==', '==', '!='))} {self._another(one, of, depth, names)}"
+
+    def _another(self, one: str, of: Type, depth: int, names: Names) -> str:
+        """A term, most likely another than this one."""
+        drawn = [self.term(of, depth, names) for _ in range(2)]
+        return next((term for term in drawn if term != one), one)
 
     def _plain(self, of: Type, names: Names) -> str:
         """A name, or how it compares with another or a constant."""
@@ -263,26 +278,32 @@ class Formulas:
         other = choice(others) if others and self.random.random() < 0.4 else self.term(of, 0, {})
         return f"{one} {choice((*ORDERS, '==', '!=') if of in NUMBERS else ('==', '!='))} {other}"
 
-    def _among(self, of: Type, names: Names) -> str:
+    def _among(self, of: Type, depth: int, names: Names) -> str:
         """A collection of things of a type."""
         known = [name for name, t in self.sets.items() if t == of]
         known += [name for name, t in names.items() if t.kind == "seq" and t.parts[0] == of]
         known += [of.name] if of.kind == "enum" and of.name in self.types else []
         known += [self._upto(names)] if of == NATURAL else []
-        made = self.collection(of, self.knobs.terms, names, "{}")
+        made = self.collection(of, depth, names, "{}")
         return self.random.choice([*known, made, made])
 
-    def formula(self, depth: int, names: Names) -> str:
+    def formula(self, depth: int, names: Names, terms: int | None = None) -> str:
+        """`terms`: how deep its terms are, if not as the knobs say."""
         knobs, chance = self.knobs, self.random.random()
+        terms = knobs.terms if terms is None else terms
+
+        def smaller() -> str:
+            return self.formula(depth - 1, names, terms)
+
         if depth <= 0 or chance < knobs.atoms:
-            return self.atom(names)
+            return self.atom(names, terms)
         if chance < knobs.atoms + knobs.quantified:
-            return self.quantified(depth, names)
+            return self.quantified(depth, names, terms)
         if chance < knobs.atoms + knobs.quantified + knobs.past:
-            return self.past(lambda: self.formula(depth - 1, names), names)
+            return self.past(smaller, names)
 
         def part() -> str:
-            inner = self.formula(depth - 1, names)
+            inner = smaller()
             return inner if self.random.random() < knobs.bare else f"({inner})"
 
         match self.random.choice(knobs.connectives):
@@ -297,7 +318,7 @@ class Formulas:
             case sign:
                 return f"{part()} {sign} {part()}"
 
-    def quantified(self, depth: int, names: Names) -> str:
+    def quantified(self, depth: int, names: Names, terms: int) -> str:
         inside, binders = dict(names), []
         for _ in range(self.random.choice((1, 1, 2) if self.knobs.wild else (1,))):
             of, domain = self.domain(names)
@@ -308,7 +329,7 @@ class Formulas:
             binders.append(f"{', '.join(variables)} in {domain}")
         word = self.random.choice(("forall", "forall", "exists", "exists", "exists_unique"))
         sign = self.random.choice("|;") if self.knobs.wild else "|"
-        return f"{word}({', '.join(binders)} {sign} {self.formula(depth - 1, inside)})"
+        return f"{word}({', '.join(binders)} {sign} {self.formula(depth - 1, inside, terms)})"
 
     def domain(self, names: Names) -> tuple[Type, str]:
         """What a bound variable ranges over."""
@@ -316,9 +337,9 @@ class Formulas:
         finite = [t for t in (BOOL, *self.types.values()) if t.finite and t.kind != "fun"]
         sequences = [(name, t) for name, t in names.items() if t.kind == "seq"]
         match choice(("type", "type", "type", "upto", "numbers", "sequence", "set", "any")):
-            case "upto":
+            case "upto" if self.knobs.arithmetic:
                 return NATURAL, self._upto(names)
-            case "numbers":
+            case "numbers" if self.knobs.arithmetic:
                 return choice(((INTEGER, "{-1, 0, 5}"), (REAL, "{0, 0.5, 2}")))
             case "sequence" if sequences:
                 name, t = choice(sequences)
@@ -327,13 +348,12 @@ class Formulas:
                 name = choice(list(self.sets))
                 return self.sets[name], name
             case "set":
-                of = choice([*finite, NATURAL])
+                of = choice([*finite, NATURAL] if self.knobs.arithmetic else finite)
                 return of, self.collection(of, 1, names, "{}")
             case "any" if self.knobs.wild:
-                of = self.basic()
-                return of, self.written(of)
+                finite = [self.basic()]
         of = choice(finite)
-        return of, self.written(of)
+        return of, f"({', '.join(map(self.written, of.parts))})" if of.kind == "tuple" else self.written(of)
 
     # -- other steps ---------------------------------------------------------------------------------------------------
 
@@ -359,7 +379,7 @@ class Formulas:
             case "previous":
                 return f"previous({inner()}, {inner()})"
             case "edge":
-                what = self.atom(names) if self.knobs.seconds else inner()
+                what = self.atom(names, 0) if self.knobs.seconds else inner()
                 return f"{choice(('rose', 'fell', 'changed'))}({what})"
             case "number":
                 before = f"{numbers[0]} == previous({numbers[0]}, {choice((numbers[0], '2'))})"

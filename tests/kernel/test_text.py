@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 import pytest
-from language.typed import Contracts
-from logic.random_contracts import random_contract
+from drawn.contracts import Strange, small_contract
 
 from avow.formulas.formula import negation
 from avow.kernel.solvers import Said, ask_z3
@@ -58,7 +57,7 @@ def over(written: Callable[[int], str], seeds: range, second: Apart | None = Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("written", [lambda seed: Contracts(seed).text(), random_contract], ids=["types", "cases"])
+@pytest.mark.parametrize("written", [lambda seed: Strange(seed).text(), small_contract], ids=["types", "cases"])
 def test_generated_contracts(written: Callable[[int], str]) -> None:
     told = over(written, range(6))
     assert told["unsat"] > 0
@@ -68,7 +67,7 @@ def test_generated_contracts(written: Callable[[int], str]) -> None:
 
 @pytest.mark.nightly
 @pytest.mark.needs_cvc5
-@pytest.mark.parametrize("written", [lambda seed: Contracts(seed).text(), random_contract], ids=["types", "cases"])
+@pytest.mark.parametrize("written", [lambda seed: Strange(seed).text(), small_contract], ids=["types", "cases"])
 def test_generated_contracts_at_length(written: Callable[[int], str]) -> None:
     second = Apart("cvc5")
     try:

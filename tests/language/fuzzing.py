@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from drawn.contracts import CONTRACT, Varied
+
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.rendering import render, to_json, to_sarif
@@ -28,8 +30,6 @@ from avow.language.load import check_text
 from avow.language.translate import FORMATS
 from avow.solving.contract_smtlib import to_smtlib
 from avow.tuning.shown import DIAGNOSTICS
-
-from .generate import CONTRACT, Formulas, damaged
 
 SECONDS = 10.0
 """CPU time for all that is done with one text (of some 10 kB at most)."""
@@ -238,7 +238,7 @@ def texts(root: Path, seed: int, count: int, *, short: bool = False) -> Iterator
     source = random.Random(seed)
     sources = [text for text in seeds(root) if not short or len(text) < SHORT]
     made = 0
-    for text in _endless(source, sources, Formulas(seed)):
+    for text in _endless(source, sources, Varied(seed)):
         if not short or len(text) <= SHORT:
             yield text
             made += 1
@@ -246,7 +246,7 @@ def texts(root: Path, seed: int, count: int, *, short: bool = False) -> Iterator
             return
 
 
-def _endless(source: random.Random, sources: Sequence[str], formulas: Formulas) -> Iterator[str]:
+def _endless(source: random.Random, sources: Sequence[str], formulas: Varied) -> Iterator[str]:
     while True:
         match source.randrange(20):
             case 0:
@@ -272,6 +272,42 @@ def _endless(source: random.Random, sources: Sequence[str], formulas: Formulas) 
                 yield damaged(source.choice(sources), source)
             case _:
                 yield mutated(source.choice(sources), source, sources)
+
+
+_PIECES = re.compile(r"\w+'*|[^\w\s]+|\s+")
+_WORDS = (
+    *("context", "node", "inputs", "outputs", "topics", "matches", "assume", "guarantee", "forall", "exists", "in"),
+    *("exists_unique", "upto", "length", "TRUE", "REAL", "STRING", "A", "G", "x", "not", "!in", "out", ".", "1.5"),
+    *("<", ">", "<>", "<=>", "->", "-->", "--", "==", "=", "{", "}", "(", ")", "|", ";", "//", "/*", "*/", '"', "\n"),
+    *("∀", "é", "\x00", "\x1b[31m", "\\", "9" * 600, "'", "\ufeff", "\u202e"),
+)
+
+
+def damaged(text: str, source: random.Random) -> str:
+    """The text with a few of its words replaced, dropped, doubled, swapped or reversed, or junk put between them."""
+    if source.random() < 0.4:
+        start = source.randrange(len(text))
+        text = text[start : start + source.randrange(3000)]
+    parts = _PIECES.findall(text)
+    for _ in range(source.randrange(1, 12)):
+        if not parts:
+            break
+        at = source.randrange(len(parts))
+        match source.randrange(7):
+            case 0 | 1:
+                parts[at] = source.choice(_WORDS)
+            case 2:
+                del parts[at]
+            case 3:
+                parts.insert(at, source.choice(_WORDS))
+            case 4:
+                other = source.randrange(len(parts))
+                parts[at], parts[other] = parts[other], parts[at]
+            case 5:
+                parts[at] = parts[at][::-1]
+            case _:
+                parts.insert(at, "".join(chr(source.randrange(0x3000)) for _ in range(source.randrange(6))))
+    return "".join(parts)
 
 
 # --- what must hold --------------------------------------------------------------------------------------------------

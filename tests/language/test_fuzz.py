@@ -16,7 +16,6 @@ from avow.base.diagnostics import Rejected
 from avow.language.load import check_text, parse_formula
 
 from . import fuzzing
-from .generate import damaged
 from .test_printer import LOADED, NODE
 
 ROUNDS = int(os.environ.get("AVOW_FUZZ", "300"))
@@ -60,7 +59,7 @@ def test_the_fuzzer_notices(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_damaged_formulas() -> None:
     source = random.Random(SEED + 1)
     for _ in range(ROUNDS // 4):
-        text = damaged(
+        text = fuzzing.damaged(
             "forall(x in REAL, y in NATURAL | in.m(x, y) and x < 3.5 -> c == move(x, y)) <=> st in Q", source
         )
         with contextlib.suppress(Rejected), fuzzing.at_most(fuzzing.SECONDS):

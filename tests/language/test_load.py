@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from drawn.contracts import CONTRACT
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract, Node
@@ -43,8 +44,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-
-from .generate import CONTRACT
 
 
 def load(text: str) -> Contract:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+from drawn.contracts import CONTRACT, Varied
 from helpers import some
 
 from avow.base.diagnostics import Rejected
@@ -13,8 +14,6 @@ from avow.language.printer import show_number, show_sort, show_term, show_type
 from avow.language.sorts import REAL, OpaqueSort
 from avow.language.terms import And, Literal, Or, Role, Variable
 
-from .generate import CONTRACT, Formulas
-
 LOADED = check_text(CONTRACT, "t")[0]
 assert LOADED is not None
 NODE = LOADED.nodes[0]
@@ -22,7 +21,7 @@ NODE = LOADED.nodes[0]
 
 @pytest.mark.parametrize("seed", some(range(8), 3))
 def test_round_trip_of_random_formulas(seed: int) -> None:
-    formulas = Formulas(seed)
+    formulas = Varied(seed)
     kept, faults = 0, []
     for _ in range(250):
         text = formulas.formula(1 + formulas.random.randrange(4))

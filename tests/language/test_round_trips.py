@@ -7,6 +7,7 @@ import os
 from dataclasses import replace
 
 import pytest
+from drawn.contracts import Strange
 
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import node_digest
@@ -15,8 +16,6 @@ from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
 from avow.solving.contract_smtlib import to_smtlib
-
-from .typed import Contracts
 
 ROUNDS = max(60, int(os.environ.get("AVOW_FUZZ", "300")) // 4)
 SEED = int(os.environ.get("AVOW_FUZZ_SEED", "20261122"))
@@ -35,7 +34,7 @@ def digests(contract: Contract) -> list[str]:
 def made() -> list[tuple[str, tuple[str, ...], Contract]]:
     found = []
     for seed in range(SEED, SEED + ROUNDS):
-        source = Contracts(seed)
+        source = Strange(seed)
         text = source.text()
         contract, diagnostics = check_text(text, "f")
         if contract is None:  # the generator does not see every rule of types

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from drawn.contracts import CONTRACT
 
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_text
 from avow.language.source import Reports, Source
-
-from .generate import CONTRACT
 
 # --- the grammar -----------------------------------------------------------------------------------------------------
 

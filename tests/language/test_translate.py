@@ -9,13 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from drawn.contracts import CONTRACT
 
 from avow.base.diagnostics import Rejected
 from avow.language.contract import Contract
 from avow.language.load import check_text, load_contract
 from avow.language.translate import FORMATS
-
-from .generate import CONTRACT
 
 HOSTILE = r"""
 context { T_x' : {a_b, c'd, e''}; F : {u, v} x (REAL, <T_x'>) --> REAL x REAL;

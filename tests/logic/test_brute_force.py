@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import pytest
+from drawn.contracts import FUNCTION_OUTPUT, INPUTS, OUTPUTS, finite_formulas
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from oracle.values import Step, domain, holds, plain, situations
@@ -16,8 +17,6 @@ from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.terms import Not, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.solving.questions import entails, replay, solve
-
-from .random_formulas import FUNCTION_OUTPUT, INPUTS, OUTPUTS, formulas
 
 few = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
@@ -37,7 +36,7 @@ def as_value(value: object) -> Value:
 
 
 @few
-@given(formulas())
+@given(finite_formulas())
 def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
     free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
     expected = any(holds(term, s) for s in situations(free))
@@ -48,7 +47,7 @@ def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
 
 
 @few
-@given(formulas(), formulas())
+@given(finite_formulas(), finite_formulas())
 def test_entailment_is_right(left: Term, right: Term) -> None:
     free = tuple(sorted(free_variables(left) | free_variables(right), key=lambda v: v.qualified))
     expected = all(holds(right, s) for s in situations(free) if holds(left, s))
@@ -61,7 +60,7 @@ def test_entailment_is_right(left: Term, right: Term) -> None:
 
 
 @few
-@given(formulas(), st.data())
+@given(finite_formulas(), st.data())
 def test_replay_agrees_with_evaluation(term: Term, data: st.DataObject) -> None:
     free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
     situation = data.draw(st.sampled_from(situations(free)))
@@ -69,7 +68,7 @@ def test_replay_agrees_with_evaluation(term: Term, data: st.DataObject) -> None:
 
 
 @few
-@given(formulas())
+@given(finite_formulas())
 def test_normal_forms_keep_the_meaning(term: Term) -> None:
     free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
     for form in (normalise(term), push_negations(term)):
@@ -88,7 +87,7 @@ def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
     verdicts: list[Verdict] = []
 
     @settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
-    @given(formulas(INPUTS), st.lists(formulas(INPUTS + outputs), min_size=1, max_size=3))
+    @given(finite_formulas(INPUTS), st.lists(finite_formulas(INPUTS + outputs), min_size=1, max_size=3))
     def check(assumption: Term, guarantees: list[Term]) -> None:
         def met(inputs: Step) -> bool:
             return any(all(holds(g, {**inputs, **out}) for g in guarantees) for out in situations(outputs))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from drawn.contracts import INPUTS, OUTPUTS, finite_formulas
 from hypothesis import given, settings
 
 from avow.evaluation.evaluate import compile_term
@@ -12,7 +13,6 @@ from avow.formulas.conditions import conditions
 from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.terms import Not, Term
-from logic.random_formulas import INPUTS, OUTPUTS, formulas
 
 RCL = """
 context {{ Mode : {{off, on}}; }}
@@ -82,6 +82,6 @@ def test_under_quantifiers(text: str, number: int) -> None:
 
 
 @settings(max_examples=120, deadline=None)
-@given(formulas(free=(*INPUTS[:1], *OUTPUTS[:1], INPUTS[2], OUTPUTS[1])))
+@given(finite_formulas(free=(*INPUTS[:1], *OUTPUTS[:1], INPUTS[2], OUTPUTS[1])))
 def test_denying_twice_changes_nothing(term: Term) -> None:
     assert conditions(Not(Not(term))) == conditions(term)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import pytest
+from drawn.contracts import small_contract
 from oracle.sanity import Survey, is_small, judge
 from oracle.values import Meaning
 
@@ -22,7 +23,6 @@ from avow.sanity.analysis import SanityResult, analyse
 from avow.sanity.claims import Property
 
 from .contracts import node
-from .random_contracts import random_contract
 
 QUICK = (1, 3, 7, 8, 22, 24, 25, 28)
 COUNT = int(os.environ.get("AVOW_ORACLE_CONTRACTS", "8"))
@@ -50,15 +50,15 @@ class Tally:
         )
 
 
-def small_contract(seed: int) -> Node | None:
+def small_node(seed: int) -> Node | None:
     """None if the text is ill-typed (``<> == <>``), or has too many cases for the oracle."""
-    found, _ = check_text(random_contract(seed), "test.rcl")
+    found, _ = check_text(small_contract(seed), "test.rcl")
     return found.nodes[0] if found is not None and is_small(found.nodes[0]) else None
 
 
 @cache
 def analysed(seed: int) -> tuple[Node, tuple[SanityResult, ...]]:
-    found = small_contract(seed)
+    found = small_node(seed)
     assert found is not None, "the quick ones are small"
     return found, analyse(found)
 
@@ -66,7 +66,7 @@ def analysed(seed: int) -> tuple[Node, tuple[SanityResult, ...]]:
 def tally(seeds: Iterable[int]) -> Tally:
     found = Tally()
     for seed in seeds:
-        asked = small_contract(seed)
+        asked = small_node(seed)
         if asked is None:
             found.skipped += 1
             continue
@@ -75,7 +75,7 @@ def tally(seeds: Iterable[int]) -> Tally:
         found.contracts += 1
         found.claims += len(results)
         found.hinging += len(judgement.hinging)
-        found.wrong += [f"{seed}: {name}\n{random_contract(seed)}" for name in judgement.wrong]
+        found.wrong += [f"{seed}: {name}\n{small_contract(seed)}" for name in judgement.wrong]
         found.unknown += [f"{seed}: {name}" for name in judgement.unknown]
     return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import z3
+from drawn.contracts import finite_formulas
 from helpers import some
 from hypothesis import HealthCheck, given, settings
 
@@ -15,7 +16,6 @@ from avow.solving.questions import solve
 from avow.solving.smtlib import ask_cvc5, formulas_script
 
 from .contracts import case_study
-from .random_formulas import formulas
 from .test_smt import FALSE_SOMEWHERE, TRUE_ALWAYS, say
 
 LINEAR = [pair for pair in TRUE_ALWAYS + FALSE_SOMEWHERE if "in.r *" not in pair[0]]
@@ -44,7 +44,7 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
 @pytest.mark.nightly
 @pytest.mark.needs_cvc5
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
-@given(formulas())
+@given(finite_formulas())
 def test_cvc5_never_contradicts_z3(term: Term) -> None:
     answer = solve([term], effort=10_000).status
     other = ask_cvc5(formulas_script([term]), effort=5_000)

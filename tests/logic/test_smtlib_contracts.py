@@ -9,7 +9,7 @@ from collections import Counter
 
 import pytest
 import z3
-from language.generate import CONTRACT, Formulas
+from drawn.contracts import CONTRACT, Varied
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
@@ -26,7 +26,7 @@ SAYS = {Verdict.PROVED: "sat", Verdict.REFUTED: "unsat"}
 
 def generated(seed: int) -> Contract:
     """A contract of the node in `CONTRACT`, with random clauses; one in three made contradictory."""
-    formulas, source = Formulas(seed), random.Random(seed)
+    formulas, source = Varied(seed), random.Random(seed)
     while True:
         assumed = formulas.formula(1).replace("b2", "b").replace("st2", "st").replace("c == halt", "b")
         promised = [formulas.formula(1) for _ in range(source.choice((1, 2)))]
