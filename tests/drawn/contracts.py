@@ -43,7 +43,7 @@ _PORTS: Mapping[Type, str] = {
     STRING: '{v} in {{"a", ""}}',
     Type("seq", parts=(BOOL,)): "length({v}) <= 2",
     Type("seq", parts=(_PAIR,)): "length({v}) <= 1",
-    Type("seq", parts=(NATURAL,)): "length({v}) <= 1 and forall(n in NATURAL | n in {v} -> n < 3)",
+    Type("seq", parts=(NATURAL,)): "{v} in {{<>, <0>, <1>, <2>}}",
     Type("fun", parts=(COLOUR, BOOL)): "",
     Type("fun", parts=(COLOUR, COLOUR)): "",
     Type("fun", parts=(BOOL, _COMMAND)): "",
