@@ -165,7 +165,10 @@ class Timed(Records):
         for at in formula.breaks:
             if any(v.role is Role.BOUND for v in free_variables(_unapplied(at))):
                 raise Unsaid("limits in seconds that hang on a quantified variable")
-        return {side: formula.silent(Instant(ELAPSED, side)) for side in Side}, formula.breaks
+        found = {side: formula.silent(Instant(ELAPSED, side)) for side in Side}
+        begun = Compare("<=", ELAPSED, NO_TIME)  # right after the step: what that itself demands, it may have had
+        found[Side.AFTER] = Conditional(begun, formula.silent(Instant(NO_TIME, Side.AFTER)), found[Side.AFTER], BOOL)
+        return found, formula.breaks
 
     def throughout(self, formula: Lasting) -> Term:
         """That a formula is true all through the silence before a step. Raises Unsaid."""
