@@ -8,10 +8,10 @@ one that is derived through the same nodes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from avow.assurance.model import NodeView, ObligationView
 from avow.assurance.naming import requirement_claim
+from avow.base.records import dataclass
 from avow.evidence.claims import Standing
 from avow.evidence.obligation import Kind
 

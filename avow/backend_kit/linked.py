@@ -8,13 +8,14 @@ of either. A backend whose models can be run says so (`Backend.runs_models`); on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 from avow.backend_kit.protocol import Backend, Job, NoModel, wired
 from avow.backend_kit.registry import backend, judge_of_runs
 from avow.base.diagnostics import Rejected
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.formulas.values import Element, SequenceValue, Value, show

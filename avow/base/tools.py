@@ -10,12 +10,12 @@ import json
 import re
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base import process
 from avow.base.files import digest_file, sha256
 from avow.base.notes import cache_folder, read_note, write_note
+from avow.base.records import dataclass
 from avow.tuning.running import VERSION_SECONDS
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,12 @@ The engine's proofs are hints for `avow.calculus.finder`; certificates kept from
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING, assert_never
 
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, Phase, Settled
 from avow.calculus.discharge import Bounds

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates

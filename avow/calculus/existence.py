@@ -7,9 +7,9 @@ asks for values, and takes no proof that there are none for an answer.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, negation, rename
 from avow.language.terms import Role, Term, Variable

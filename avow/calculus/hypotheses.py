@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Hypothesis, HypothesisKind
 from avow.calculus.composition import Composition, argument
 from avow.calculus.questions import Answer

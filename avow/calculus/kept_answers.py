@@ -12,10 +12,11 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest
 from avow.kernel.solvers import Said, ask_z3

@@ -4,10 +4,11 @@ and comments do not count."""
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.files import sha256
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.calculus.variables import Frame
 from avow.formulas.formula import digest, sort_digest
 

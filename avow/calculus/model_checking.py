@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from random import Random
 
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.base.verdict import bound as named
 from avow.calculus.discharge import Bounds

@@ -7,8 +7,8 @@ open (`avow.calculus.narrowing`) are asked for only where a clause looks at them
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from avow.base.records import dataclass
 from avow.calculus.choices import Values, by_variable, definition, search
 from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
 from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened

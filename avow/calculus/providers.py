@@ -9,12 +9,13 @@ only the whole system can settle.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from typing import assert_never
 
 from avow.base.diagnostics import Severity
 from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.variables import Frame, indexed

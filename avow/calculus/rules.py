@@ -11,11 +11,12 @@ also from the step before (R4). Persistence and one output are `Latched` there: 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.variables import Frame
 from avow.language.contract import Clause

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
 from avow.base.diagnostics import Rejected
+from avow.base.records import dataclass
 from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values

@@ -14,8 +14,9 @@ is `Derived` in proofs/instances.dfy; the kernel's certificates are of the nodes
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from avow.base.records import dataclass
 from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from itertools import product
 from typing import Any, Protocol, assert_never
 
+from avow.base.records import dataclass
 from avow.formulas import values
 from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, Element, FunctionValue, Value

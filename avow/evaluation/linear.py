@@ -6,9 +6,9 @@ Small systems only: monitors ask ``exists(a, b in REAL | …)`` over the few poi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.tuning.bounds import CONSTRAINTS
 
 

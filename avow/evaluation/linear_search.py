@@ -7,10 +7,10 @@ the points of a table, so that the formula is a system of inequalities in a, whi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
+from avow.base.records import dataclass
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.disjunctions import Part, conjunction

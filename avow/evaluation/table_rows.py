@@ -4,9 +4,9 @@ are left."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.patterns import Match, patterns
 from avow.formulas.disjunctions import Part

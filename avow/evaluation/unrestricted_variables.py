@@ -10,11 +10,12 @@ on the variable breaks the argument, and the variable is refused.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.linear_search import linear_step
 from avow.formulas import values

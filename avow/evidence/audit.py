@@ -8,12 +8,12 @@ is ``avow verify --fresh``); whether it is the answer that was given, to the que
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
 from avow.base.files import digest_file
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence

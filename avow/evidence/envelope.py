@@ -10,10 +10,10 @@ import base64
 import binascii
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.evidence.signing import private_key, public_key
 
 PAYLOAD = "application/vnd.in-toto+json"

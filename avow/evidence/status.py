@@ -8,10 +8,10 @@ take a refutation away. `Weight.status` reads the one word off it. Everything he
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, reduce
 
+from avow.base.records import dataclass
 from avow.base.verdict import Hypothesis, Link, Verdict, said
 from avow.evidence.record import Evidence
 

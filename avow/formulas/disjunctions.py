@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+from avow.base.records import dataclass
 from avow.formulas.formula import opposite
 from avow.formulas.renaming import bound_names
 from avow.language.operators import definition

@@ -4,11 +4,12 @@ take the values that it gives them. What holds then is *checked*, not proved; wh
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from itertools import product
 from math import prod
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation, substitute
 from avow.formulas.renaming import map_children
 from avow.formulas.values import Element, Value

@@ -10,9 +10,9 @@ only together with `defined`: that no element outside a sequence matters.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth, subterms

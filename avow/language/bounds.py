@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort
 from avow.language.terms import (

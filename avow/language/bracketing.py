@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
+from avow.base.records import dataclass
 from avow.language.syntax import (
     Connective,
     Negation,

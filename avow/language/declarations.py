@@ -7,10 +7,11 @@ enumeration of that name, whose name also stands for the set of its elements.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean

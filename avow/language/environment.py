@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.contract import Contract
 from avow.language.sorts import (
     BoolSort,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.records import dataclass
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.file_syntax import FileSyntax, NodeSyntax

@@ -9,8 +9,8 @@ only one with its number. A relation (``REAL x REAL x NATURAL --> BOOL``) can sa
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from avow.base.records import dataclass
 from avow.language.sorts import (
     FunctionSort,
     IntegerSort,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.contract import Definition, Node, Port
 from avow.language.environment import Environment
 from avow.language.source import Reports

@@ -9,9 +9,9 @@ Each is a hint, with a code of its own; what cannot be seen to differ is left al
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
 from avow.language.english import Comparison, both_ways, comparisons, is_one_way, mentions

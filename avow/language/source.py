@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.records import dataclass
 from avow.tuning.shown import DIAGNOSTICS
 
 _LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")

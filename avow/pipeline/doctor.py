@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shutil
 import sys
-from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
 from avow.backend_kit.registry import backend, names
+from avow.base.records import dataclass
 from avow.base.tools import Tool
 
 _PACKAGES = (

@@ -15,13 +15,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.linked import connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
+from avow.base.records import dataclass
 from avow.formulas.formula import digest, sort_digest
 from avow.language.contract import Contract, Definition, Node
 from avow.language.sorts import DataSort, EnumSort, Sort, components

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from avow.base.records import dataclass
 from avow.language.contract import Clause, Node
 from avow.sanity.mutants import Mutant, telling
 from avow.system.plan import System

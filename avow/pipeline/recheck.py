@@ -10,12 +10,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from avow.assurance.certification import KernelRun
 from avow.base.codec import Unreadable
 from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import IO, TYPE_CHECKING
 
+from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.pipeline.results import Results
 from avow.pipeline.run_info import Run, new_run

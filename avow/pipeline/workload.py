@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from avow import __version__
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, sha256, write
+from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation

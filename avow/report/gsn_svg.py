@@ -6,13 +6,13 @@ Widths are those of DejaVu Sans, one of the widest sans-serif faces, plus 8 %: w
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from xml.sax.saxutils import escape, quoteattr
 
 from avow.assurance.answers import Tone
 from avow.assurance.model import Case
 from avow.assurance.modules import node_modules, requirement_modules
 from avow.assurance.relied import word
+from avow.base.records import dataclass
 from avow.report.wording import anchor, clean
 
 WIDTH, COLUMNS, GAP, SIZE = 720, 4, 8, 12

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 from markupsafe import Markup, escape
 
 from avow.assurance.model import MapView
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample
 from avow.report.example import is_small
 from avow.tuning.shown import MAP_STEPS

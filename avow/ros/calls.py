@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.ros.definitions import Message
 from avow.ros.listing import Listed, Listing
 

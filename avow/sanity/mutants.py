@@ -7,9 +7,9 @@ hollow. Mutants that follow from the original (a weaker claim) are no test of th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, normalise
 from avow.language.definedness import with_value
 from avow.language.sorts import REAL, EnumSort, RealSort

@@ -8,9 +8,10 @@ said, and the whole question (`avow.solving.questions.entails`) has to be asked.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.formulas.formula import free_variables, negation
 from avow.language.terms import Term

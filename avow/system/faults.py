@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular
+from avow.base.records import dataclass
 from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS
 from avow.system.formulas import check_formulas

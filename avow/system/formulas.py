@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
 from avow.language.terms import Past, Role, Term, Variable, histories

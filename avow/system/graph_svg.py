@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html import escape
 from itertools import pairwise
 
 from avow.base.graphs import components
+from avow.base.records import dataclass
 from avow.system.graph import Edge, Graph
 from avow.tuning.shown import NODES_DRAWN, SUBSYSTEMS_DRAWN
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
+from avow.base.records import dataclass
 from avow.ros.listing import is_info, parse_info
 from avow.system.graph import Graph
 from avow.system.plan import System

@@ -8,13 +8,13 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
+from avow.base.records import dataclass
 from avow.base.tools import Tool
 from avow.tuning.running import VERSION_SECONDS
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from avow.base.records import dataclass
 
 RESERVED = frozenset(
     re.findall(

@@ -8,9 +8,9 @@ conjuncts and a trigger: one of several alternatives bounds nothing.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.bounds import constant
 from avow.language.operators import FLIPPED, OPPOSITE

@@ -7,11 +7,11 @@ greatest value beyond the tolerance is a run that failed. Every figure stands fo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.records import dataclass
 from avow.system.strict_yaml import Piece, read_yaml
 
 from .quantity import Figure, conversion, figure, show

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 
 from .figures import Figures, contradictions, failures

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base import process
 from avow.base.process import Completed, ToolMissing
+from avow.base.records import dataclass
 from avow.base.tools import Tool, find_tool
 from avow.isolation.observed import Observed, recorded
 

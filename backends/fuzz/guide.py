@@ -4,9 +4,10 @@ and nothing is judged by it."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.language.operators import definition
 from avow.language.sorts import EnumSort, IntegerSort, NaturalSort
 from avow.language.terms import (

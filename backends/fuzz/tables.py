@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, assert_never
 
 from avow.backend_kit.programs.samples import around, numbers_of
+from avow.base.records import dataclass
 from avow.language.contract import Port
 from avow.language.sorts import (
     BoolSort,

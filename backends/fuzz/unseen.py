@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+
+from avow.base.records import dataclass
 
 _CLOCK = "the clock"
 _CHANCE = "chance"

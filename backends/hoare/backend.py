@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.stepping import Stepping
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation

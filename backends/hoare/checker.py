@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import NATURAL, FunctionSort, Sort

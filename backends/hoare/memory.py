@@ -7,11 +7,12 @@ then known before every step. Guesses that runs of the program do not contradict
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, stepping
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.records import dataclass
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import longest_limits, remembers

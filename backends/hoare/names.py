@@ -6,9 +6,10 @@ Nothing here complains: a name without a sort stays without, and the checker say
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
+from avow.base.records import dataclass
 from avow.language.contract import Contract, Node
 from avow.language.sorts import (
     BOOL,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, negation
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term

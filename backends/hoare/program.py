@@ -6,10 +6,11 @@ Program variables are free variables of role BOUND, which every part of the core
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.language.sorts import DataSort, Sort
 from avow.language.terms import Role, Term, Variable
 

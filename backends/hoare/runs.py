@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 
 from avow.backend_kit.stepping import Stepping
+from avow.base.records import dataclass
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term, evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import free_variables

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

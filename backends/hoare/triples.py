@@ -8,9 +8,10 @@ between outputs and inputs two.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.records import dataclass
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.one_point_rule import solved

@@ -6,9 +6,9 @@ Simple numbers are tried first: those between the thresholds that program and tr
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.traversal import subterms

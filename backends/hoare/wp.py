@@ -7,10 +7,11 @@ assignment and test also demands that what it computes is defined: no division b
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import subterms, transform

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.language.sorts import (
     BOOL,

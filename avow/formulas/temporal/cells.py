@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import assert_never
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, equal, some_value
 from avow.formulas.temporal.responses import in_the_past

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
 from avow.formulas.temporal.ages import (
     CLOCK,

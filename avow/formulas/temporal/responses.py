@@ -3,8 +3,9 @@ since."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.formulas.temporal.cell import Unsaid
 from avow.language.sorts import BOOL
