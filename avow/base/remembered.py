@@ -21,7 +21,7 @@ from avow.base.diagnostics import Span
 from avow.base.files import PART, sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.records import dataclass
-from avow.tuning.sizes import SHELVES
+from avow.tuning.sizes import NOTED, SHELVES
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -76,6 +76,10 @@ class Stretch:
         return span.file == self.file and self.first <= span.line and span.end_line <= self.end
 
 
+_TRUE = ""
+"""In the place of a digest: what is known to be so."""
+
+
 class Shelf:
     """What was found out of the texts of one folder, from run to run.
 
@@ -88,7 +92,7 @@ class Shelf:
         self._given = (sys.version, *given)
         data = unsealed(self._path)
         self._kept: dict[str, dict[str, bytes]] = pickle.loads(data) if data is not None else {}
-        self._asked: dict[str, dict[str, bytes]] = {}
+        self._asked: dict[str, dict[str, bytes]] = {_TRUE: self._kept.get(_TRUE, {})}
         self._texts: dict[int, tuple[object, str, Stretch]] = {}
         self._new = False
 
@@ -107,6 +111,17 @@ class Shelf:
             answers[what] = _written(made, stretch)
             self._new = True
         return made
+
+    def knows(self, digest: str) -> bool:
+        """Whether it was found to be so, of the texts with that digest."""
+        return digest in self._asked[_TRUE]
+
+    def note(self, digest: str) -> None:
+        """That it is so. It stays known when the texts change; of very many nothing is."""
+        if len(self._asked[_TRUE]) >= NOTED:
+            self._asked[_TRUE].clear()
+        self._asked[_TRUE][digest] = b""
+        self._new = True
 
     def is_of(self, value: object, digest: str, stretch: Stretch) -> None:
         """The value was worked out from the texts with that digest: so is what follows from it alone."""

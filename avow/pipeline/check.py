@@ -17,6 +17,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
 from avow.base.plain import count
+from avow.base.remembered import Shelf
 from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
@@ -36,7 +37,9 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
     keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
     known = set((read_note(_stamp(workspace, surveyed)) or {}).get("clean", ()))
     clean = {name for name, key in keys.items() if key in known}
-    found = diagnostics(surveyed.system, clean)
+    found = diagnostics(surveyed.system, clean, surveyed.shelf)
+    if surveyed.shelf is not None:
+        surveyed.shelf.keep()
     errors = tuple(d for d in found if d.is_error)
     if errors:
         raise Rejected(*found)
@@ -51,18 +54,23 @@ def _depends_on_slice(work: Work) -> bool:
     return not work.is_engine and is_portable(method_backend(work.system, planned_method(work)))
 
 
-def diagnostics(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[Diagnostic, ...]:
+def diagnostics(
+    system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
+) -> tuple[Diagnostic, ...]:
     """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off.
-    `clean`: (node, method) of which nothing is to be said; those found to be so are added."""
+    `clean`: (node, method) of which nothing is to be said; those found to be so are added. `shelf`: where it is kept
+    what the nodes' texts say, and which options have the right shape."""
     from avow.language.load import check_paths
 
     off = frozenset(system.plan.lints_off)
-    return (*check_paths(system.plan.contract_files, off=off)[1], *of_plan(system, clean))
+    return (*check_paths(system.plan.contract_files, off=off, shelf=shelf)[1], *of_plan(system, clean, shelf))
 
 
-def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[Diagnostic, ...]:
+def of_plan(
+    system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
+) -> tuple[Diagnostic, ...]:
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
-    what each backend says of its options; without the warnings that the plan switches off. `clean`: as for
+    what each backend says of its options; without the warnings that the plan switches off. `clean` and `shelf`: as for
     `diagnostics`."""
     from avow.system import launched
     from avow.system.graph import dataflow
@@ -85,7 +93,7 @@ def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[
         for method in plan.methods:
             name = plan.node, method.id
             if clean is None or name not in clean:
-                said = tuple(_method(system, plan.node, method))
+                said = tuple(_method(system, plan.node, method, shelf))
                 found += said
                 if clean is not None and not said:
                     clean.add(name)
@@ -139,7 +147,12 @@ def _policy(system: System) -> tuple[Diagnostic, ...]:
 
 
 def _method(
-    system: System, node: str, method: Method, *, follows: Callable[[Diagnostic], bool] = lambda _: False
+    system: System,
+    node: str,
+    method: Method,
+    shelf: Shelf | None = None,
+    *,
+    follows: Callable[[Diagnostic], bool] = lambda _: False,
 ) -> Iterable[Diagnostic]:
     """What is wrong with the options, and what the backend says of those that are right, but for what only follows from
     a fault that is told already."""
@@ -154,7 +167,7 @@ def _method(
         yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
         return
     whole = f"nodes.{node}: {method.id}"
-    wrong = tuple(_schema(tool.options_schema, method.options, whole))
+    wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
     yield from wrong
     if any(d.is_error for d in wrong):
         method = replace(method, options=_right(tool.options_schema, method.options))
@@ -179,14 +192,16 @@ def _right(schema: Mapping[str, Any], options: Located) -> Located:
     return replace(options, data=right)
 
 
-def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable[Diagnostic]:
+def _schema(
+    schema: Mapping[str, Any], options: Located, whole: str, shelf: Shelf | None = None
+) -> Iterable[Diagnostic]:
     from avow.system.schema import violations
 
     data = options.data
     if isinstance(data, Mapping):
         own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
         options = Located(own, options.span, options.spans)
-    yield from violations(options, schema, whole)
+    yield from violations(options, schema, whole, shelf)
 
 
 def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> None:

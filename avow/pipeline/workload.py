@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ class Survey:
     system: System
     catalogue: Catalogue
     digest: str
+    shelf: Shelf | None = field(default=None, compare=False, repr=False)
+    """Where it is kept what was found out of the texts; none in a run that believes no earlier one."""
 
     def work(self, method: str) -> Work:
         """The first work of that method; for the engines that there is one of. Raises KeyError."""
@@ -61,7 +64,7 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
         return Rejected(*in_order((*rejected.diagnostics, *of_rest(folder))))
     files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
     texts = [__version__, *map(digest_file, files)]
-    return Survey(system, listed, sha256(json.dumps(texts)))
+    return Survey(system, listed, sha256(json.dumps(texts)), shelf)
 
 
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:

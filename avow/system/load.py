@@ -47,7 +47,7 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], she
         if not files:
             raise Rejected(Diagnostic("PLAN100", f"{folder} holds neither a {PLAN_FILE} nor an .rcl file"))
         return load_bare(files, folder.resolve().name, shelf)
-    plan, root, faults = read_plan(path)
+    plan, root, faults = read_plan(path, shelf=shelf)
     contract, more = _contract(plan.contract_files, shelf)
     faults += more
     if contract is None:

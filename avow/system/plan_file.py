@@ -15,6 +15,7 @@ from pathlib import Path
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, sha256
+from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
 from avow.ros.launch import Launched
 from avow.system.launched import read_launched
@@ -51,14 +52,17 @@ RESERVED = ("interpret", "domains", "steps")
 """Keys of `scenario` that are not tables."""
 
 
-def read_plan(path: Path, text: str | None = None) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
+def read_plan(
+    path: Path, text: str | None = None, shelf: Shelf | None = None
+) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
     """The plan in a file (or in a `text` that is to be the file's), its names not yet held against a contract; the
-    document; what is wrong with its values.
+    document; what is wrong with its values. `shelf`: where it is kept that a document has the
+    right shape.
 
     Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
     """
     root, faults = _document(path) if text is None else read_yaml(text.encode("utf-8", "replace"), str(path))
-    faults += check_shape(root)
+    faults += check_shape(root, shelf)
     if faults:
         raise Rejected(*faults)
     reader = _PlanReader(path, root)

@@ -12,6 +12,8 @@ from importlib import resources
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.remembered import Shelf
+from avow.base.tools import package_version
 from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
 from avow.tuning.sizes import REPAIR_ROUNDS
@@ -25,9 +27,10 @@ def plan_schema() -> dict[str, Any]:
     return schema
 
 
-def check_shape(piece: Piece) -> tuple[Diagnostic, ...]:
-    """Everything in which the plan departs from the schema, in the order of the file."""
-    return _faults(piece, plan_schema())
+def check_shape(piece: Piece, shelf: Shelf | None = None) -> tuple[Diagnostic, ...]:
+    """Everything in which the plan departs from the schema, in the order of the file. `shelf`: where it is kept that a
+    document departs in nothing."""
+    return _faults(piece, plan_schema(), "the plan", shelf)
 
 
 def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
@@ -76,13 +79,29 @@ def _without(piece: Piece, path: tuple[str | int, ...], dropped: set[str]) -> Pi
     return replace(piece, items=[value for value in items if value is not None])
 
 
-def violations(options: Located, schema: Mapping[str, Any], whole: str = "the plan") -> tuple[Diagnostic, ...]:
+def violations(
+    options: Located, schema: Mapping[str, Any], whole: str = "the plan", shelf: Shelf | None = None
+) -> tuple[Diagnostic, ...]:
     """Everything in which a part of a plan departs from a schema of its own, such as a backend's for its options.
-    `whole` is what that part is called."""
-    return _faults(_piece(options, ()), schema, whole)
+    `whole` is what that part is called; `shelf`: as for `check_shape`."""
+    return _faults(_piece(options, ()), schema, whole, shelf)
 
 
-def _faults(piece: Piece, schema: Mapping[str, Any], whole: str = "the plan") -> tuple[Diagnostic, ...]:
+def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | None) -> tuple[Diagnostic, ...]:
+    # what is said of a value is decided by its type, too, which JSON would not show
+    if shelf is None:
+        return _departures(piece, schema, whole)
+    told = (package_version("jsonschema"), json.dumps(schema, default=repr), repr(piece.data))
+    digest = shelf.digest("shape", *told)
+    if shelf.knows(digest):
+        return ()
+    found = _departures(piece, schema, whole)
+    if not found:
+        shelf.note(digest)
+    return found
+
+
+def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
     from jsonschema import Draft202012Validator, validators  # slow to import
 
     validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(schema)  # type: ignore[no-untyped-call]

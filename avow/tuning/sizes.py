@@ -113,6 +113,9 @@ ANSWERED_BY_ONE = 500
 CONTRACTS_KEPT = 8
 """Contracts that stay checked in memory: a run loads one, and then asks what there is to say of it."""
 
+NOTED = 2_000
+"""Plans and options of one folder of which it is kept between runs that their shape is right."""
+
 SHELVES = 32
 """Folders of which it is kept between runs what their contracts' texts say: some 25 kB a node of ten clauses."""
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers import keys_of
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.remembered import Shelf
+from avow.system import schema
 from avow.system.plan import Located
 from avow.system.plan_file import read_plan
-from avow.system.schema import plan_schema, violations
+from avow.system.schema import check_shape, plan_schema, violations
 from avow.system.strict_yaml import read_yaml, scalar
 
 
@@ -297,3 +300,22 @@ def test_statements_of_a_plan(tmp_path: Path) -> None:
         ("requirements.R.amounts", "", "it does", "", "", ""),
     ]
     assert plan.node("a").title == "the first"
+
+
+def test_a_right_shape_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    real = schema._departures
+
+    def departures(*given: Any) -> tuple[Diagnostic, ...]:
+        asked.append(given)
+        return real(*given)
+
+    monkeypatch.setattr(schema, "_departures", departures)
+    texts = ("system: s\n", "system: s # a remark\n", "system: 1\n", "system: '1'\n", "system: 1\n", "system: s\n")
+    for text, times in zip(texts, (1, 1, 2, 3, 4, 4), strict=True):
+        piece = read_yaml(f"{text}contract: c.rcl\n".encode(), "plan.yaml")[0]
+        shelf = Shelf(tmp_path, "code")
+        found = check_shape(piece, shelf)
+        shelf.keep()
+        assert len(asked) == times, text
+        assert found == real(piece, plan_schema(), "the plan")
