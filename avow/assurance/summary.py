@@ -38,8 +38,11 @@ def open_items(
         for name in f.obligations:
             said[name] = said.get(name) or f.reason
     items = [OpenItem("discrepancy", d.subject, d.text, advice=not d.serious) for d in facts.discrepancies or ()]
+    by_status: dict[Status, list[ObligationView]] = {}
+    for view in views:
+        by_status.setdefault(view.status, []).append(view)
     for status in _WORST_FIRST:
-        items += [_open(view, said) for view in views if view.status is status and not view.advice]
+        items += [_open(view, said) for view in by_status.get(status, ()) if not view.advice]
         if status is Status.ERROR:
             items += _failed_attempts(views)
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
@@ -243,10 +246,8 @@ def not_shown(
         lines.append(
             f"{_list(trusted)}: what is assumed of these environment inputs is believed for a reason, not shown."
         )
-    models = sorted(
-        {m.title for m in facts.methods if m.strength in (Verdict.PROVED, Verdict.CHECKED) and _used(m.name, views)}
-    )
-    if models:
+    used = {v.entry.evidence.backend for view in views for v in view.counting}
+    if any(m.strength in (Verdict.PROVED, Verdict.CHECKED) and m.name in used for m in facts.methods):
         lines.append(
             "A proof or check is about the program or model that it was given; that the deployed software is that "
             "program, on that hardware, is not shown."
@@ -268,10 +269,6 @@ def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
                     found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
     for text, names in found.items():
         yield f"{_list(names)}: measured under this protocol, and not beyond it: {text}."
-
-
-def _used(backend: str, views: Sequence[ObligationView]) -> bool:
-    return any(v.entry.evidence.backend == backend for view in views for v in view.counting)
 
 
 def _list(names: Sequence[str]) -> str:

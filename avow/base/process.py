@@ -159,11 +159,12 @@ def _descendants(pid: int) -> list[int]:
 def _parents() -> dict[int, list[int]]:
     """Process → its children. Read from /proc; empty where there is none."""
     children: dict[int, list[int]] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError, ValueError, IndexError):
-            # the name in parentheses may hold spaces and parentheses of its own
-            fields = stat.read_text(errors="replace").rpartition(")")[2].split()
-            children.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    with contextlib.suppress(OSError), os.scandir("/proc") as processes:
+        for name in [entry.name for entry in processes if entry.name.isdigit()]:
+            with contextlib.suppress(OSError, ValueError, IndexError), open(f"/proc/{name}/stat", "rb", 0) as stat:  # noqa: PTH123 - there are many
+                # the name in parentheses may hold spaces and parentheses of its own
+                fields = stat.read(4096).rpartition(b")")[2].split()
+                children.setdefault(int(fields[1]), []).append(int(name))
     return children
 
 

@@ -54,7 +54,7 @@ class Shortcut:
             kept = read_note(_stamp(self.workspace)) or {}
             results = tuple(codec.from_json(Result, r) for r in kept["results"])
             observed = codec.from_json(tuple[Observed, ...], kept["observed"])
-            if kept["identity"] != _identity(self.workspace, observed):
+            if self._begun is None or kept["identity"] != _identity(self.workspace, self._begun, observed):
                 return None
         except (codec.Unreadable, OSError, ValueError, KeyError, TypeError):
             return None
@@ -67,12 +67,13 @@ class Shortcut:
         link leads out of the workspace, where a plan reads launch files (which stand anywhere, and say what else is
         read), or where something was edited during the run: the results are not of what stands there now."""
         try:
-            if self._begun != _sources(self.workspace) or _reads_elsewhere(self.workspace):
+            sources = _sources(self.workspace)
+            if self._begun != sources or _reads_elsewhere(self.workspace):
                 return
             tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
             observed = (*_observed(self.workspace), *dict.fromkeys(tools))
             kept = {
-                "identity": _identity(self.workspace, observed),
+                "identity": _identity(self.workspace, sources, observed),
                 "observed": codec.to_json(observed),
                 "results": codec.to_json(tuple(results)),
             }
@@ -103,9 +104,9 @@ def _observed(workspace: Workspace) -> tuple[Observed, ...]:
     return outside_of(entries, workspace.root)
 
 
-def _identity(workspace: Workspace, observed: Sequence[Observed]) -> str:
-    """Raises OSError for anything that cannot be looked at."""
-    digest = hashlib.sha256(_sources(workspace).encode())
+def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) -> str:
+    """`sources`: what `_sources` says. Raises OSError for anything that cannot be looked at."""
+    digest = hashlib.sha256(sources.encode())
     for o in observed:
         mark = _mark(o.path) if o.kind is Seen.READ and Path(o.path).is_file() else look(o.kind, o.path)
         digest.update(f"{o.kind} {o.path} {mark}\n".encode("utf-8", "surrogateescape"))

@@ -16,13 +16,17 @@ from avow.solving.limits import net
 from avow.solving.question_process import Answering, NoAnswer
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
+from avow.solving.z3_sorts import Sorts
 from avow.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 
 
-def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
-    """A script that asks whether the formulas hold together; each is named by its label. Raises Unsupported."""
+def formulas_script(
+    formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "", beside: Sorts | None = None
+) -> str:
+    """A script that asks whether the formulas hold together; each is named by its label. `beside`: in whose context it
+    is made, where there are many. Raises Unsupported."""
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
-    translator = Translator()
+    translator = Translator(beside)
     free = frozenset(v for formula in labelled.values() for v in free_variables(formula))
     background = translator.background(free)
     named = [(label, translator.term(formula)) for label, formula in labelled.items()]

@@ -25,6 +25,7 @@ from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported
+from avow.solving.z3_sorts import Sorts
 
 from .endless import endless_run
 from .memory import knowing, remembered
@@ -78,23 +79,24 @@ def files(job: Job) -> Mapping[str, str]:
     except Rejected:
         return {}
     made: dict[str, str] = {}
+    beside = Sorts()
     for name, condition in work.firsts.items():
-        made[f"{name}.first.smt2"] = _script(work.every_run, condition)
+        made[f"{name}.first.smt2"] = _script(work.every_run, condition, beside)
     for found in (*all_triples.values(), work.kept):
         for triple in found:
             made[f"{_stem(triple)}.hoare"] = _triple_text(triple, work)
             if triple.fidelity != TRUE:
                 same = Condition("fidelity", (), triple.fidelity, "the triple says what the contract's formulas say")
-                made[f"{_stem(triple)}.fidelity.smt2"] = _script(triple, same)
+                made[f"{_stem(triple)}.fidelity.smt2"] = _script(triple, same, beside)
             try:
                 made[f"{_stem(triple)}.outline.txt"] = outline(triple, work.checked.program.body)
                 for condition in conditions(triple, work.checked.program.body):
-                    made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition)
+                    made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition, beside)
             except (TooLarge, RecursionError) as error:
                 made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
     try:
         for condition in run_conditions(work.every_run, work.checked.program):
-            made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition)
+            made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition, beside)
     except (TooLarge, RecursionError):
         pass  # each triple's outline says so
     return made
@@ -109,12 +111,14 @@ def _triple_text(triple: Triple, work: Work) -> str:
     return f"{{{one_line(triple.full_pre)}}}\n{body}\n{{{one_line(triple.post)}}}\n"
 
 
-def _script(triple: Triple, condition: Condition) -> str:
+def _script(triple: Triple, condition: Condition, beside: Sorts) -> str:
     """`unsat` means that the condition holds."""
     formulas = {f"H{k}": h for k, h in enumerate(condition.hypotheses, start=1)}
     try:
         return formulas_script(
-            {**formulas, "goal": Not(condition.goal)}, comment=f"{triple.name}: {condition.what}; valid if unsat"
+            {**formulas, "goal": Not(condition.goal)},
+            comment=f"{triple.name}: {condition.what}; valid if unsat",
+            beside=beside,
         )
     except Unsupported as error:
         return f"; not expressible in SMT-LIB: {' '.join(error.what.split())}\n"
