@@ -93,11 +93,11 @@ def evidence_schema() -> dict[str, Any]:
     }
 
 
-def write_schemas(folder: Path) -> None:
+def _write_schemas(folder: Path) -> None:
     """Write the published schemas (``python -m avow.assurance.codec docs/schemas``)."""
     for name, schema in (("case", case_schema()), ("evidence", evidence_schema())):
         write(folder / f"{name}.schema.json", document(schema) + "\n")
 
 
 if __name__ == "__main__":
-    write_schemas(Path(sys.argv[1]))
+    _write_schemas(Path(sys.argv[1]))

@@ -103,7 +103,7 @@ def _taken_for_one(persons: list[list[str]]) -> str:
     return f": {told} are taken for one person; where they are not, write full names that differ" if several else ""
 
 
-def age_days(evidence: Evidence, today: date) -> int | None:
+def _age_days(evidence: Evidence, today: date) -> int | None:
     """Days since the evidence came about: a person's date where the details give one, else the attempt's start."""
     for text in (evidence.details.get("date"), evidence.started):
         if isinstance(text, str):
@@ -119,7 +119,7 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
     support = weigh(item).support
     if support is None:
         return None
-    age = age_days(item, today)
+    age = _age_days(item, today)
     if age is not None and age < -1:  # a clock of another zone may be a day ahead
         return "dated in the future"
     limit = demand.max_age(support)

@@ -105,7 +105,7 @@ class Certificates:
         lemmas = tuple(dict.fromkeys((*of_whole.lemmas, *lemmas)))
         finder = replace(of_whole, known=self.known_with(lemmas), lemmas=lemmas, scope=scope, goals=(claim,))
         finder.hints = {**finder.hints, name: hint}
-        self.made[scope] = pruned(finder.find(), claim)
+        self.made[scope] = _pruned(finder.find(), claim)
         return self.established(self.made[scope], claim)
 
     def existence(self, name: str) -> list[Established] | None:
@@ -150,7 +150,7 @@ class Certificates:
         """The claims of an obligation that something is possible: of each part, those of which one is enough."""
         parts: dict[str, list[Statement]] = {}
         for claim in self.known.every:
-            if claim.kind in POSSIBLE and possible_name(claim) == name:
+            if claim.kind in POSSIBLE and _possible_name(claim) == name:
                 parts.setdefault(claim.name, []).append(claim)
         return list(parts.values())
 
@@ -233,7 +233,7 @@ def scope_of(claim: Statement) -> str | None:
         case Claimed.REQUIREMENT:
             return requirement_scope(claim.name)
         case Claimed.POSSIBLE | Claimed.IMPOSSIBLE | Claimed.START:
-            return existence_scope(possible_name(claim))
+            return existence_scope(_possible_name(claim))
         case Claimed.ASSUMPTION | Claimed.GUARANTEE | Claimed.ENVIRONMENT | Claimed.INITIAL | Claimed.DEFINITION:
             # a clause or a formula of the plan: its derivation's, or none
             return None
@@ -241,7 +241,7 @@ def scope_of(claim: Statement) -> str | None:
             assert_never(claim.kind)
 
 
-def possible_name(claim: Statement) -> str:
+def _possible_name(claim: Statement) -> str:
     """The obligation of which a claim that something is possible is a part."""
     return claim.name if claim.kind is Claimed.START else claim.name.rpartition(".")[0]
 
@@ -251,7 +251,7 @@ def existence_scope(name: str) -> str:
     return f"existence {name}"
 
 
-def pruned(certificate: Certificate, goal: Statement) -> Certificate:
+def _pruned(certificate: Certificate, goal: Statement) -> Certificate:
     """The entries that a claim rests on, and no others."""
     wanted = (How.SHOWN, goal.node, goal.digest)
     at = next((i for i, e in enumerate(certificate.entries) if (e.how, e.node, e.digest) == wanted), None)

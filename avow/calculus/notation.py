@@ -116,7 +116,7 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     return Written(
         goal.name,
         goal.root.rule.value,
-        "\n\n".join([*map(as_text, written), *_joined(goal.contract)]),
+        "\n\n".join([*map(_as_text, written), *_joined(goal.contract)]),
         "\n".join([*map(as_html, written), *(f"<pre>{html.escape(line)}</pre>" for line in _joined(goal.contract))]),
         "\n\n".join(map(as_latex, written)),
         _plain(conclusion.parts),
@@ -269,7 +269,7 @@ def _plain(parts: tuple[Part, ...]) -> str:
     return text
 
 
-def as_text(lines: Lines) -> str:
+def _as_text(lines: Lines) -> str:
     """Unicode text for a terminal or a fixed-width font."""
     above = [_remarked(_plain(line.parts), line.remark) for line in lines.above]
     below = [_remarked(_plain(line.parts), line.remark) for line in lines.below]

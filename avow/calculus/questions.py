@@ -85,8 +85,8 @@ class SideQuestion:
         settled = composition.settled(goal, bounds).settled[self.condition]
         if settled.verdict is not Verdict.PROVED:
             frame = composition.frame_of(goal)
-            return as_far_as_shown(frame, side_answer(settled, would_hold(frame, goal, settled)))
-        answer = side_answer(settled)
+            return as_far_as_shown(frame, _side_answer(settled, would_hold(frame, goal, settled)))
+        answer = _side_answer(settled)
         found = composition.certificates.condition(goal, str(self.condition.about), bounds)
         return certified(answer, found, late=composition.certificates.late)
 
@@ -110,19 +110,19 @@ def as_far_as_shown(frame: Frame, answer: Answer) -> Answer:
         return answer
     kept = {key: value for key, value in answer.details.items() if key not in ("would_hold_if", "run")}
     shown = answer.counterexample
-    told = None if shown is None else Counterexample(shown.values, not_kept_to(frame), shown.trace, shown.loop)
-    summary = f"{answer.summary.partition('; ')[0]}, but {not_kept_to(frame)}"
+    told = None if shown is None else Counterexample(shown.values, _not_kept_to(frame), shown.trace, shown.loop)
+    summary = f"{answer.summary.partition('; ')[0]}, but {_not_kept_to(frame)}"
     return replace(
         answer, verdict=Verdict.UNKNOWN, summary=summary, counterexample=told, details=kept | {"genuine": False}
     )
 
 
-def not_kept_to(frame: Frame) -> str:
+def _not_kept_to(frame: Frame) -> str:
     """Why an example need not be one: `Frame.left_out`."""
     return f"what has no formula of one step is left out, and may exclude it: {', '.join(frame.left_out)}"
 
 
-def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
+def _side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
     """A settled side condition in words; `repairs`: what would make its refuted cases hold."""
     condition = settled.condition
     details: dict[str, object] = {
@@ -372,7 +372,7 @@ class JointQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         frame = composition.frame
         if frame.left_out:
-            return Answer(Verdict.UNKNOWN, f"whether there is room cannot be told: {not_kept_to(frame)}")
+            return Answer(Verdict.UNKNOWN, f"whether there is room cannot be told: {_not_kept_to(frame)}")
         hypotheses = {
             f"{name}.{clause.name}": frame.clause(name, clause.name)
             for name in self.members

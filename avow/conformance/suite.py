@@ -327,7 +327,7 @@ class Conformance:
             self.forget_tools()
         for outcome in report.outcomes:
             if outcome.verdict.supports:
-                right = case.verdicts[job_name(job, outcome)]
+                right = case.verdicts[_job_name(job, outcome)]
                 assert right.supports, f"{outcome.obligation} is {outcome.verdict} without its tool"
                 required = [t for t in self.backend.tools() if t.path and not t.optional]
                 assert not required, f"{required[0].name} is required, and was not there"
@@ -368,7 +368,7 @@ class Conformance:
         assert all(isinstance(self.backend.suits(node), bool) for node in nodes)
 
 
-def job_name(job: Job, outcome: Outcome) -> str:
+def _job_name(job: Job, outcome: Outcome) -> str:
     return next(o.name for o in job.obligations if o.id == outcome.obligation)
 
 

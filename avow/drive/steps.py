@@ -60,7 +60,7 @@ def coded(value: Any, depth: int = 0) -> Any:
     return {"?": f"a value of type {type(value).__name__}"}
 
 
-def kept_as(before: Any, value: Any) -> Any:
+def _kept_as(before: Any, value: Any) -> Any:
     """What an attribute is given: where it holds a member of an enumeration, the member that a text names."""
     if isinstance(before, enum.Enum) and isinstance(value, str):
         return type(before).__members__.get(value, value)
@@ -91,7 +91,7 @@ def driver(made: Any, spec: Any) -> Callable[[str], str]:
         node = kept[0] if asked.get("on") else start()  # "on": the run goes on with the object of the case before
         kept[:] = [node]
         for port, value in (asked.get("memory") or {}).items():
-            setattr(node, memory[port], kept_as(getattr(node, memory[port], None), plain(value)))
+            setattr(node, memory[port], _kept_as(getattr(node, memory[port], None), plain(value)))
         answers: list[dict[str, Any]] = []
         said = {name: coded(getattr(node, name, None)) for name in shown}
         for inputs in asked["steps"]:

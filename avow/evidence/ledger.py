@@ -351,11 +351,6 @@ def _identity(info: os.stat_result) -> tuple[int, ...]:
     return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
 
 
-def read_line(line: bytes) -> Entry:
-    """One line of a ledger; its hash is not checked here. Raises Unreadable."""
-    return _entry(_parsed(line))
-
-
 def _parsed(line: bytes) -> dict[str, Any]:
     try:
         data = json.loads(line)

@@ -148,7 +148,7 @@ class _FromSource(importlib.machinery.SourceFileLoader):
         return self.source_to_code(self.get_data(path), path)
 
 
-def read_sources_only(root: str) -> None:
+def _read_sources_only(root: str) -> None:
     """Modules from within `root` are compiled anew."""
     suffixes = (_FromSource, importlib.machinery.SOURCE_SUFFIXES)
     extensions = (importlib.machinery.ExtensionFileLoader, importlib.machinery.EXTENSION_SUFFIXES)
@@ -345,7 +345,7 @@ def main() -> None:
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
         drive = driving(function)
-        read_sources_only(os.path.realpath(root))
+        _read_sources_only(os.path.realpath(root))
         dumps, write, leave = json.dumps, os.write, os._exit
 
         def end(fault: str) -> None:

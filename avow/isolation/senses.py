@@ -86,7 +86,7 @@ _AVOW = os.path.dirname(os.path.dirname(__file__)) + os.sep  # noqa: PTH120
 _LOOKING = (_STDLIB + "inspect.py", _STDLIB + "traceback.py")
 
 
-def watch_chance(told: Told) -> Callable[[], None]:
+def _watch_chance(told: Told) -> Callable[[], None]:
     """Tells when the subject reads a clock or draws what nobody seeded, as far as Python does it; returns what is to be
     asked once more at the end."""
 
@@ -191,7 +191,7 @@ _THROUGH = {"uname": "platform.py", "listxattr": "shutil.py", "getxattr": "shuti
 """A module of the library with functions that ask for more than they tell: those that tell are in the table."""
 
 
-def watch_system(told: Told) -> None:
+def _watch_system(told: Told) -> None:
     """Tells when the subject calls a function of the running system, or has SQLite tell the time."""
 
     def outer(inner: Callable[..., Any], name: str, what: str) -> Callable[..., Any]:
@@ -362,7 +362,7 @@ class _Entries:
         self._real.close()
 
 
-def watch_state(told: Told) -> None:
+def _watch_state(told: Told) -> None:
     """Tells which files are looked at without being opened, of which no audit event tells, and programs started by
     hand."""
     readlink, scandir, open_ = os.readlink, os.scandir, os.open
@@ -452,7 +452,7 @@ class _Variables(dict[bytes, bytes]):
         return [self[name] for name in self]
 
 
-def watch_place(told: Told) -> None:
+def _watch_place(told: Told) -> None:
     """Tells when the subject asks in which folder it runs, or reads a search path."""
     known = _Variables(os.environ._data)  # type: ignore[attr-defined]
     known.told = told
@@ -472,7 +472,7 @@ def watch_place(told: Told) -> None:
 
 def watch_all(told: Told) -> Callable[[], None]:
     """All of it; returns what is to be called at the end."""
-    watch_state(told)
-    watch_system(told)
-    watch_place(told)
-    return watch_chance(told)
+    _watch_state(told)
+    _watch_system(told)
+    _watch_place(told)
+    return _watch_chance(told)

@@ -243,7 +243,7 @@ class Mistyped:
     hint: str | None = None
 
 
-def wrong_count(name: Builtin, given: int) -> Mistyped | None:
+def _wrong_count(name: Builtin, given: int) -> Mistyped | None:
     """That an operator has too few or too many arguments."""
     counts = OPERATORS[name].takes
     assert not isinstance(counts, Why), counts.reason
@@ -256,7 +256,7 @@ def wrong_count(name: Builtin, given: int) -> Mistyped | None:
 
 def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Term | Mistyped:
     """The operator applied to arguments, which are widened where they have to be; or why that means nothing."""
-    counted = wrong_count(name, len(arguments))
+    counted = _wrong_count(name, len(arguments))
     if counted is not None:
         return counted
     match name:

@@ -60,9 +60,9 @@ def to_rcl(contract: Contract) -> str:
             out.append(f"  {word}( {shown} )" if shown else f"  {word}()")
         topics = ",\n          ".join(_topic(t) for t in node.topics)
         out.append(f"  topics( {topics} )" if topics else "  topics()")
-        out += [f"  {show_term(c.formula, 'rcl')}" for c in node.guarantees if is_own_section(c)]
+        out += [f"  {show_term(c.formula, 'rcl')}" for c in node.guarantees if _is_own_section(c)]
         for clause in node.clauses:
-            if is_own_section(clause):
+            if _is_own_section(clause):
                 continue
             word = "assume" if clause in node.assumptions else "guarantee"
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
@@ -77,7 +77,7 @@ def to_rcl(contract: Contract) -> str:
         raise Rejected(Diagnostic("RCL110", message, place, hint="split the deepest clause")) from rejected
 
 
-def is_own_section(clause: Clause) -> bool:
+def _is_own_section(clause: Clause) -> bool:
     """Whether a clause is written as ``steps(every 20 ms)``."""
     return clause.pace is not None and clause.name == "steps" and clause.sentence is None
 
@@ -176,12 +176,12 @@ def _factor(sort: Sort, names: Mapping[str, Sort]) -> str:
 # --- for people ------------------------------------------------------------------------------------------------------
 
 
-def to_text(contract: Contract) -> str:
+def _to_text(contract: Contract) -> str:
     """The contract in words."""
     return _for_people(contract, "text")
 
 
-def to_unicode(contract: Contract) -> str:
+def _to_unicode(contract: Contract) -> str:
     """The contract in mathematical signs."""
     return _for_people(contract, "unicode")
 
@@ -275,8 +275,8 @@ def _data(value: Any) -> Any:
 
 FORMATS: dict[str, Callable[[Contract], str]] = {
     "rcl": to_rcl,
-    "text": to_text,
-    "unicode": to_unicode,
+    "text": _to_text,
+    "unicode": _to_unicode,
     "latex": to_latex,
     "json": to_json,
 }

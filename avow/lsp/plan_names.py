@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import re
-from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -276,8 +275,3 @@ def _scalars(piece: Piece) -> Iterator[Piece]:
 
 def _corners(span: Span) -> tuple[tuple[int, int], tuple[int, int]]:
     return (span.line, span.column), (span.end_line, span.end_column)
-
-
-def line_of(plan: PlanText, offset: int) -> int:
-    """The line of an offset, from 1."""
-    return bisect_right([0, *(m.end() for m in re.finditer("\n", plan.text))], offset)

@@ -346,7 +346,7 @@ def _takes_snippets(capabilities: types.ClientCapabilities) -> bool:
     return bool(item is not None and item.snippet_support)
 
 
-def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
+def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
     """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
     language_server = LanguageServer(
         "avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental
@@ -392,4 +392,4 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
 
 def serve(status: Callable[[str], StatusLookup] = _nothing) -> None:
     """Run on standard input and output until the editor leaves."""
-    make_server(status).start_io()
+    _make_server(status).start_io()

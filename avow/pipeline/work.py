@@ -84,7 +84,7 @@ class Work:
         return self.engine in ENGINES
 
 
-def language_work(system: System) -> Work:
+def _language_work(system: System) -> Work:
     """The contract parses and types: settled by having been loaded."""
     contract = system.contract
     files = ", ".join(path.name for path in system.plan.contract_files)
@@ -100,7 +100,7 @@ def language_work(system: System) -> Work:
     return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), engine_digest())
 
 
-def sanity_work(whole: Frame, node: Node) -> Work:
+def _sanity_work(whole: Frame, node: Node) -> Work:
     """Is this node's contract worth verifying? `whole` is its system's frame: made once for all nodes."""
     from avow.pipeline.slices import sanity_slice
 
@@ -155,7 +155,7 @@ def compose_work(composition: Composition) -> Work:
     return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
 
 
-def method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
+def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
     """One for each method of each node of the plan. Raises Rejected for an unknown backend."""
     return tuple(
         method_work(system, system.contract.node(plan.node), method, offered)
@@ -272,7 +272,7 @@ def method_job(system: System, node: Node, method: Method, tool: Backend | None 
     """`tool` is the method's backend, where it is at hand: one under test need not be installed."""
     claimed = (tool or method_backend(system, method)).claims
     names = [c for c in claimed if _can_be_claimed(system, node, c)]
-    claims = tuple(program_claim(system, node, name) for name in names)
+    claims = tuple(_program_claim(system, node, name) for name in names)
     return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
 
 
@@ -288,7 +288,7 @@ _CLAIMED = {
 
 
 @by_identity(50_000)
-def program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
+def _program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
     """Something of the node's program: its meaning hangs on the node's ports and assumptions."""
     ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
     assumed = sorted(digest(clause.formula) for clause in node.assumptions)
@@ -342,10 +342,10 @@ def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = Non
     composition = composed(system)
     texts = texts_digest(system)
     works = (
-        language_work(system),
-        *(sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
+        _language_work(system),
+        *(_sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
         compose_work(composition),
-        *method_works(system, offered),
+        *_method_works(system, offered),
     )
     asked = asked_seconds()
     works = tuple(

@@ -85,11 +85,11 @@ def _listed(workspace: Workspace, surveyed: Survey) -> str:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
     shown = functools.cache(lambda file: workspace.relative(Path(file)))
-    listed = [obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
+    listed = [_obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
     return json_text({"system": surveyed.system.name, "obligations": listed})
 
 
-def obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:
+def _obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:
     span = obligation.span
     return {
         "id": obligation.id,

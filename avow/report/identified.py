@@ -54,14 +54,14 @@ def left_out(case: Case, records: Iterable[Entry], name: str) -> Iterator[Told]:
         kept = {entry.hash for entry in entries(case)}
         for entry in records:
             if entry.hash.startswith(name) and entry.hash not in kept:
-                heading, lines = of_record(entry)
+                heading, lines = _of_record(entry)
                 yield (
                     heading,
                     [*lines, "left out of the report: what it says is of an earlier state, or said again since"],
                 )
 
 
-def of_record(entry: Entry) -> Told:
+def _of_record(entry: Entry) -> Told:
     return f"record {entry.number + 1} of the ledger", [_line(entry), entry.evidence.summary]
 
 
@@ -71,7 +71,7 @@ def _line(entry: Entry) -> str:
 
 
 def _of_digest(case: Case, name: str) -> Iterator[Told]:
-    yield from (of_record(entry) for entry in entries(case) if entry.hash.startswith(name))
+    yield from (_of_record(entry) for entry in entries(case) if entry.hash.startswith(name))
     for view in case.obligations:
         if view.obligation.digest.startswith(name):
             yield f"the meaning of {short(view.id)}", [view.obligation.formula or view.obligation.claim]

@@ -41,7 +41,7 @@ _HIDDEN = re.compile("[\r\u00ad\u061c\u180e\u200b-\u200f\u202a-\u202e\u2060-\u20
 """Characters that show nothing, or turn the order of what follows: a comment could make code look like a comment."""
 
 
-def line_anchor(number: int, line: int) -> str:
+def _line_anchor(number: int, line: int) -> str:
     """The fragment of a line of the `number`-th text, from 1."""
     return f"s{number}-{line}"
 
@@ -59,7 +59,7 @@ def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
     number, lines = known.get(span.file, (0, 0))
     if not 1 <= span.line <= lines:
         return shown
-    return Markup(f'<a href="#{line_anchor(number, span.line)}">{shown}</a>')  # escaped above
+    return Markup(f'<a href="#{_line_anchor(number, span.line)}">{shown}</a>')  # escaped above
 
 
 def lines_of(case: Case, number: int) -> Markup:
@@ -74,7 +74,7 @@ def lines_of(case: Case, number: int) -> Markup:
     lines = _coloured(source)
     rows = []
     for at, shown in enumerate(lines, 1):
-        name = f' id="{line_anchor(number, at)}"' if len(lines) <= ANCHORED_LINES or at in needed else ""
+        name = f' id="{_line_anchor(number, at)}"' if len(lines) <= ANCHORED_LINES or at in needed else ""
         rows.append(f"<div{name}>{''.join(notes.get(at, ()))}{shown or ' '}</div>")
     return Markup("".join(rows))  # every piece is escaped
 

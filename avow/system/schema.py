@@ -137,7 +137,7 @@ def suggest(word: str, known: Iterable[str]) -> str | None:
     return f"known: {shown}"
 
 
-def key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
+def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
     """``connections[0].to``, for messages; `whole` where the path is empty."""
     text = ""
     for step in path:
@@ -156,7 +156,7 @@ def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterat
 def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
     path: tuple[str | int, ...] = tuple(error.absolute_path)
     piece = root.at(*path) or root
-    where = key_path(path, whole)
+    where = _key_path(path, whole)
     about = error.schema.get("description") if isinstance(error.schema, dict) else None
     wanted = f" (expected: {about})" if about else ""
     if "propertyNames" in error.absolute_schema_path:

@@ -141,7 +141,7 @@ def contradicted(connections: Sequence[Connection], found: Ends, relays: Collect
                 f"{source} is published on {one.topic}, and {target} listens to {other.topic}: "
                 "the connection contradicts the topics"
             )
-            yield Diagnostic("ROS112", message, connection.span, hint=remap_hint(target.node, other, one))
+            yield Diagnostic("ROS112", message, connection.span, hint=_remap_hint(target.node, other, one))
         elif others and apart and (publishers := found.reaching(target)):
             topic = next(c for c in others if found.published.get(c.topic)).topic
             message = (
@@ -163,7 +163,7 @@ def unheard(source: Endpoint, target: Endpoint, found: Ends, span: Span | None) 
         yield Diagnostic("PLAN122", message, span, hint=hint)
 
 
-def remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
+def _remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
     """What the plan may write so that a node listens to the topic that is meant."""
     remap = f"ros: {{nodes: {{{node}: {{remap: {{{carrier.topic}: {meant.topic}}}}}}}}}"
     return f"if they are one topic when the robot runs:  {remap}"
@@ -175,7 +175,7 @@ def unlinked(target: Endpoint, carrier: Carrier, source: Endpoint, other: Carrie
         f"{source} does not feed {target}: it is published on {other.topic}, and {target.node} listens to "
         f"{carrier.topic}; the input is left to the environment"
     )
-    return Diagnostic("ROS113", message, span, Severity.WARNING, remap_hint(target.node, carrier, other))
+    return Diagnostic("ROS113", message, span, Severity.WARNING, _remap_hint(target.node, carrier, other))
 
 
 # -- several publishers ------------------------------------------------------------------------------------------------

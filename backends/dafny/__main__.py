@@ -20,7 +20,7 @@ from .modules import generate
 from .printer import NotExpressible
 
 
-def write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
+def _write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
     """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, also where a file is."""
     system = load_system(folder)
     if node not in [n.name for n in system.contract.nodes]:
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--method", help="the method's id, where the node has several of dafny")
     given = parser.parse_args(arguments)
     try:
-        path = write_skeleton(given.folder, given.node, method=given.method)
+        path = _write_skeleton(given.folder, given.node, method=given.method)
     except Rejected as error:
         for d in error.diagnostics:
             hint = f" ({d.hint})" if d.hint else ""

@@ -167,12 +167,12 @@ def numbers(terms: Iterable[Term]) -> tuple[list[Fraction], list[Fraction]]:
         if isinstance(part, Literal) and part.sort in NUMERIC and not isinstance(part.value, str)
     }
     ordered = sorted(constants)
-    between = [simplest_between(a, b) for a, b in itertools.pairwise(ordered)]
+    between = [_simplest_between(a, b) for a, b in itertools.pairwise(ordered)]
     outside = [ordered[0] - 1, ordered[-1] + 1] if ordered else []
     return [*between, *outside], [*ordered, Fraction(0), Fraction(1)]
 
 
-def simplest_between(low: Fraction, high: Fraction) -> Fraction:
+def _simplest_between(low: Fraction, high: Fraction) -> Fraction:
     """A number near the middle that is easy to read: the middle rounded as far as it stays well inside."""
     middle = (low + high) / 2
     for step in (100, 50, 10, 5, 1):

@@ -109,7 +109,7 @@ def join(one: Sort | None, other: Sort | None) -> Sort | None:
     return one
 
 
-def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
+def _estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
     """The sort that an expression seems to have, if its names' sorts are known."""
     match expression:
         case Number(whole=whole):
@@ -117,12 +117,12 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
         case Truth() | Member() | Inside() | Chain() | Quantification():
             return BOOL
         case Tuple(items=items):
-            sorts = [estimate(item, names, local) for item in items]
+            sorts = [_estimate(item, names, local) for item in items]
             return TupleSort(tuple(s for s in sorts if s is not None)) if None not in sorts else None
         case Sequence(items=items):
             item: Sort | None = UNKNOWN
             for each in items:
-                item = join(item, estimate(each, names, local))
+                item = join(item, _estimate(each, names, local))
             return SequenceSort(item or UNKNOWN)
         case Call(function=Name(name="length", prefix=None)) if "length" not in names.sorts:
             return NATURAL
@@ -147,11 +147,11 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
                 return sort.item
             return sort.result if isinstance(sort, FunctionSort) else None
         case Unary(operator="-", operand=operand):
-            return join(INTEGER, estimate(operand, names, local))
+            return join(INTEGER, _estimate(operand, names, local))
         case Binary(operator="/"):
             return REAL
         case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
-            sort = join(estimate(left, names, local), estimate(right, names, local))
+            sort = join(_estimate(left, names, local), _estimate(right, names, local))
             return join(INTEGER, sort) if operator == "-" else sort
         case Unary() | Binary():  # a comparison or a connective
             return BOOL
@@ -176,7 +176,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
                 for argument, parameter in zip(arguments, parameters, strict=False):
                     expect(argument, parameter, names)
             elif name not in names.sorts and name != "length":
-                known = [estimate(argument, names, {}) for argument in arguments]
+                known = [_estimate(argument, names, {}) for argument in arguments]
                 if all(k is not None for k in known):
                     names.sorts[name] = FunctionSort(tuple(k for k in known if k is not None), sort)
         case _:  # says nothing of a name's sort
@@ -193,7 +193,7 @@ def spread(body: tuple[StatementSyntax, ...], names: Names) -> None:
             if statement.arguments or statement.target.name in fixed or statement.target.name in local:
                 continue
             old = names.sorts.get(statement.target.name)
-            new = join(old, estimate(statement.value, names, local))
+            new = join(old, _estimate(statement.value, names, local))
             if new is not None and new != old:
                 names.sorts[statement.target.name] = new
                 names.inferred.add(statement.target.name)

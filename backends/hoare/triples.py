@@ -105,8 +105,8 @@ def triples(obligation: str, clause: Clause, node: Node, checked: Checked) -> tu
     parts = tuple(_split(rename_apart(clause.formula, names)))
     found: dict[tuple[Term, Term, Stated], None] = {}
     for outer, conditions, consequent in parts:
-        goal = translate_formula(consequent, checked.reading, clause)
-        read = [translate_formula(c, checked.reading, clause) for c in conditions]
+        goal = _translate_formula(consequent, checked.reading, clause)
+        read = [_translate_formula(c, checked.reading, clause) for c in conditions]
         found.setdefault(_solved(outer, (*assumed, *read), goal))
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
     count = len(found)
@@ -179,10 +179,10 @@ def _is_input(term: Term) -> bool:
 
 def translate(clause: Clause, reading: Reading, names: set[str]) -> Term:
     """A clause over the program's variables. Raises Rejected."""
-    return translate_formula(rename_apart(clause.formula, names), reading, clause)
+    return _translate_formula(rename_apart(clause.formula, names), reading, clause)
 
 
-def translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
+def _translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
     """The formula with every port read as the plan or the names say; bound names are apart already. Raises Rejected."""
     missing: list[Variable] = []
     widened: list[Term] = []

@@ -94,7 +94,7 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
         if port.name not in taken and step.args.kwarg is None:
             message = f"`step` does not take the input `{port.name}`"
             problems.append(Diagnostic("HYPO104", message, _span(step, str(found.path))))
-    wrong = unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
+    wrong = _unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
     if wrong:
         place = job.method.options.at("subject")
         problems.append(Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place))
@@ -115,7 +115,7 @@ def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> Subj
     for port in (*job.node.inputs, *job.node.outputs):
         called = port.variable.qualified
         needed = port in job.node.inputs and (every or port.name in taken)
-        if not unfit({port.name: port.sort}):
+        if not _unfit({port.name: port.sort}):
             continue
         if called in spoken or needed or port.name in found.memory:
             place = job.source.place.at("source") if job.source is not None else None
@@ -173,7 +173,7 @@ def parameter_files(job: Job) -> tuple[Path, ...]:
     return (path,) if path is not None else ()
 
 
-def unfit(ports: Mapping[str, Sort]) -> str:
+def _unfit(ports: Mapping[str, Sort]) -> str:
     """The first port whose values no step class is given; empty where there is none."""
     for name, sort in ports.items():
         if not _plain(sort):

@@ -134,10 +134,10 @@ def _promised(loop: For, first: Turn, node: Node, promised: Sequence[Term], know
                 done = {length: _plus(turn.done, start) for length, start in lengths.items()}
                 return substitute(formula, {output: meaning(turn), **done})
 
-            yield Candidate(loop.counter, f"{name} as {output.qualified} in {hash_text(formula)}", build)
+            yield Candidate(loop.counter, f"{name} as {output.qualified} in {_hash_text(formula)}", build)
 
 
-def hash_text(formula: Term) -> str:
+def _hash_text(formula: Term) -> str:
     """A formula, told apart from others in few words."""
     from avow.language.printer import show_term
 

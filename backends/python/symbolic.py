@@ -273,7 +273,7 @@ class Run:
         leaving = self._left.pop()
         for gone, word in (*leaving, *(((end, "continue"),) if end is not None else ())):
             if word == "continue":
-                after = Turn(gone.values, plus_one(done), entry, loop, carried)
+                after = Turn(gone.values, _plus_one(done), entry, loop, carried)
                 for candidate in own:
                     goal = candidate.build(after) or FALSE
                     self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
@@ -479,7 +479,7 @@ def zero(term: Term) -> Literal:
     return Literal(Fraction(0), REAL) if term.sort == REAL else ZERO
 
 
-def plus_one(term: Term) -> Term:
+def _plus_one(term: Term) -> Term:
     return Arithmetic("+", term, Literal(1, INTEGER), INTEGER)
 
 

@@ -35,7 +35,7 @@ def dotted_type(ros_type: str) -> str:
     return f"{parts[0]}.msg.{parts[-1]}"
 
 
-def topic_types(setup: Setup) -> dict[str, str]:
+def _topic_types(setup: Setup) -> dict[str, str]:
     """Topic → dotted type, each once: the contract's topics, then those that only the plan names."""
     found: dict[str, str] = {}
     seen: set[str] = set()
@@ -59,7 +59,7 @@ def of_system(parts: Sequence[tuple[Setup, Mapping[str, Any]]]) -> str:
     if len(versions) > 1:
         text = f"the methods say {' and '.join(sorted(versions))} as `ros_version`, and one file is for one"
         raise Rejected(Diagnostic("MON101", text))
-    monitors = [_monitor(setup, options) for setup, options in parts if topic_types(setup)]
+    monitors = [_monitor(setup, options) for setup, options in parts if _topic_types(setup)]
     nodes = [node for setup, options in parts for node in _nodes(setup, options)]
     text = _file(monitors, nodes, next(iter(versions), None))
     if wrong := problems(text):
@@ -102,7 +102,7 @@ def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
         }
     filtered = setup.filtered if "oracle" in monitor else frozenset[str]()  # it is the oracle that says what is broken
     monitor["topics"] = []
-    for name, kind in topic_types(setup).items():
+    for name, kind in _topic_types(setup).items():
         topic: dict[str, Any] = {"name": name, "type": kind, "action": "log"}
         if same_topic(name) in filtered:
             topic |= {"action": "filter", "publishers": [setup.node.name]}

@@ -22,7 +22,7 @@ from .watched import Answer, Fault, Part, Violation, Watched
 @dataclass(frozen=True, slots=True)
 class Judgement:
     """Of one clause at one event: `held`, `broken`, `excused` (broken, with an assumption broken), `undecided`, or
-    `unpaired` (undecided which input was answered). `margin`: see `margin_of`."""
+    `unpaired` (undecided which input was answered). `margin`: see `_margin_of`."""
 
     node: str
     clause: str
@@ -89,7 +89,7 @@ class Telling(Monitor):
     def _margin(self, watched: Watched, values: Mapping[str, Value]) -> float | None:
         name = watched.clause.name
         if name not in self._margins:
-            self._margins[name] = margin_of(watched.clause.formula)
+            self._margins[name] = _margin_of(watched.clause.formula)
         margin = self._margins[name]
         return None if margin is None or any(n not in values for n in watched.names) else margin(values)
 
@@ -112,13 +112,13 @@ def _verdict_between(before: Tally, after: Tally) -> str:
     return "held" if after.judged > before.judged else ""
 
 
-def margin_of(formula: Term) -> Margin | None:
+def _margin_of(formula: Term) -> Margin | None:
     """How far a comparison of numbers is from being broken, negative where it is: of ``a <= b`` and ``a < b``, b - a;
     of ``a == b``, minus their distance; of ``a != b``, their distance; of a conjunction, the least. None of any other
     formula. At 0 the operator decides."""
     match formula:
         case And(items=items):
-            parts = [margin_of(item) for item in items]
+            parts = [_margin_of(item) for item in items]
             known = [part for part in parts if part is not None]
             if len(known) < len(parts):
                 return None

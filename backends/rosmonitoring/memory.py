@@ -85,7 +85,7 @@ class Memory:
         self.judged: Mapping[str, Value] = {}
         """The valuation of that step."""
         self.silence = silence
-        self._arrivals = {v.qualified: port_of(v) for v in arrivals}
+        self._arrivals = {v.qualified: _port_of(v) for v in arrivals}
         self._arrived = set[str]()
         self._keeper = Keeper(cells, leeway.instances)
         self._leeway = leeway
@@ -328,10 +328,10 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         names |= free_names(trigger) if trigger is not None else set()
         names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}
         names = names - {CLOCK.qualified, ANSWERED.qualified, *(v.qualified for v in arrivals)} | set(
-            map(port_of, arrivals)
+            map(_port_of, arrivals)
         )
         steps.unsaid = never
-        steps.alone = bool(arrivals) and names == set(map(port_of, arrivals))
+        steps.alone = bool(arrivals) and names == set(map(_port_of, arrivals))
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
         clause = replace(clause, formula=formula)
@@ -346,7 +346,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     )
 
 
-def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
+def _triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
     """The variables whose publication makes a clause judged, of those that it speaks of."""
     direct = tuple(n for n in names if isinstance(setup.rules[n], Fields | Choice))
     outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
@@ -376,7 +376,7 @@ def watching(
         return None
     tally.triggered = watched.trigger is None
     every = watched.steps is not None and watched.steps.every
-    triggers = triggers_of(setup, names, every=every)
+    triggers = _triggers_of(setup, names, every=every)
     answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
     if setup.when == "outputs" and answers and not every:
         watched.outputs = frozenset(triggers)
@@ -409,7 +409,7 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         hidden = [setup.hidden[name] for name in names if name in setup.hidden]
         if hidden and about is not clause:
             return where + hidden[0]
-        if not hidden and not triggers_of(setup, names):
+        if not hidden and not _triggers_of(setup, names):
             return f"{where}it speaks of other steps, and no message makes one"
     return ""
 
@@ -471,7 +471,7 @@ def _once_said(formula: Term) -> Term:
     return replace(formula, arguments=tuple(conjunction((ANSWERED, part)) for part in formula.arguments))
 
 
-def port_of(arrival: Variable) -> str:
+def _port_of(arrival: Variable) -> str:
     """``in.scan``, of whether a message of it has arrived."""
     return f"in.{arrival.name.removeprefix('arrived ').removesuffix(CELL)}"
 

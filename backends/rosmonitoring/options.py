@@ -107,7 +107,7 @@ def setup(
     and the scenario. `known`: the definitions, where they have been read already."""
     wrong: tuple[Diagnostic, ...] = ()
     if known is None:
-        known, wrong = known_types(system, traces_of(system, options))
+        known, wrong = known_types(system, _traces_of(system, options))
     work = _Work(system, node, options, known, faults=list(wrong))
     work.unknown_names()
     for port in (*node.inputs, *node.outputs):
@@ -163,7 +163,7 @@ def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tu
     return known, wrong
 
 
-def traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
+def _traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
     """The traces that a method names and that are there."""
     named = said(options).get("traces")
     paths = (inside(system.plan.root, n) for n in named if isinstance(n, str)) if isinstance(named, list) else ()

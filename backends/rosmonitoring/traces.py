@@ -49,7 +49,7 @@ def parse_event(text: str) -> Event:
     return found
 
 
-def wrong_time(event: Event) -> str:
+def _wrong_time(event: Event) -> str:
     """What is wrong with the time of a recorded event, if anything is: ROSMonitoring writes one with every event, as
     seconds, and a record without it was cut or put together by hand."""
     raw = event.get("time")
@@ -81,7 +81,7 @@ def event_of(line: str, name: str, number: int) -> Event | None:
         raise Rejected(_fault(name, number, 1, str(error))) from None
     if not isinstance(topic := event.get("topic"), str) or not topic:
         raise Rejected(_fault(name, number, max(1, line.find('"topic"') + 1), "the event has no `topic`: a name"))
-    if wrong := wrong_time(event):
+    if wrong := _wrong_time(event):
         raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
     return event
 

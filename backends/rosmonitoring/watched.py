@@ -191,11 +191,11 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
             bindings = watched.witness(known) or {}
     except NotEvaluable:
         pass
-    values = tuple((n, shorten(show(snapshot[n]))) for n in watched.names if n in snapshot)
+    values = tuple((n, _shorten(show(snapshot[n]))) for n in watched.names if n in snapshot)
     return values, tuple((n, show(v)) for n, v in bindings.items())
 
 
-def shorten(text: str) -> str:
+def _shorten(text: str) -> str:
     return text if len(text) <= 200 else text[:199] + "…"
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -65,6 +67,11 @@ HOLDERS = {"ContextVar", "Lock", "RLock", "defaultdict", "deque", "dict", "list"
 CACHES = {"by_identity", "cache", "lru_cache"}
 
 
+@functools.cache
+def product() -> dict[Path, ast.Module]:
+    return {p: ast.parse(p.read_text("utf-8")) for room in ("avow", "backends") for p in (ROOT / room).rglob("*.py")}
+
+
 def test_the_map_shows_the_floors() -> None:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     layers = [layer.split(" | ") for layer in next(c["layers"] for c in contracts if c["type"] == "layers")]
@@ -84,13 +91,26 @@ def test_a_room_says_what_it_is_for() -> None:
     assert [path for path in doors if not ast.get_docstring(ast.parse(path.read_text()))] == []
 
 
+def test_what_only_its_module_uses_is_private() -> None:
+    """Functions whose name stands nowhere else, and those whose name stands nowhere at all. (What a framework calls
+    has a decorator, or a prefix of the framework's.)"""
+    files = (*product(), *(ROOT / "tests").rglob("*.py"))
+    uses = Counter(word for path in files for word in set(re.findall(r"\w+", path.read_text("utf-8"))))
+    assert [
+        f"{path.relative_to(ROOT)}: {node.name}"
+        for path, tree in product().items()
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith(("_", "pytest_")) and not node.decorator_list
+        if uses[node.name] < 2
+    ] == []
+
+
 def test_no_class_is_imported_by_another_name() -> None:
     """Two of one name are met together, then: one of them is to be called what it is."""
     assert [
         f"{path.relative_to(ROOT)}: {name.name} as {name.asname}"
-        for folder in ("avow", "backends")
-        for path in (ROOT / folder).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
+        for path, tree in product().items()
+        for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").startswith("avow"))
         for name in node.names
         if name.asname not in (None, name.name) and name.name.lstrip("_")[0].isupper()
@@ -103,11 +123,10 @@ def test_no_file_is_longer_than_one_can_read() -> None:
     assert not long, f"part what is longer than {LINES} lines by what it is about"
 
 
-def state(source: str) -> set[str]:
+def state(tree: ast.Module) -> set[str]:
     """The names at the top of a module whose value can change while it runs: variables and containers that are not
     written as constants, constants that something changes, functions without arguments that keep what they
     answer, names of other modules."""
-    tree = ast.parse(source)
     nodes = list(ast.walk(tree))
     values = {
         target.id: node.value
@@ -177,13 +196,13 @@ def _called(node: ast.expr) -> str:
 
 
 def test_what_a_run_knows_stands_in_its_object() -> None:
-    found = {f"{p.stem}.{name}" for p in sorted(PIPELINE.glob("*.py")) for name in state(p.read_text("utf-8"))}
+    found = {f"{p.stem}.{name}" for p, tree in product().items() if p.parent == PIPELINE for name in state(tree)}
     assert found == set(STAYS), "put it into `State` or `Run`; what is of the process, and not of a run, has its reason"
 
 
 def test_what_outlives_a_call_has_its_reason() -> None:
-    files = [p for room in ("avow", "backends") for p in (ROOT / room).rglob("*.py") if PIPELINE not in p.parents]
-    found = {f"{p.relative_to(ROOT).with_suffix('')}.{name}" for p in files for name in state(p.read_text("utf-8"))}
+    files = {p.relative_to(ROOT).with_suffix(""): tree for p, tree in product().items() if PIPELINE not in p.parents}
+    found = {f"{p}.{name}" for p, tree in files.items() for name in state(tree)}
     assert found == set(ELSEWHERE), "put it into an object that whoever needs it is handed"
 
 
@@ -204,10 +223,12 @@ def test_what_outlives_a_call_has_its_reason() -> None:
     ],
 )
 def test_state_is_found(source: str) -> None:
-    assert state(source)
+    assert state(ast.parse(source))
 
 
 def test_a_constant_is_none() -> None:
     assert not state(
-        "TABLE = {1: 2}\n_NAMES = ('a',)\nPair = tuple[int, str]\ndef f():\n    found = []\n    found.append(1)"
+        ast.parse(
+            "TABLE = {1: 2}\n_NAMES = ('a',)\nPair = tuple[int, str]\ndef f():\n    found = []\n    found.append(1)"
+        )
     )

@@ -146,9 +146,9 @@ class Driver:
         fields = fields_of(event)
         if not fields and data["d"]:
             return False
-        said = plain_fields(data, fields)
+        said = _plain_fields(data, fields)
         recorded = self.coded(topic, event, "the recording")
-        return json.dumps(said) == json.dumps(plain_fields(recorded, fields))
+        return json.dumps(said) == json.dumps(_plain_fields(recorded, fields))
 
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
         """So many messages on what it hears, from the numbers and words of contract, program and parameters."""
@@ -398,12 +398,12 @@ def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
             return float.fromhex(data["f"]) if name.startswith("float") else data
 
 
-def plain_fields(data: Any, like: Any) -> Any:
+def _plain_fields(data: Any, like: Any) -> Any:
     """Of a message's data only the fields that a recorded event has."""
     if isinstance(like, dict) and isinstance(data, dict) and "d" in data:
-        return [[name, plain_fields(value, like[name])] for name, value in data["d"] if name in like]
+        return [[name, _plain_fields(value, like[name])] for name, value in data["d"] if name in like]
     if isinstance(like, list) and isinstance(data, dict) and "l" in data and len(like) == len(data["l"]):
-        return [plain_fields(item, each) for item, each in zip(data["l"], like, strict=True)]
+        return [_plain_fields(item, each) for item, each in zip(data["l"], like, strict=True)]
     return data
 
 

@@ -256,7 +256,7 @@ def numeric(value: Numeric) -> str:
             return f"({numeric(left)} {operator} {numeric(right)})"
 
 
-def condition_text(condition: Condition) -> str:
+def _condition_text(condition: Condition) -> str:
     match condition:
         case Comparison(operator=operator, left=left, right=right):
             return f"{numeric(left)} {operator} {numeric(right)}"
@@ -265,9 +265,9 @@ def condition_text(condition: Condition) -> str:
         case Some(items=()):
             return "0 == 1"
         case Every(items=items):
-            return f"({' && '.join(map(condition_text, items))})"
+            return f"({' && '.join(map(_condition_text, items))})"
         case Some(items=items):
-            return f"({' || '.join(map(condition_text, items))})"
+            return f"({' || '.join(map(_condition_text, items))})"
 
 
 TOLERANCE = (
@@ -304,7 +304,7 @@ def _event_text(event: EventType | Derived) -> str:
     if isinstance(event, Derived):
         return f"{event.name} matches {' | '.join(event.parents)};"
     head = event.name + (f"({', '.join(event.parameters)})" if event.parameters else "")
-    guard = "" if event.condition == TRUE else f"\n  with {condition_text(event.condition)}"
+    guard = "" if event.condition == TRUE else f"\n  with {_condition_text(event.condition)}"
     return f"{head} matches {' | '.join(event.patterns)}{guard};"
 
 
