@@ -102,7 +102,9 @@ def method_slice(
     looks = connected(tool, job)
     edges = graph.feeding(own) if looks else ()
     edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
-    sources = {edge.source.node for edge in edges} - {own}
+    sources = {edge.source.node for edge in edges}
+    told_of_itself = told_too(tool, job) if own in sources else frozenset[str]()
+    sources -= {own}
     contract = job.contract
     nodes = tuple(
         _own(job, named, upstream, sentences) if n.name == own else _other(n, upstream)
@@ -112,7 +114,7 @@ def method_slice(
     cut = replace(
         _bare(plan),
         nodes=(
-            _planned(tool, plan.node(job.node.name), job),
+            _planned(tool, plan.node(job.node.name), job, told_of_itself),
             *(_told(plan.node(name), told_too(tool, job)) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
@@ -165,10 +167,15 @@ def _bare_clause(clause: Clause) -> Clause:
     return replace(clause, position=0, text="", sentence=None)
 
 
-def _planned(tool: Backend, node: NodePlan, job: Job) -> NodePlan:
-    """With the methods whose models the program is held against, and those whose recordings it is asked on."""
-    others = tuple(replace(m, guarantees=()) for m in beside(job) if m.id != job.method.id)
-    return replace(node, methods=(job.method, *others), source=node.source if tool.uses_source else None)
+def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str]) -> NodePlan:
+    """With the methods whose models the program is held against, those whose recordings it is asked on, and, of a node
+    that feeds itself, what is told of it as of any source (`_told`)."""
+    told = tuple(m for m in node.methods if m.backend in backends)
+    others = {m.id: replace(m, guarantees=()) for m in (*beside(job), *told) if m.id != job.method.id}
+    methods = (job.method, *others.values())
+    if told:  # in the plan's order, in which the key has them
+        methods = tuple(sorted(methods, key=lambda m: [each.id for each in node.methods].index(m.id)))
+    return replace(node, methods=methods, source=node.source if tool.uses_source else None)
 
 
 def _told(node: NodePlan, backends: Collection[str]) -> NodePlan:

@@ -104,6 +104,19 @@ def test_a_slice_comes_back_as_it_was_sent_and_gives_the_same_keys(folder: Path)
         assert b"system.rcl" not in sent
 
 
+SHIPPED = sorted(path.parent for path in Path("contracts").glob("*/plan.yaml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system", SHIPPED, ids=lambda path: path.name)
+def test_what_is_sent_of_a_shipped_system_gives_the_same_keys(system: Path) -> None:
+    """Also where a node feeds itself, and is told of by several methods."""
+    place = system.absolute()
+    for work in works(place):
+        assert work.cut is not None
+        assert keys_of(decode(encode(work.cut(), place), place)) == work.keys, work.name
+
+
 _SHOWN = {
     *(("Clause", name) for name in ("sentence", "text", "position")),
     *(("Claim", name) for name in ("sentence", "formula", "severity", "clauses")),
