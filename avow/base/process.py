@@ -72,9 +72,17 @@ def run(
     stdin: str | None = None,
     pass_fds: Sequence[int] = (),
 ) -> Completed:
-    """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception."""
+    """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception.
+
+    It gets the variables `bare` and `env`, and no others: what stands in somebody's environment or home is no part of
+    any question."""
     start = time.monotonic()
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err, _stdin(stdin) as source:
+    with (
+        tempfile.TemporaryFile() as out,
+        tempfile.TemporaryFile() as err,
+        _stdin(stdin) as source,
+        tempfile.TemporaryDirectory(prefix="avow-home-", ignore_cleanup_errors=True) as home,
+    ):
         try:
             process = subprocess.Popen(
                 list(command),
@@ -82,7 +90,7 @@ def run(
                 stdin=source,
                 stdout=out,
                 stderr=err,
-                env={**os.environ, **env} if env else None,
+                env={**bare(home), **(env or {})},
                 start_new_session=True,
                 preexec_fn=_before_exec(megabytes),
                 pass_fds=pass_fds,
@@ -101,6 +109,12 @@ def run(
             unwatch(process.pid)
         ended_with(code)
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
+
+
+def bare(home: str) -> dict[str, str]:
+    """The variables that an outside program gets: the way to programs, an empty folder of its own, one language."""
+    fixed = {"HOME": home, "TMPDIR": home, "LANG": "C.UTF-8", "LC_ALL": "C.UTF-8", "TZ": "UTC"}
+    return {"PATH": os.environ.get("PATH", os.defpath), **fixed}
 
 
 def ended_with(code: int | None) -> None:

@@ -20,14 +20,14 @@ _SHARED = frozenset({"bin", "sbin", "lib", "lib64", "tmp", "etc", "dev"})
 """Folders of many programs: what lies in one says nothing of a program in it."""
 
 
-def program_digest(path: str | None) -> str:
-    """SHA-256 of all files of `program_files`; empty where there is no program. Kept, sealed, for as long as each is
-    the same by inode, size and times."""
-    if path is None:
+def program_digest(places: tuple[str, ...]) -> str:
+    """SHA-256 of all files of `program_files` of these; empty where there are none. Kept, sealed, for as long as each
+    is the same by inode, size and times."""
+    if not places:
         return ""
-    files = program_files(path)
+    files = sorted({file for place in places for file in program_files(place)})
     mark = sha256(json.dumps([[str(file), _mark(file)] for file in files]))
-    note = cache_folder() / f"program-{sha256(path)[:16]}.json"
+    note = cache_folder() / f"program-{sha256(json.dumps(places))[:16]}.json"
     known = read_note(note) or {}
     if known.get("of") != mark:
         known = {"of": mark, "digest": sha256(json.dumps([[str(file), _digest(file)] for file in files]))}
@@ -47,10 +47,17 @@ def program_files(path: str) -> tuple[Path, ...]:
         if file not in found and file.is_file():
             found[file] = None
             waiting += _named(file)
-        elif file.is_dir():
-            compiled = [folder for name in ("bin", "lib") if (folder := file / name).is_dir()]
-            found |= dict.fromkeys(p for folder in compiled or [file] for p in folder.rglob("*") if p.is_file())
+        else:
+            found |= dict.fromkeys(p for folder in program_folders(str(file)) for p in folder.rglob("*") if p.is_file())
     return tuple(sorted(found))
+
+
+def program_folders(path: str) -> tuple[Path, ...]:
+    """Of a program that is a folder, those of which every file counts; none of any other."""
+    place = Path(os.path.realpath(path))
+    if not place.is_dir():
+        return ()
+    return tuple(folder for name in ("bin", "lib") if (folder := place / name).is_dir()) or (place,)
 
 
 def _named(file: Path) -> Iterator[Path]:

@@ -31,10 +31,17 @@ class Tool:
     """Its absence leaves something unasked, but no method without an engine."""
     package: str = ""
     """The Python package that it is, where it is no program of its own."""
+    parts: tuple[str, ...] = ()
+    """Further programs that it runs, and folders that it is made of."""
 
     @property
     def present(self) -> bool:
         return self.version is not None
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """All that its key covers."""
+        return (self.path, *self.parts) if self.path is not None else ()
 
 
 @functools.cache

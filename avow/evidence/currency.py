@@ -18,7 +18,7 @@ from avow.base.verdict import Isolation
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import ISOLATION, OBSERVED, Evidence
 from avow.isolation.level import wanted
-from avow.isolation.observed import Observed, Seen, look
+from avow.isolation.observed import Observed, Seen, look, marks
 
 
 def stands(record: Evidence, root: Path) -> bool:
@@ -87,16 +87,11 @@ def _apart(record: Evidence) -> bool:
 
 
 def _now(kind: Seen, path: str) -> str:
-    """As `look`; a file that is as it was a moment ago is not read again."""
-    if kind is not Seen.READ:
-        return look(kind, path)
-    try:
-        info = Path(path).stat()
-    except (OSError, ValueError):
-        return look(kind, path)
-    return _digest(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
+    """As `look`; what is as it was a moment ago is not read again."""
+    mark = marks(Observed(kind, path))
+    return look(kind, path) if mark is None else _digest(kind, path, mark)
 
 
 @functools.lru_cache(maxsize=100_000)
-def _digest(path: str, mark: tuple[int, ...]) -> str:
-    return look(Seen.READ, path)
+def _digest(kind: Seen, path: str, mark: tuple[object, ...]) -> str:
+    return look(kind, path)

@@ -60,7 +60,7 @@ def ask(
             cwd=cwd,
             seconds=seconds,
             megabytes=megabytes,
-            env={"PYTHONPATH": absolute_only(), **env},
+            env={**os.environ, "PYTHONPATH": absolute_only(), **env},
             pass_fds=(channel.theirs,),
         )
     finally:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from avow.base.files import digest_file, sha256
 from avow.base.module_path import absolute_only
+from avow.tuning.sizes import FOLDED
 
 
 class Seen(StrEnum):
@@ -31,6 +32,8 @@ class Seen(StrEnum):
     """There was nothing of that name. The digest is empty."""
     LISTING = "listing"
     """A folder; the digest is of the names in it."""
+    FOLDER = "folder"
+    """All that lies directly in a folder: names, kinds, and the bytes of files. It stands for many rows (`folded`)."""
     STATE = "state"
     """Looked at, not opened: besides its kind, its size and its mode."""
     KIND = "kind"
@@ -66,7 +69,9 @@ def look(kind: Seen, path: str) -> str:
                 return "there"
             case Seen.LISTING:
                 # what Python and we leave behind is nobody's input
-                return sha256(json.dumps(sorted(n for n in os.listdir(path) if n != "__pycache__")))  # noqa: PTH208
+                return sha256(json.dumps(_names(path)))
+            case Seen.FOLDER:
+                return sha256(json.dumps([[name, _content(os.path.join(path, name))] for name in _names(path)]))  # noqa: PTH118
             case Seen.STATE:
                 size = "" if stat.S_ISDIR(info.st_mode) else str(info.st_size)
                 return sha256(f"{info.st_mode} {size} {_link(path)}")
@@ -76,6 +81,71 @@ def look(kind: Seen, path: str) -> str:
                 return ""
     except (OSError, ValueError):
         return _link(path) if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(name for name in os.listdir(folder) if name != "__pycache__")  # noqa: PTH208
+
+
+def _content(path: str) -> str:
+    return look(Seen.READ if os.path.isfile(path) else Seen.KIND, path)  # noqa: PTH113
+
+
+def marks(observed: Observed) -> tuple[object, ...] | None:
+    """What tells, without reading, that the bytes which a row stands for are as they were a moment ago; None where to
+    look again costs no more."""
+    try:
+        if observed.kind is Seen.READ:
+            return _mark(os.stat(observed.path))  # noqa: PTH116
+        if observed.kind is Seen.FOLDER:
+            with os.scandir(observed.path) as entries:
+                found = [(entry.name, entry) for entry in entries if entry.name != "__pycache__"]
+                return tuple((name, *_mark(entry.stat())) for name, entry in sorted(found, key=lambda f: f[0]))
+    except (OSError, ValueError):
+        return None
+    return None
+
+
+def _mark(info: os.stat_result) -> tuple[int, ...]:
+    return (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns)
+
+
+def folded(observed: Iterable[Observed]) -> tuple[Observed, ...]:
+    """Fewer rows that stand for no less: a thing below a folder that is not there is missing with it, and many things
+    in one folder are that folder. Folders of many programs stay apart: what else lies there is nobody's input."""
+    rows = {(o.path, o.kind): o for o in map(_missing, observed)}
+    beside: dict[str, set[str]] = {}
+    for path, kind in rows:
+        if kind in _OF_FILES:
+            beside.setdefault(os.path.dirname(path), set()).add(path)  # noqa: PTH120
+    for folder, many in beside.items():
+        if len(many) >= FOLDED and os.path.basename(folder) not in _SHARED and not folder.endswith(_LIBRARIES):  # noqa: PTH119
+            rows[folder, Seen.FOLDER] = Observed(Seen.FOLDER, folder, look(Seen.FOLDER, folder))
+    whole = {path for path, kind in rows if kind is Seen.FOLDER}
+    read = {path for path, kind in rows if kind is Seen.READ}
+
+    def stands(path: str, kind: Seen) -> bool:
+        """Whether the row says more than others do."""
+        if kind in _OF_FILES and os.path.dirname(path) in whole:  # noqa: PTH120
+            return False
+        return kind not in (Seen.LISTING, Seen.KIND, Seen.STATE) or path not in whole | read
+
+    return tuple(rows[key] for key in sorted(rows) if stands(*key))
+
+
+_OF_FILES = frozenset({Seen.READ, Seen.MISSING, Seen.STATE, Seen.KIND})
+_SHARED = frozenset({"", "bin", "sbin", "lib", "lib64", "etc", "tmp", "home", "root"})
+_LIBRARIES = f"/lib/{sysconfig.get_config_var('MULTIARCH')}"
+
+
+def _missing(observed: Observed) -> Observed:
+    """Of what is missing, the first folder on the way there that is."""
+    path = observed.path
+    if observed.kind is not Seen.MISSING:
+        return observed
+    while (above := os.path.dirname(path)) != path and not os.path.lexists(above):  # noqa: PTH120
+        path = above
+    return observed._replace(path=path)
 
 
 def variables() -> dict[str, str]:

@@ -100,6 +100,67 @@ class Trace:
             lines = _whole(file.read().split(b"\n"))
         return _read(lines, self.mark, str(folder), scratch)
 
+    def read_all(self, program: str, folder: Path) -> tuple[tuple[str, str], ...] | None:
+        """As `read`, of a trusted tool, from the start of its program: what it asked for, but for what it made itself
+        and what the machine is (``/proc``, devices). Said once."""
+        self.hide()
+        with self._file as file:
+            lines = list(_whole(file.read().split(b"\n")))
+        begins = (k for k, (_, line) in enumerate(lines) if line.startswith(b"execve(") and _names(line, program))
+        begin = next(begins, None)
+        ended = any(not line for _, line in lines)
+        return _looked_at(lines[begin:], str(folder)) if begin is not None and ended else None
+
+
+def _looked_at(lines: Iterable[tuple[int, bytes]], folder: str) -> tuple[tuple[str, str], ...]:
+    events: dict[tuple[str, str], None] = {}
+    places: dict[int, str] = {}
+    made: set[str] = set()
+    for process, line in lines:
+        found = _CALL.match(line)
+        if found is None:
+            continue
+        call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
+        at = _text(base) if base is not None else places.get(process, folder)
+        if call == "connect" and b"AF_UNIX" not in line and rest.rstrip().endswith(_CONNECTED):
+            events["outside", "the network"] = None
+        if text is None or not text:
+            continue
+        path = _plain(os.path.join(at, _text(text)))  # noqa: PTH118
+        well = b"= -1 " not in rest
+        if call == "chdir":
+            places[process] = path
+        elif call in _CHANGES or call == "creat" or (call in _OPENS and _WRITES.search(rest)):
+            if call in _OPENS and b"O_RDWR" in rest and b"O_CREAT" not in rest and path not in made:
+                events["read", path] = None
+            made |= {_plain(p) for p in (_both(call, line, at) if call in _BOTH else [path])} if well else set()
+        elif f"{path}/".startswith(_OF_THE_MACHINE) or any(f"{path}/".startswith(f"{own}/") for own in made):
+            pass
+        elif path.startswith(tempfile.gettempdir()) and str(process) in path:
+            pass  # a Java asks whether somebody wants to speak to it
+        elif call in _OPENS:
+            events["kind" if b"O_PATH" in rest else "read", path] = None
+        elif call in _LOOKS:
+            events["link" if call.startswith("readlink") else "state", path] = None
+    return (*events, *_interpreters(events))
+
+
+def _names(line: bytes, program: str) -> bool:
+    found = _CALL.match(line)
+    return found is not None and found[3] is not None and _text(found[3]) == program
+
+
+_CONNECTED = (b"= 0", b"(Operation now in progress)")
+_OF_THE_MACHINE = ("/proc/", "/sys/", "/dev/", "/etc/ld.so.cache/", "/etc/ld.so.preload/")
+
+
+def _plain(path: str) -> str:
+    """The path without ``..``, as the system goes it: through links."""
+    if "/../" in f"{path}/":
+        folder, name = os.path.split(path)
+        return os.path.realpath(path) if name == ".." else os.path.join(os.path.realpath(folder), name)  # noqa: PTH118
+    return os.path.normpath(path)
+
 
 def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
     """(process, call), calls that were interrupted by others' joined again, in the order in which they ended; nothing

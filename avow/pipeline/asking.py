@@ -51,7 +51,11 @@ def settle(
     log = {"worker.log": came.log} if came.log.strip() else {}
     if came.data is None:
         return _failed(obligations, work, Verdict.UNKNOWN if came.timed_out else Verdict.ERROR, came.failure, log)
-    return judged(work, obligations, asked.data, came.data, log)
+    report = judged(work, obligations, asked.data, came.data, log)
+    if run.elsewhere is None or request.root:
+        return report
+    # What a tool looked at on another machine cannot be looked at here; its programs' digests are in the key.
+    return replace(report, observed=tuple(o for o in report.observed if o.kind is Seen.OUTSIDE))
 
 
 def elsewhere(executor: Executor) -> Elsewhere:

@@ -141,11 +141,11 @@ def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...])
 
 def _circumstances(workspace: Workspace, report: Report) -> dict[str, object]:
     """What the subject looked at, with paths relative to the workspace where they lie within, and how it was kept."""
-    if report.isolation is Isolation.NONE:
-        return {}
     root = str(workspace.root.resolve()) + os.sep
-    seen = tuple(o._replace(path=o.path.removeprefix(root)) for o in report.observed)
-    return {ISOLATION: report.isolation.value, OBSERVED: to_json(seen)}
+    seen = to_json(tuple(o._replace(path=o.path.removeprefix(root)) for o in report.observed))
+    if report.isolation is Isolation.NONE:
+        return {OBSERVED: seen} if seen else {}
+    return {ISOLATION: report.isolation.value, OBSERVED: seen}
 
 
 def _language(obligations: tuple[Obligation, ...]) -> Report:

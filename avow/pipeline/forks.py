@@ -76,7 +76,8 @@ class Forks:
         done = server.run(arguments, seconds, stopped) if server else None
         if done is not None:
             return done
-        return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
+        command = [sys.executable, "-P", "-m", WORKER, *arguments]
+        return process.run(command, cwd=cwd, seconds=seconds, env={**os.environ, **_python()})
 
     def _at(self, cwd: Path, own: bool = False) -> _Server | None:
         """The server for this folder and environment; None where there can be none."""

@@ -24,7 +24,7 @@ from avow.base.programs import program_files
 from avow.base.tools import package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Observed, Seen, look
+from avow.isolation.observed import Observed, Seen, look, marks
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 
@@ -108,7 +108,7 @@ def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) 
     """`sources`: what `_sources` says. Raises OSError for anything that cannot be looked at."""
     digest = hashlib.sha256(sources.encode())
     for o in observed:
-        mark = _mark(o.path) if o.kind is Seen.READ and Path(o.path).is_file() else look(o.kind, o.path)
+        mark = marks(o) or look(o.kind, o.path)
         digest.update(f"{o.kind} {o.path} {mark}\n".encode("utf-8", "surrogateescape"))
     _add_files(digest, workspace.artifacts, workspace.reports)
     return digest.hexdigest()

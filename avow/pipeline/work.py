@@ -249,14 +249,14 @@ def tool_identities(tool: Backend, offered: Offered = None) -> tuple[tuple[str, 
     `offered`, of what can be sent there: the tools there."""
     if offered is not None and is_portable(tool):
         return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
-    found = ((t, package_digest(t.package) if t.package else program_digest(t.path)) for t in tool.tools())
+    found = ((t, package_digest(t.package) if t.package else program_digest(t.places)) for t in tool.tools())
     return tuple((t.name, t.version or "", mark) for t, mark in found)
 
 
 def programs(works: Iterable[Work]) -> tuple[str, ...]:
     """Where the outside tools are that these works use."""
     used = (method_backend(work.system, planned_method(work)) for work in works if not work.is_engine)
-    return tuple(dict.fromkeys(tool.path for backend in used for tool in backend.tools() if tool.path))
+    return tuple(dict.fromkeys(place for backend in used for tool in backend.tools() for place in tool.places))
 
 
 def is_portable(tool: Backend) -> bool:

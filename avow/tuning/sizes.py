@@ -125,3 +125,7 @@ would have no end."""
 
 SCRIPT_BYTES = 65_536
 """So much of a tool's script is looked through for the files that it names: a launcher has a few lines."""
+
+FOLDED = 4
+"""Files of one folder that a tool looked at, from which on a record tells of the folder: a compiler reads hundreds of
+headers, and a record that names each would be a hundred times as long."""

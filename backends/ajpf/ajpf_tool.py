@@ -14,8 +14,11 @@ from pathlib import Path
 
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
+from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.tools import Tool
+from avow.isolation.observed import Observed
+from avow.isolation.outside import Outside
 from avow.tuning.running import VERSION_SECONDS
 
 INSTALL = (
@@ -37,7 +40,10 @@ _STEP = re.compile(r"\[MS:\s*(\d+),\s*BS:\s*([^,\]]+),\s*UN:\s*([^\]]+)\]")
 _FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
 
 
-BRIEF = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
+ALONE = ("-XX:-UsePerfData", "-Duser.home=.")
+"""Nothing is shared with other runs, and settings are looked for where the run's files are."""
+
+BRIEF = (*ALONE, "-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
 """For a Java that runs for a second or two: it compiles lightly, and starts no threads for its garbage."""
 
 
@@ -60,6 +66,8 @@ class Answer:
     """What MCAPL calls its own version."""
     kept: bool = False
     """It was given in an earlier run, to the same files (`kept`)."""
+    observed: tuple[Observed, ...] = ()
+    """What Java looked at besides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +77,26 @@ class Installation:
     javac: str | None
     version: str
 
+    @property
+    def tool(self) -> Tool:
+        """With Java and its compiler."""
+        parts = tuple(_whole(program) for program in (self.java, self.javac) if program is not None)
+        return Tool("AJPF", self.version, str(self.home), INSTALL, parts=parts)
+
     def mark(self) -> str:
-        """Changes with any class or jar that is compiled anew or put in another's place."""
-        folders = (self.home / "bin", self.home / "lib")
-        files = sorted(path for folder in folders for path in folder.rglob("*") if path.is_file())
-        seen = [(str(path), (stat := path.stat()).st_size, stat.st_mtime_ns) for path in files]
-        return sha256(repr((self.version, seen)).encode()).hexdigest()
+        """Changes with any class, jar or program that is compiled anew or put in another's place."""
+        return sha256(repr((self.version, program_digest(self.tool.places))).encode()).hexdigest()
 
     def class_path(self, *folders: str) -> str:
         jars = sorted(str(p) for p in (self.home / "lib" / "3rdparty").glob("*.jar"))
         return os.pathsep.join([*folders, str(self.home / "bin"), *jars])
+
+
+def _whole(program: str) -> str:
+    """The home of a Java's program; where it has none, the program."""
+    place = os.path.realpath(shutil.which(program) or program)
+    home = Path(place).parent.parent
+    return str(home) if (home / "lib" / "modules").is_file() else place
 
 
 def find() -> Installation | None:
@@ -116,10 +134,10 @@ def _revision(home: Path) -> str:
 
 def tool() -> Tool:
     found = find()
-    return Tool("AJPF", found.version if found else None, str(found.home) if found else None, INSTALL)
+    return found.tool if found else Tool("AJPF", None, None, INSTALL)
 
 
-def prepare(installation: Installation, folder: Path, files: Mapping[str, str]) -> str | None:
+def prepare(installation: Installation, folder: Path, files: Mapping[str, str], outside: Outside) -> str | None:
     """Write the files of a run into a folder of its own and compile what is Java; why not, where that fails.
 
     AIL splits what it is given at commas and knows ASCII names only: so every name in the folder is ours, MCAPL is
@@ -146,7 +164,7 @@ def prepare(installation: Installation, folder: Path, files: Mapping[str, str]) 
         "-d",
         ".",
     ]
-    done = run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
+    done = outside.run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
     return None if done.code == 0 else f"the environment does not compile: {(done.stdout + done.stderr).strip()[:300]}"
 
 
@@ -154,15 +172,18 @@ def jpf_file(ail: str, properties: str, key: str, extra: str = "") -> str:
     return f"@using = mcapl\n\ntarget = ail.util.AJPF_w_AIL\ntarget.args = {ail},{properties},{key}\n{extra}"
 
 
-def check(installation: Installation, folder: Path, key: str, seconds: float, megabytes: int) -> Answer:
+def check(
+    installation: Installation, folder: Path, key: str, seconds: float, megabytes: int, outside: Outside
+) -> Answer:
     """Ask for one property of what was prepared. Never raises for what AJPF does."""
     jars = sorted(p.name for p in (installation.home / "lib" / "3rdparty").glob("guava*.jar"))
     path = ";".join([".", *(f"mcapl/lib/3rdparty/{jar}" for jar in jars)])
     (folder / f"{key}.jpf").write_text(jpf_file("agent.ail", "agent.psl", key, f"classpath = {path}\n"))
-    command = [installation.java, f"-Xmx{megabytes}m", "-cp", installation.class_path("."), "gov.nasa.jpf.tool.RunJPF"]
+    command = [installation.java, *ALONE, f"-Xmx{megabytes}m", "-cp", installation.class_path(".")]
+    command += ["gov.nasa.jpf.tool.RunJPF", "+site=site.properties", f"{key}.jpf"]
     env = {"AJPF_HOME": str(installation.home)}
     try:
-        done = run([*command, "+site=site.properties", f"{key}.jpf"], cwd=folder, seconds=seconds, env=env)
+        done = outside.run(command, cwd=folder, seconds=seconds, env=env)
     except ToolMissing as error:
         return Answer(Said.ERROR, str(error))
     return judge(done)

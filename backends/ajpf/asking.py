@@ -8,8 +8,11 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
+
+from avow.isolation.outside import Outside
 
 from . import kept, psl
 from .ajpf_tool import Answer, Installation, Said, check, prepare
@@ -64,7 +67,8 @@ def _asked(
     waiting, lock = len(properties), threading.Lock()
     with tempfile.TemporaryDirectory(prefix="avow-ajpf-") as temporary:
         folder = Path(temporary)
-        wrong = prepare(installation, folder, given)
+        outside = Outside((installation.tool,))
+        wrong = prepare(installation, folder, given, outside)
         if wrong is not None:
             return {p.key: Answer(Said.ERROR, wrong) for p in properties}
 
@@ -75,7 +79,9 @@ def _asked(
                 waiting -= 1
             if limit <= 1:
                 return Answer(Said.TIMEOUT, "no time left")
-            return check(installation, folder, p.key, limit, max(256, megabytes // workers))
+            return check(installation, folder, p.key, limit, max(256, megabytes // workers), outside)
 
         with ThreadPoolExecutor(workers) as pool:
-            return dict(zip([p.key for p in properties], pool.map(one, properties), strict=True))
+            answers = dict(zip([p.key for p in properties], pool.map(one, properties), strict=True))
+        observed = outside.observed()
+        return {key: replace(answer, observed=observed) for key, answer in answers.items()}

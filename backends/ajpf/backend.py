@@ -23,7 +23,7 @@ class AjpfBackend(Backend):
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "8"
+    version = "9"
     strength = Verdict.CHECKED
     uses_steps = False
     uses_wiring = False

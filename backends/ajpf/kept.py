@@ -12,12 +12,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
+from avow.base.codec import Unreadable, from_json, to_json
 from avow.base.notes import cache_folder, read_note, write_note
+from avow.evidence.record import OBSERVED
+from avow.isolation.observed import Observed, look
 
 from .ajpf_tool import Answer, Said
 
-_FORM = 1
+_FORM = 2
 """Of what is asked and how answers are read: another number, and nothing that was kept counts."""
 
 
@@ -31,7 +35,10 @@ def recall(key: str) -> Answer | None:
     data = read_note(_path(key))
     if data is None or data.get("said") not in (Said.HOLDS, Said.VIOLATED):
         return None
-    return Answer(Said(data["said"]), path=tuple(data["path"]), log=data["log"], framework=data["framework"], kept=True)
+    said, observed = Said(data["said"]), _as_it_was(data)
+    if observed is None:
+        return None
+    return Answer(said, "", tuple(data["path"]), data["log"], data["framework"], kept=True, observed=observed)
 
 
 def keep(key: str, answer: Answer) -> None:
@@ -39,21 +46,31 @@ def keep(key: str, answer: Answer) -> None:
     if answer.said not in (Said.HOLDS, Said.VIOLATED):
         return
     said = {"said": str(answer.said), "path": list(answer.path), "log": answer.log, "framework": answer.framework}
+    said[OBSERVED] = to_json(answer.observed)
     with suppress(OSError):
         write_note(_path(key), said)
 
 
-def told(key: str) -> str | None:
-    """What AIL printed in a run with these files, where that was kept."""
+def told(key: str) -> tuple[str, tuple[Observed, ...]] | None:
+    """What AIL printed in a run with these files, and what it looked at, where that was kept."""
     data = read_note(_path(key))
-    text = None if data is None else data.get("told")
-    return text if isinstance(text, str) else None
+    text, observed = (data.get("told"), _as_it_was(data)) if data is not None else (None, None)
+    return (text, observed) if isinstance(text, str) and observed is not None else None
 
 
-def keep_told(key: str, text: str) -> None:
+def keep_told(key: str, text: str, observed: tuple[Observed, ...]) -> None:
     """Where it cannot be written, the run will be done again."""
     with suppress(OSError):
-        write_note(_path(key), {"told": text})
+        write_note(_path(key), {"told": text, OBSERVED: to_json(observed)})
+
+
+def _as_it_was(data: Mapping[str, Any]) -> tuple[Observed, ...] | None:
+    """What was looked at, where all of it is as it was."""
+    try:
+        observed = from_json(tuple[Observed, ...], data.get(OBSERVED, []))
+    except Unreadable:
+        return None
+    return observed if all(look(o.kind, o.path) == o.digest for o in observed) else None
 
 
 def _path(key: str) -> Path:

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.base.process import ToolMissing, run
+from avow.base.process import ToolMissing
 from avow.formulas.lasso import Lasso
+from avow.isolation.observed import Observed
+from avow.isolation.outside import Outside
 
 from . import kept
 from .ajpf_tool import BRIEF, Installation, prepare
@@ -92,33 +94,37 @@ def _told(system: System, state: Any, why: str) -> Moment:
 
 def replay(
     installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path
-) -> tuple[str | None, str]:
-    """How AIL's run differs from ours, None where it does not; and AIL's output. In `folder` the environment's class is
-    compiled once for all runs of the setup. What AIL told of a run that agreed is kept (`kept`). Raises Unable."""
+) -> tuple[str | None, str, tuple[Observed, ...]]:
+    """How AIL's run differs from ours, None where it does not; AIL's output; and what AIL looked at besides.
+
+    In `folder` the environment's class is compiled once for all runs of the setup. What AIL told of a run that agreed
+    is kept (`kept`). Raises Unable."""
     moments, script = expected(graph, lasso)
     source = environment_class(setup.environment, agents=len(setup.programs), scripted=True)
     ail = f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = {BUILDER}\n"
     files = {"agent.gwen": program_text(setup.programs), "agent.ail": ail, f"{CLASS}.java": source}
     key = kept.key({**files, SCRIPT: script.text()}, "replay", installation.mark())
-    output = kept.told(key)
-    if output is not None:
-        return _difference(moments, output), output
-    output = _run(installation, files, script, folder)
-    difference = _difference(moments, output)
+    told = kept.told(key)
+    if told is not None:
+        return _difference(moments, told[0]), *told
+    outside = Outside((installation.tool,))
+    output = _run(installation, files, script, folder, outside)
+    difference, observed = _difference(moments, output), outside.observed()
     if difference is None:  # anything else may come of the machine, and is tried again
-        kept.keep_told(key, output)
-    return difference, output
+        kept.keep_told(key, output, observed)
+    return difference, output, observed
 
 
-def _run(installation: Installation, files: Mapping[str, str], script: Script, folder: Path) -> str:
+def _run(installation: Installation, files: Mapping[str, str], script: Script, folder: Path, outside: Outside) -> str:
     if not (folder / f"{CLASS}.class").is_file():
-        wrong = prepare(installation, folder, files)
+        wrong = prepare(installation, folder, files, outside)
         if wrong is not None:
             raise Unable(wrong)
     (folder / SCRIPT).write_text(script.text(), encoding="utf-8")
     command = [installation.java, *BRIEF, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
     try:
-        done = run(command, cwd=folder, seconds=REPLAY_SECONDS, env={"AJPF_HOME": str(installation.home)})
+        env = {"AJPF_HOME": str(installation.home)}
+        done = outside.run(command, cwd=folder, seconds=REPLAY_SECONDS, env=env)
     except ToolMissing as error:
         raise Unable(str(error)) from None
     return f"{done.stdout}\n{done.stderr}"

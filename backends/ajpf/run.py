@@ -15,6 +15,8 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
+from avow.isolation.observed import Observed
+from avow.isolation.outside import Outside
 
 from . import ajpf_tool, spin, spin_tool
 from .ajpf_tool import Installation, Said
@@ -54,7 +56,7 @@ def settle(job: Job, folder: Path, limits: Limits, version: str) -> Report:
     frame = run.frame()
     claims = {claim.guarantee: claim for claim in frame.made.claims}
     outcomes = tuple(outcome(o, claims[o.name], frame) for o in job.obligations)
-    return Report(outcomes, frame.engine, run.version(version), run.command, run.logs)
+    return Report(outcomes, frame.engine, run.version(version), run.command, run.logs, tuple(run.observed))
 
 
 class _Run:
@@ -77,6 +79,7 @@ class _Run:
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
+        self.observed: dict[Observed, None] = {}
         self.ajpf = ajpf_tool.find() if setup.semantics == "mcapl" else None
 
     def version(self, own: str) -> str:
@@ -220,11 +223,12 @@ class _Run:
         name = f"AIL ({installation.version})"
         result = self.results[refuted.key]
         try:
-            difference, log = replay(installation, self.setup, graph, lasso, folder)
+            difference, log, observed = replay(installation, self.setup, graph, lasso, folder)
         except Unable as error:
             self.bound["replay"] = f"not replayed by {name}: {error}"
             return
         self.logs[f"{refuted.key}.replay.txt"] = log
+        self.observed.update(dict.fromkeys(observed))
         if difference is None:
             opinions = {**result.opinions, name: "does the same run"}
             self.results[refuted.key] = replace(result, opinions=opinions)
@@ -240,11 +244,12 @@ class _Run:
         answers: dict[str, bool] = {}
         seconds = min(self.left() * SPIN_SHARE, SPIN_SECONDS) if self.setup.engine == "auto" else self.left()
         deadline = time.monotonic() + seconds
+        outside = Outside((spin_tool.tool(),))
         with tempfile.TemporaryDirectory() as temporary:
             try:
                 for checker in checkers:
                     seconds = max(0.0, deadline - time.monotonic())
-                    answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds)
+                    answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds, outside)
             except spin.NoOpinion as error:
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":
@@ -253,6 +258,7 @@ class _Run:
                     self.results = {key: replace(r, verdict=verdict, reason=reason) for key, r in self.results.items()}
                 return
             self.logs["spin.pml"] = (Path(temporary) / "agent.pml").read_text()
+        self.observed.update(dict.fromkeys(outside.observed()))
         for key, holds in answers.items():
             self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
         self.engine += f" and {name}"
@@ -281,6 +287,7 @@ class _Run:
         answers = ask(self.ajpf, self.setup, self.made.properties, self.left(), self.limits.megabytes)
         named = {answer.framework for answer in answers.values() if answer.framework}
         self.bound["ajpf"] = f"{self.ajpf.version}, {' and '.join(sorted(named)) or 'which did not name itself'}"
+        self.observed.update(dict.fromkeys(o for answer in answers.values() for o in answer.observed))
         kept = sum(answer.kept for answer in answers.values())
         if kept:
             self.bound["ajpf"] += f"; {kept} of {len(answers)} answers kept of an earlier run with the same files"

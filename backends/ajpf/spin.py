@@ -11,7 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from avow.base.files import write
-from avow.base.process import ToolMissing, run
+from avow.base.process import ToolMissing
+from avow.isolation.outside import Outside
 
 from . import promela, psl, spin_tool
 from .checker import Checker, Property
@@ -28,7 +29,9 @@ class NoOpinion(Exception):  # noqa: N818 - it names a state, not a fault
         self.reason = reason
 
 
-def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:
+def opinions(
+    checker: Checker, properties: Sequence[Property], folder: Path, seconds: float, outside: Outside
+) -> dict[str, bool]:
     """Key → whether the property holds, says Spin. Raises NoOpinion."""
     if spin_tool.version() is None:
         raise NoOpinion("spin or gcc is not installed")
@@ -36,11 +39,16 @@ def opinions(checker: Checker, properties: Sequence[Property], folder: Path, sec
         files = _translated(checker, properties)
     except promela.NotTranslated as error:
         raise NoOpinion(f"no translation of {error}") from None
-    return _asked(files, checker, properties, folder, time.monotonic() + seconds)
+    return _asked(files, checker, properties, folder, time.monotonic() + seconds, outside)
 
 
 def _asked(
-    files: Mapping[str, str], checker: Checker, properties: Sequence[Property], folder: Path, deadline: float
+    files: Mapping[str, str],
+    checker: Checker,
+    properties: Sequence[Property],
+    folder: Path,
+    deadline: float,
+    outside: Outside,
 ) -> dict[str, bool]:
     for name, text in files.items():
         write(folder / name, text)
@@ -49,7 +57,7 @@ def _asked(
     model = ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c", "agent.o", "-lm"]
     for command in (["spin", "-a", "agent.pml"], runner, model):
         try:
-            done = run(command, cwd=folder, seconds=_left(deadline))
+            done = outside.run(command, cwd=folder, seconds=_left(deadline))
         except ToolMissing as error:
             raise NoOpinion(str(error)) from None
         if done.code != 0:
@@ -57,7 +65,7 @@ def _asked(
     depth = 20 * len(checker.graph) + SPIN_DEPTH
 
     def one(number: int) -> bool:
-        return _verdict(folder, f"c{number}", depth, deadline)
+        return _verdict(folder, f"c{number}", depth, deadline, outside)
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return dict(zip([p.key for p in properties], pool.map(one, range(len(properties))), strict=True))
@@ -89,9 +97,10 @@ def _left(deadline: float) -> float:
     return left
 
 
-def _verdict(folder: Path, claim: str, deepest: int, deadline: float) -> bool:
+def _verdict(folder: Path, claim: str, deepest: int, deadline: float, outside: Outside) -> bool:
     for depth in (SPIN_DEPTH, deepest):  # a deep stack costs more than most searches
-        done = run(["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim], cwd=folder, seconds=_left(deadline))
+        command = ["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim]
+        done = outside.run(command, cwd=folder, seconds=_left(deadline))
         text = done.stdout + done.stderr
         if "too small" not in text:
             break

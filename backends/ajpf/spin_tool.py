@@ -24,4 +24,6 @@ def version() -> str | None:
 
 
 def tool() -> Tool:
-    return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc")
+    compiler = shutil.which("gcc")
+    parts = (compiler,) if compiler is not None else ()
+    return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc", parts=parts)

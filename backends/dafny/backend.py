@@ -12,6 +12,7 @@ from avow.backend_kit.runs import unsaid
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.isolation.outside import Outside
 from avow.language.contract import Clause, Node
 from avow.system.plan import System
 
@@ -29,7 +30,7 @@ class DafnyBackend(Backend):
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "5"
+    version = "6"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
@@ -121,8 +122,9 @@ class DafnyBackend(Backend):
         if not tool.present:
             return all_alike(Verdict.NOT_RUN, f"dafny is not on this machine; install it with: {INSTALL}")
         scanned = _scan(text, generated)
+        outside = Outside((tool,))
         try:
-            settled = settle(job.node, generated, scanned, path.name, limits)
+            settled = settle(job.node, generated, scanned, path.name, limits, outside)
         except (process.ToolMissing, OSError) as error:
             return all_alike(Verdict.ERROR, f"dafny could not be run: {error}")
         uncovered = dict(generated.uncovered)
@@ -134,7 +136,7 @@ class DafnyBackend(Backend):
                 outcomes.append(Outcome(obligation.id, Verdict.UNKNOWN, what, link=Link.GENERATED))
             else:
                 outcomes.append(_outcome(obligation.id, settled.verdicts[obligation.name]))
-        return Report(tuple(outcomes), "dafny", version, settled.command, settled.logs)
+        return Report(tuple(outcomes), "dafny", version, settled.command, settled.logs, outside.observed())
 
 
 def _outcome(obligation: str, settled: Settled) -> Outcome:

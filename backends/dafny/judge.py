@@ -19,6 +19,7 @@ from avow.base.plain import ALLOWS_MORE
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
+from avow.isolation.outside import Outside
 from avow.language.contract import Node
 
 from .answer import Member
@@ -48,7 +49,9 @@ class Judgement:
     logs: Mapping[str, str]
 
 
-def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, limits: Limits) -> Judgement:
+def settle(
+    node: Node, generated: Generated, scanned: Scan, shown_name: str, limits: Limits, outside: Outside
+) -> Judgement:
     """Run Dafny and judge each guarantee of the node. `shown_name` is what the implementation is called in messages.
 
     Raises ToolMissing, OSError.
@@ -56,7 +59,7 @@ def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, lim
     guarantees = tuple(name for _, name in generated.ensures)
     asks = scanned.environment != "true"
     files = _files(generated, scanned, guarantees, asks)
-    run = verify(files, limits)
+    run = verify(files, limits, outside)
     logs = {"verify.log": run.output}
 
     def alike(settled: Settled) -> Judgement:
@@ -65,7 +68,7 @@ def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, lim
     broken = _broken(run, scanned, generated, shown_name)
     if broken is not None:
         return alike(broken)
-    audited = audit(files, limits)
+    audited = audit(files, limits, outside)
     logs["audit.log"] = audited.output
     taken = _taken_for_granted(audited, scanned, generated, shown_name)
     if taken is None:
@@ -82,7 +85,7 @@ def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, lim
     if spared:
         # Only other guarantees failed. Dafny assumes what it has reported before it goes on, so these are asked
         # again without those.
-        again = verify(_files(generated, scanned, spared, asks), limits)
+        again = verify(_files(generated, scanned, spared, asks), limits, outside)
         logs["verify-again.log"] = again.output
         if _broken(again, scanned, generated, shown_name) is None:
             left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated, environment))

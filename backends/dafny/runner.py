@@ -5,15 +5,18 @@ Up to version 3 it is asked with the options of 2.3, from version 4 on with its 
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.protocol import Limits, Tool
-from avow.base import process
 from avow.base.records import dataclass
 from avow.base.tools import find_tool
+from avow.isolation.outside import Outside
 
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members
@@ -21,6 +24,7 @@ from .tuning import MODEL_CHARACTERS
 
 INSTALL = "apt-get install dafny"
 
+_MONO = ("/usr/lib/mono", "/etc/mono")
 _ANSWER = "answer.xml"
 _RESOLVED = "resolved.txt"
 _MODEL = "model.txt"
@@ -32,8 +36,10 @@ def dafny() -> Tool:
     # Any run prints its version in the XML only; without a file it says it in a usage line.
     found = find_tool("dafny", ("/version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
     if found.version == "unknown":
-        return find_tool("dafny", ("--version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
-    return found
+        found = find_tool("dafny", ("--version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+    # Its prover; what runs it, from version 4 on, and before.
+    parts = (shutil.which("z3"), shutil.which("dotnet"), *(place for place in _MONO if os.path.isdir(place)))  # noqa: PTH112
+    return replace(found, parts=tuple(part for part in parts if part is not None))
 
 
 def has_commands(version: str | None) -> bool:
@@ -71,30 +77,30 @@ class Audit:
     output: str
 
 
-def verify(files: Mapping[str, str], limits: Limits) -> Run:
+def verify(files: Mapping[str, str], limits: Limits, outside: Outside) -> Run:
     """Verify all files together. Raises ToolMissing."""
     each = max(1, min(30, int(limits.seconds / 2)))
     if not has_commands(dafny().version):
         flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20")
         said = (f"/xml:{_ANSWER}", f"/mv:{_MODEL}", f"/rprint:{_RESOLVED}")
-        done = _run((*flags, *said), files, limits)
+        done = _run((*flags, *said), files, limits, outside)
         members = read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None
         return _answer(done, members, done.answers[_RESOLVED])
-    done = _run(modern.verify_arguments(each, lenient=True), files, limits)
+    done = _run(modern.verify_arguments(each, lenient=True), files, limits, outside)
     if modern.is_unknown_option(done.output):
-        done = _run(modern.verify_arguments(each, lenient=False), files, limits)
+        done = _run(modern.verify_arguments(each, lenient=False), files, limits, outside)
     log = done.answers[modern.LOG]
     return _answer(done, modern.read_log(log, done.output) if log else None)
 
 
-def audit(files: Mapping[str, str], limits: Limits) -> Audit:
+def audit(files: Mapping[str, str], limits: Limits, outside: Outside) -> Audit:
     """Have Dafny say what it takes for granted, without verifying; nothing is compiled or executed. Raises ToolMissing.
 
     2.3 complains of every missing body and assumption when it translates the files; 4 has a command for it."""
     if has_commands(dafny().version):
-        done = _run(("audit",), files, limits)
+        done = _run(("audit",), files, limits, outside)
         return Audit(None if done.code is None else modern.read_audit(done.output), done.output)
-    done = _run(("/nologo", "/compile:0", "/noVerify", "/spillTargetCode:3"), files, limits)
+    done = _run(("/nologo", "/compile:0", "/noVerify", "/spillTargetCode:3"), files, limits, outside)
     found = complaints(done.output)
     said = done.code in (0, 3) and _FINISHED.search(done.output) is not None
     if not said or (done.code == 3 and not any(c.message.startswith("Error") for c in found)):
@@ -115,19 +121,22 @@ def _answer(done: _Done, members: tuple[Member, ...] | None, resolved: str | Non
     return Run(done.command, done.code, members, said, counted(done.output), done.output, model, resolved)
 
 
-def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits) -> _Done:
+def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside: Outside) -> _Done:
     megabytes: int | None = limits.megabytes
     env: dict[str, str] = {}
     if has_commands(dafny().version):
         # .NET reserves far more addresses than it uses: a bound on addresses would keep it from starting at all.
         env, megabytes = {"DOTNET_GCHeapHardLimit": f"{limits.megabytes * 2**20:x}"}, None
+        runtime = shutil.which("dotnet")
+        if runtime is not None:
+            env["DOTNET_ROOT"] = os.path.dirname(os.path.realpath(runtime))  # noqa: PTH120
     # The files' names are ours (derived by `file_stem`): none can be taken for an option or lead elsewhere.
     command = ("dafny", *first, *files)
     with tempfile.TemporaryDirectory(prefix="avow-dafny-") as name:
         folder = Path(name)
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
-        done = process.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
+        done = outside.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
         answers = {each: _read(folder / each) for each in (_ANSWER, _MODEL, _RESOLVED, modern.LOG)}
     return _Done(command, done.code, quiet(done.stdout + done.stderr), answers)
 

@@ -6,11 +6,11 @@ import os
 import re
 from pathlib import Path
 
-from avow.base import process
 from avow.base.process import Completed, ToolMissing
 from avow.base.records import dataclass
 from avow.base.tools import Tool, find_tool
-from avow.isolation.observed import Observed, recorded
+from avow.isolation.observed import Observed, folded, recorded
+from avow.isolation.outside import Outside
 
 from .reading import Reading
 from .tables import TABLES, Drawable, native, tables
@@ -70,39 +70,42 @@ def write(reading: Reading, made: Drawable, folder: Path) -> None:
     (folder / LINK).symlink_to(reading.adapter)
 
 
-def fuzzed(reading: Reading, folder: Path, seconds: float) -> Built:
+def fuzzed(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
     """The harness. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, "harness.cpp", (*_SANITIZED, *_FUZZED), "fuzz", seconds)
+    return _build(reading, folder, outside, "harness.cpp", (*_SANITIZED, *_FUZZED), "fuzz", seconds)
 
 
-def sanitized(reading: Reading, folder: Path, seconds: float) -> Built:
+def sanitized(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
     """The plain program with sanitizers: what tells where a fault is. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, "replay.cpp", _SANITIZED, "sanitized", seconds)
+    return _build(reading, folder, outside, "replay.cpp", _SANITIZED, "sanitized", seconds)
 
 
-def plain(reading: Reading, folder: Path, seconds: float) -> Built:
+def plain(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
     """The program whose answers are judged. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, "replay.cpp", _PLAIN, "replay", seconds)
+    return _build(reading, folder, outside, "replay.cpp", _PLAIN, "replay", seconds)
 
 
-def filled(reading: Reading, folder: Path, seconds: float) -> Built:
+def filled(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
     """The plain program, in which variables and memory that nothing was written to hold other bytes. Raises NotBuilt
     and ToolMissing."""
-    return _build(reading, folder, "replay.cpp", (*_PLAIN, *_FILLED), "filled", seconds)
+    return _build(reading, folder, outside, "replay.cpp", (*_PLAIN, *_FILLED), "filled", seconds)
 
 
-def looked_into(reading: Reading, folder: Path, linked: str, seconds: float) -> Unseen:
+def looked_into(reading: Reading, folder: Path, outside: Outside, linked: str, seconds: float) -> Unseen:
     """What no run shows of the source; `linked` as the plain build has it. Raises NotBuilt and ToolMissing."""
-    alone = _preprocessed(reading, folder, _PLAIN, seconds)
-    fuzzing = _preprocessed(reading, folder, (*_SANITIZED, *_FUZZED), seconds)
+    alone = _preprocessed(reading, folder, outside, _PLAIN, seconds)
+    fuzzing = _preprocessed(reading, folder, outside, (*_SANITIZED, *_FUZZED), seconds)
     found = unseen(alone, fuzzing, linked)
     return Unseen(*(plainly(said, reading, folder) for said in (found.undeclared, found.faults)))
 
 
-def _preprocessed(reading: Reading, folder: Path, flags: tuple[str, ...], seconds: float) -> list[Line]:
+def _preprocessed(
+    reading: Reading, folder: Path, outside: Outside, flags: tuple[str, ...], seconds: float
+) -> list[Line]:
     lines: list[Line] = []
     for source in (folder / "replay.cpp", *reading.sources):
-        done = _clang(_there(), [*_COMMON, *flags, *_includes(reading, folder), "-E", str(source)], folder, seconds)
+        words = [*_COMMON, *flags, *_includes(reading, folder), "-E", str(source)]
+        done = _clang(_there(), words, folder, outside, seconds)
         if done.code != 0:
             raise NotBuilt(_first(done, reading, folder))
         lines += own(done.stdout, folder, reading.adapter)
@@ -121,32 +124,38 @@ def _includes(reading: Reading, folder: Path) -> list[str]:
     return [*around, f'-DADAPTER="{LINK}"']
 
 
-def _build(reading: Reading, folder: Path, main: str, flags: tuple[str, ...], name: str, seconds: float) -> Built:
+def _build(
+    reading: Reading,
+    folder: Path,
+    outside: Outside,
+    main: str,
+    flags: tuple[str, ...],
+    name: str,
+    seconds: float,
+) -> Built:
     tool = _there()
     objects: list[str] = []
     read: list[Path] = []
     for k, source in enumerate((folder / main, *reading.sources)):
         object_file = folder / f"{name}-{k}.o"
         listed = folder / f"{name}-{k}.d"
-        words = [*_COMMON, *flags, *_includes(reading, folder), "-MMD", "-MF", str(listed)]
-        done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, seconds)
+        words = [*_COMMON, *flags, *_includes(reading, folder), "-MD", "-MF", str(listed)]
+        done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, outside, seconds)
         if done.code != 0 or not object_file.is_file():
             raise NotBuilt(_first(done, reading, folder))
         objects.append(str(object_file))
         read += _listed(listed, folder)
     program = folder / name
     watched = [f"-Wl,-y,{name}" for name in WATCHED]
-    done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, seconds)
+    done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
     if done.code != 0 or not program.is_file():
         raise NotBuilt(_first(done, reading, folder))
     return Built(program, tuple(dict.fromkeys(read)), done.stdout + done.stderr)
 
 
-def _clang(tool: Tool, words: list[str], folder: Path, seconds: float) -> Completed:
-    """Nothing of the environment but the way to its own programs: variables could add files and flags."""
-    bare = ["env", "-i", f"PATH={os.environ.get('PATH', os.defpath)}", f"TMPDIR={folder}", "LC_ALL=C.UTF-8"]
+def _clang(tool: Tool, words: list[str], folder: Path, outside: Outside, seconds: float) -> Completed:
     limit = max(5.0, min(seconds, BUILD_SECONDS))
-    return process.run([*bare, str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
+    return outside.run([str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
 
 
 def _first(done: Completed, reading: Reading, folder: Path) -> str:
@@ -167,7 +176,7 @@ def plainly(said: str, reading: Reading, folder: Path) -> str:
 
 
 def _listed(path: Path, folder: Path) -> list[Path]:
-    """What a build read of files that are no system's: as make writes it, beside what we generated."""
+    """What a build read: as make writes it, beside what we generated."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -177,8 +186,10 @@ def _listed(path: Path, folder: Path) -> list[Path]:
     return [p.resolve() for p in found if not p.resolve().is_relative_to(folder.resolve())]
 
 
-def observed(reading: Reading, built: tuple[Built, ...]) -> tuple[Observed, ...]:
-    """What the builds read; and the folders in which another file of the same name would have been found first."""
+def observed(reading: Reading, built: tuple[Built, ...], outside: Outside) -> tuple[Observed, ...]:
+    """What the builds read; the folders in which another file of the same name would have been found first; and what
+    was looked for, where that is traced."""
     read = dict.fromkeys(path for one in built for path in one.read)
-    folders = dict.fromkeys([*(path.parent for path in read), *reading.include])
-    return recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])
+    folders = dict.fromkeys([reading.adapter.parent, *reading.include])
+    told = recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])
+    return folded((*told, *outside.observed()))

@@ -27,6 +27,7 @@ from avow.evidence.obligation import ProgramClaim
 from avow.isolation import judge
 from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
+from avow.isolation.outside import Outside
 
 from . import building
 from .building import NotBuilt
@@ -90,9 +91,11 @@ class Work:
     logs: dict[str, str] = field(default_factory=dict)
     command: tuple[str, ...] = ()
     _end: float = field(init=False)
+    _outside: Outside = field(init=False)
 
     def __post_init__(self) -> None:
         self._end = time.monotonic() + self.limits.seconds * 0.9
+        self._outside = Outside((building.clang(),))
 
     @property
     def job(self) -> Job:
@@ -106,12 +109,12 @@ class Work:
         made = drawable(reading)
         building.write(reading, made, self.folder)
         built = [
-            building.fuzzed(reading, self.folder, self._left()),
-            building.plain(reading, self.folder, self._left()),
-            building.filled(reading, self.folder, self._left()),
+            building.fuzzed(reading, self.folder, self._outside, self._left()),
+            building.plain(reading, self.folder, self._outside, self._left()),
+            building.filled(reading, self.folder, self._outside, self._left()),
         ]
-        unseen = building.looked_into(reading, self.folder, built[1].linked, self._left())
-        self.observed.update(dict.fromkeys(building.observed(reading, tuple(built))))
+        unseen = building.looked_into(reading, self.folder, self._outside, built[1].linked, self._left())
+        self.observed.update(dict.fromkeys(building.observed(reading, tuple(built), self._outside)))
         bench = Bench(reading)
         kept = self.folder / "kept"
         seeds = self._seeds(kept / "corpus")
@@ -251,7 +254,7 @@ class Work:
         assumptions allow."""
         if not runs:
             return None
-        program = building.sanitized(self.reading, self.folder, self._left()).program
+        program = building.sanitized(self.reading, self.folder, self._outside, self._left()).program
         for run in runs:
             words = [command(self.reading.asked, step) for step in run]
             root = str(self.job.root.resolve())

@@ -23,6 +23,7 @@ from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
+from avow.base import programs
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
 
@@ -72,8 +73,8 @@ def _installed(tmp_path: Path, monkeypatch, answer: str) -> None:
     java.write_text(
         "#!/bin/sh\n"
         'if [ "$1" = -version ]; then echo \'openjdk version "11.0.13"\' >&2; exit 0; fi\n'
-        f'for last; do :; done; test -f "$last" || exit 3; echo "$last" >> {tmp_path}/asked\n'
-        f"cat {tmp_path}/answer\n"
+        'for last; do :; done; test -f "$last" || exit 3; echo "$last" >> "${0%/*}/asked"\n'
+        'cat "${0%/*}/answer"\n'
     )
     java.chmod(0o755)
     monkeypatch.setenv("AJPF_HOME", str(home))
@@ -142,6 +143,7 @@ def test_answers_are_kept_and_asked_again_when_anything_changes(lift, tmp_path, 
     assert asked(files={program: text + "+new : { True } <- act;\n"})[0] == 3, "another program"
     (tmp_path / "mcapl" / "bin" / "a.class").write_text("another build")
     ajpf_tool._find.cache_clear()
+    programs.program_files.cache_clear()
     assert asked()[0] == 3, "another MCAPL"
     for note in (tmp_path / "cache" / "avow" / "ajpf").glob("*.json"):
         note.write_text(
@@ -252,7 +254,7 @@ def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
     assert answers.verdict is Verdict.REFUTED
     assert "does the same run" in str(answers.details["properties"])
-    monkeypatch.setattr(replay, "run", lambda *a, **k: pytest.fail("what AIL told was not kept"))
+    monkeypatch.setattr(replay, "_run", lambda *a, **k: pytest.fail("what AIL told was not kept"))
     (again,) = [o for o in BACKEND.discharge(job, tmp_path, Limits(seconds=120)).outcomes if o == answers]
     assert "does the same run" in str(again.details["properties"])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -71,9 +70,14 @@ def test_standard_input_is_closed_unless_given() -> None:
     assert process.run(["cat"], seconds=5, stdin="héllo").stdout == "héllo"
 
 
-def test_environment_is_added_to() -> None:
-    done = process.run(["bash", "-c", "echo $AVOW_X$HOME"], env={"AVOW_X": "1"})
-    assert done.stdout.strip() == "1" + os.environ.get("HOME", "")
+def test_no_variable_of_ours_reaches_a_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("AVOW_Y", "JAVA_TOOL_OPTIONS", "DAFNY_HOME", "LD_LIBRARY_PATH", "CPATH", "HOME"):
+        monkeypatch.setenv(name, "/ours")
+    done = process.run(["env"], env={"AVOW_X": "1"})
+    told = dict(line.split("=", 1) for line in done.stdout.splitlines())
+    assert told.keys() <= {"AVOW_X", "PATH", "HOME", "TMPDIR", "LANG", "LC_ALL", "TZ"}
+    assert told["AVOW_X"] == "1"
+    assert told["HOME"] != "/ours"
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from oracle.values import Step, broken, value
 from avow.backend_kit.protocol import Limits
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.runner import verify
+from avow.isolation.outside import Outside
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.terms import History, Implies, Term
@@ -75,7 +76,7 @@ def disagreements(seed: int, spoil: tuple[str, str] = ("", "")) -> list[str]:
     contract = made.contract.replace(*spoil) if spoil[0] else made.contract
     assert not spoil[0] or contract != made.contract, contract
     files = {made.types_file: made.types, made.contract_file: contract, "check.dfy": check}
-    run = verify(files, Limits(seconds=400))
+    run = verify(files, Limits(seconds=400), Outside(()))
     assert run.members is not None, run.output
     proved = {m.name for m in run.members if m.kind == "Impl" and m.outcome == "correct"}
     assert "Never" not in proved, "no history is the first"

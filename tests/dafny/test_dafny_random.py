@@ -16,6 +16,7 @@ from avow.backends.dafny.modules import generate
 from avow.backends.dafny.runner import verify
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Data, Element, FunctionValue, Value
+from avow.isolation.outside import Outside
 from avow.language.load import load_contract
 from avow.language.sorts import REAL, DataSort, EnumSort, FunctionSort, NaturalSort, Sort
 
@@ -78,7 +79,7 @@ def test_dafny_and_the_evaluator_agree(seed: int, tmp_path: Path) -> None:
             ]
     check = "\n".join(["module Check {", "  import Types", "  import Contract", *lemmas, "}", ""])
     files = {made.types_file: made.types, made.contract_file: made.contract, "check.dfy": check}
-    run = verify(files, Limits(seconds=400))
+    run = verify(files, Limits(seconds=400), Outside(()))
     assert run.members is not None, run.output
     proved = {m.name for m in run.members if m.kind == "Impl" and m.outcome == "correct"}
     wrong = [name for name, held in truths.items() if f"{'Not' if held else 'Is'}_{name}" in proved]

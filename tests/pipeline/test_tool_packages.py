@@ -96,7 +96,7 @@ def test_a_launcher_counts_with_all_that_it_launches(tmp_path: Path, monkeypatch
 
     def now() -> str:
         programs.program_files.cache_clear()
-        return programs.program_digest(str(launcher))
+        return programs.program_digest((str(launcher),))
 
     known = [now()]
     assert now() == known[0]

@@ -1,0 +1,94 @@
+"""Outside tools, run so that nothing undeclared enters their answers, or is told.
+
+A tool gets the variables that Avow gives it, an empty home, and the way to the system's programs and its own. Where
+`strace` runs here, what it opens, executes and looks for besides is recorded, as of a subject.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from avow.base import process
+from avow.base.process import Completed, ToolMissing
+from avow.base.programs import program_files, program_folders
+from avow.base.tools import Tool
+from avow.isolation.observed import Observed, folded, recorded
+from avow.isolation.tracing import Trace, traces
+
+_SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin", "/bin")
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """Runs of these tools for one answer; safe to use from several threads. What the tools are made of is in the
+    answer's key, and is not told again."""
+
+    tools: tuple[Tool, ...]
+    _events: dict[tuple[str, str], None] = field(default_factory=dict)
+
+    def run(
+        self,
+        command: Sequence[str],
+        *,
+        cwd: Path,
+        seconds: float,
+        megabytes: int | None = None,
+        env: Mapping[str, str] | None = None,
+    ) -> Completed:
+        """As `process.run`. `cwd` is a folder made for this: nothing that lies in it is told."""
+        program = shutil.which(command[0]) if os.sep not in command[0] else str(cwd / command[0])
+        if program is None or not os.access(program, os.X_OK):
+            raise ToolMissing(f"{command[0]}: not found, or not to be executed")
+        trace = Trace() if traces() else None
+        with tempfile.TemporaryDirectory(prefix="avow-home-", ignore_cleanup_errors=True) as home:
+            given = {**process.bare(home), "PATH": self._path(program), **(env or {})}
+            whole = [program, *command[1:]]
+            started = whole if trace is None else trace.around([*_with_its_tracer(), *whole])
+            done = process.run(started, cwd=cwd, seconds=seconds, megabytes=megabytes, env=given)
+            if trace is not None:
+                told = trace.read_all(program, cwd)
+                if told is None and done.code is not None:
+                    told = (("outside", f"what no trace tells of {command[0]}"),)
+                own = tuple(os.path.realpath(place) + os.sep for place in (home, cwd))
+                self._events.update((event, None) for event in _beyond(told or (), own))
+        return Completed(tuple(command), done.code, done.stdout, done.stderr, done.seconds)
+
+    def observed(self) -> tuple[Observed, ...]:
+        """What they looked at so far that is in no key."""
+        places = [place for tool in self.tools for place in tool.places]
+        known = {str(file) for place in places for file in program_files(place)}
+        within = tuple(f"{folder}{os.sep}" for place in places for folder in program_folders(place))
+
+        def told(event: str, path: str) -> bool:
+            real = os.path.realpath(path)
+            return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
+
+        return folded(recorded((event, path) for event, path in list(self._events) if told(event, path)))
+
+    def _path(self, program: str) -> str:
+        places = (program, *(place for tool in self.tools for place in tool.places))
+        beside = [os.path.dirname(place) for place in places if Path(place).is_file()]  # noqa: PTH120
+        return os.pathsep.join(dict.fromkeys([*beside, *_SYSTEM]))
+
+
+def _beyond(events: Iterable[tuple[str, str]], own: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    """Those of what does not lie in the tool's own folders; of a link there, of what it leads to."""
+    for event, path in events:
+        if event == "outside":
+            yield event, path
+            continue
+        real = os.path.realpath(path)
+        if not f"{real}{os.sep}".startswith(own):
+            inside = path.startswith(own)
+            yield "kind" if event == "state" and os.path.isdir(real) else event, real if inside else path  # noqa: PTH112
+
+
+def _with_its_tracer() -> list[str]:
+    """What has a program end with strace, which stands between us and it."""
+    program = shutil.which("setpriv")
+    return [program, "--pdeathsig", "KILL", "--"] if program is not None else []
