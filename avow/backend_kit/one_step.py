@@ -15,7 +15,8 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.verdict import Outcome, Verdict
 from avow.language.contract import Clause, Node
-from avow.language.terms import History, histories
+from avow.language.subterms import histories
+from avow.language.terms import History
 from avow.system.plan import System
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from avow.formulas.temporal.cell import Unsaid
 from avow.formulas.temporal.cells import Records
 from avow.language.contract import Clause, Node
-from avow.language.terms import histories
+from avow.language.subterms import histories
 
 
 def unsaid(judge: str, node: Node, clause: Clause, *, functions: bool = False) -> str | None:

@@ -23,6 +23,7 @@ from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definedness import with_value
 from avow.language.load import NOTHING, parse_formula
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -233,15 +234,8 @@ def _counters(counter: Variable, cell: Cell) -> Iterator[Term]:
 
 def _limits(cell: Cell) -> tuple[int, ...]:
     """The numbers that a cell's definition writes down."""
-    found: dict[int, None] = {}
-    stack = [cell.now]
-    while stack:
-        part = stack.pop()
-        number = written(part)
-        if number is not None and number > 0:
-            found[number] = None
-        stack.extend(part.children)
-    return tuple(found)
+    numbers = map(written, subterms(cell.now))
+    return tuple(dict.fromkeys(number for number in numbers if number is not None and number > 0))
 
 
 def _conditions(variable: Variable) -> Iterator[Term]:

@@ -20,9 +20,9 @@ from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.kernel.solvers import Solvers
 from avow.language.contract import Node
+from avow.language.subterms import ports_of
 from avow.language.terms import Role
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
-from avow.system.formulas import ports_of
 from avow.system.plan import ComposeGoal, Endpoint, Subsystem, System
 
 

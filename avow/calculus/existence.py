@@ -12,9 +12,10 @@ from avow.base.graphs import components
 from avow.base.records import dataclass
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, negation, rename
+from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
 from avow.sanity.claims import triggers
-from avow.system.formulas import initial_condition, ports_of
+from avow.system.formulas import initial_condition
 from avow.system.graph import Edge
 
 

@@ -17,7 +17,8 @@ from avow.calculus.subsystem_contracts import carried, innermost
 from avow.formulas.formula import free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import FunctionSort
-from avow.language.terms import Quantified, Quantifier, Role, Term, Variable, histories
+from avow.language.subterms import histories
+from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.system.plan import Endpoint
 
 

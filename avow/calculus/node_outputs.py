@@ -18,11 +18,11 @@ from avow.formulas.formula import free_variables, substitute
 from avow.formulas.values import FunctionValue, SequenceValue, Value, show
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import BOOL, FunctionSort, NaturalSort, OpaqueSort, SequenceSort, Sort
+from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
 from avow.solving.checking import put
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.system.formulas import ports_of
 from avow.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 
 

@@ -23,13 +23,13 @@ from avow.formulas.formula import digest, free_variables
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
+from avow.language.subterms import ports_of
 from avow.language.terms import TRUE, Term, Variable
 from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
 from avow.sanity.claims import Claim, Property
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
-from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
 
 

@@ -21,8 +21,9 @@ from avow.formulas.formula import rename
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Contract, Node
+from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
-from avow.system.formulas import Assumed, ports_of
+from avow.system.formulas import Assumed
 from avow.system.graph import dataflow
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan

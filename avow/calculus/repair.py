@@ -22,6 +22,7 @@ from avow.formulas.formula import conjunction, disjunction, free_variables, rena
 from avow.formulas.temporal.cell import CELL
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
+from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
     And,
@@ -37,7 +38,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    subterms,
 )
 from avow.solving.limits import spend, spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy

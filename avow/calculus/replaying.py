@@ -18,9 +18,10 @@ from avow.calculus.variables import system_term
 from avow.evaluation.evaluate import NotEvaluable
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Value
+from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term
 from avow.solving.questions import replay
-from avow.system.formulas import initial_condition, ports_of
+from avow.system.formulas import initial_condition
 from avow.system.temporal import Operator, Property, State, states_of
 from avow.tuning.bounds import COMPLETIONS
 from avow.tuning.effort import REPLAY_EFFORT

@@ -24,9 +24,9 @@ from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
+from avow.language.subterms import ports_of
 from avow.language.terms import Implies, Role, Term, Variable
 from avow.system.folding import Face, Folded
-from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
 
 

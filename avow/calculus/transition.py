@@ -28,9 +28,10 @@ from avow.formulas.temporal.clock import is_arrival
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
+from avow.language.subterms import ports_of
 from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
-from avow.system.formulas import initial_condition, ports_of
+from avow.system.formulas import initial_condition
 from avow.system.plan import Endpoint
 from avow.tuning.bounds import NODE_ANSWERS
 from avow.tuning.effort import SEARCH_STEPS

@@ -20,9 +20,10 @@ from avow.formulas.temporal.clock import GOES_ON, Timed, compile_timed, events, 
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, REAL, Sort
-from avow.language.terms import TRUE, Role, Term, Variable, histories, timed
+from avow.language.subterms import histories, ports_of, timed
+from avow.language.terms import TRUE, Role, Term, Variable
 from avow.system.folding import own_inputs
-from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
+from avow.system.formulas import Assumed, environment_assumptions, initial_condition
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
 from avow.system.temporal import parse_state

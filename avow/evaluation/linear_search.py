@@ -15,9 +15,9 @@ from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.disjunctions import Part, conjunction
 from avow.formulas.renaming import bound_names, has_variables
-from avow.formulas.traversal import subterms
 from avow.language.operators import OPPOSITE
 from avow.language.sorts import RealSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     And,
     Arithmetic,

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Value
-from avow.language.terms import Role, Term, Variable
+from avow.language.subterms import ports_of
+from avow.language.terms import Term, Variable
 
 
 def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
@@ -39,11 +40,4 @@ def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_00
 
 def _free_sorts(term: Term) -> dict[str, Variable]:
     """The inputs and outputs that a formula mentions, by qualified name."""
-    found: dict[str, Variable] = {}
-    stack = [term]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and term.role is not Role.BOUND:
-            found[term.qualified] = Variable(term.role, term.name, term.sort)
-        stack.extend(term.children)
-    return found
+    return {port.qualified: port for port in ports_of(term)}

@@ -29,6 +29,7 @@ from avow.language.sorts import (
     StringSort,
     components,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import (
     Apply,
     Compare,
@@ -189,15 +190,11 @@ class _Survey:
         return variable.qualified in self.unbound or variable.qualified in inner
 
     def _closed(self, term: Term, inner: frozenset[str]) -> bool:
-        stack, own = [term], set(inner | self.unbound)
-        while stack:
-            term = stack.pop()
-            if isinstance(term, Quantified):
-                return False
-            if isinstance(term, Variable) and term.qualified in own:
-                return False
-            stack.extend(term.children)
-        return True
+        own = inner | self.unbound
+        return not any(
+            isinstance(part, Quantified) or (isinstance(part, Variable) and part.qualified in own)
+            for part in subterms(term)
+        )
 
 
 def _carrier(sort: Sort) -> str | None:

@@ -9,6 +9,7 @@ from avow.formulas.formula import opposite
 from avow.formulas.renaming import bound_names
 from avow.language.operators import definition
 from avow.language.sorts import BOOL, BoolSort, FunctionSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
     And,
@@ -118,20 +119,16 @@ def _both(condition: Term, branch: Term, positive: bool) -> Term:
 
 def occurring(parts: Sequence[Part], unbound: set[str]) -> list[Variable]:
     """The unbound variables that the parts mention."""
-    found: dict[str, Variable] = {}
-    stack: list[Term] = [part.term for part in parts]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and term.qualified in unbound:
-            found[term.name] = term
-        stack.extend(term.children)
+    found = {
+        term.name: term
+        for part in parts
+        for term in subterms(part.term)
+        if isinstance(term, Variable) and term.qualified in unbound
+    }
     return [found[name] for name in sorted(found)]
 
 
 def relations(term: Term) -> Iterator[Variable]:
-    stack = [term]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
-            yield term
-        stack.extend(term.children)
+    for part in subterms(term):
+        if isinstance(part, Variable) and isinstance(part.sort, FunctionSort) and part.sort.result == BOOL:
+            yield part

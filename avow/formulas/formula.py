@@ -13,7 +13,7 @@ from typing import assert_never
 
 from avow.base.remembered import by_identity
 from avow.formulas.flattening import flattened
-from avow.formulas.traversal import Steps, run, subterms, transform
+from avow.formulas.traversal import Steps, run, transform
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPPOSITE
 from avow.language.sorts import (
@@ -32,6 +32,7 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -82,7 +83,6 @@ __all__ = [
     "rename",
     "sort_digest",
     "substitute",
-    "subterms",
     "transform",
 ]
 

@@ -16,10 +16,11 @@ from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite, substitute
-from avow.formulas.traversal import subterms, transform
+from avow.formulas.traversal import transform
 from avow.language.bounds import constant
 from avow.language.operators import FLIPPED
 from avow.language.sorts import INTEGER, NATURAL, REAL, IntegerSort, NaturalSort, Sort, TupleSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     Argument,
     Arithmetic,

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import map_children, rename_apart
-from avow.formulas.traversal import depth, subterms
+from avow.formulas.traversal import depth
 from avow.language.sorts import FunctionSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import And, Apply, Compare, Implies, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.tuning.bounds import POINTWISE_PARTS
 from avow.tuning.sizes import CONDITION_DEPTH

@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 
 from avow.formulas.formula import free_variables, fresh
-from avow.formulas.traversal import Steps, run, subterms
+from avow.formulas.traversal import Steps, run
+from avow.language.subterms import subterms
 from avow.language.terms import Quantified, Role, Term, Variable
 
 
@@ -22,13 +23,7 @@ def bound_names(term: Term) -> frozenset[str]:
 
 def has_variables(term: Term) -> bool:
     """Whether any variable, of any role, occurs in the term."""
-    stack = [term]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable):
-            return True
-        stack.extend(term.children)
-    return False
+    return any(isinstance(part, Variable) for part in subterms(term))
 
 
 def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:

@@ -15,9 +15,10 @@ from typing import Generic, TypeVar
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.renaming import map_children
-from avow.formulas.traversal import depth, subterms
+from avow.formulas.traversal import depth
 from avow.formulas.values import FunctionValue, SequenceValue, Value
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, SetSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     And,
     Apply,

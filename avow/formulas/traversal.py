@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 from avow.language.terms import (
     Term,
 )
-from avow.language.terms import subterms as subterms
 
 T = TypeVar("T")
 

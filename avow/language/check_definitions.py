@@ -10,8 +10,9 @@ from avow.language.contract import Definition
 from avow.language.definitions import expand
 from avow.language.limits import term_extent
 from avow.language.scope import Defined
+from avow.language.subterms import subterms
 from avow.language.syntax import Syntax, TermSyntax
-from avow.language.terms import History, Term, subterms
+from avow.language.terms import History, Term
 from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 

@@ -11,6 +11,7 @@ from avow.language.conversions import WHOLE, common, joined, widen
 from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, NATURAL, REAL, FunctionSort, SetSort
+from avow.language.subterms import timed
 from avow.language.syntax import (
     Connective,
     Lasting,
@@ -36,7 +37,6 @@ from avow.language.terms import (
     Role,
     Term,
     Variable,
-    timed,
 )
 
 _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)

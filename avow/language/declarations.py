@@ -32,6 +32,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.source import Reports, Source
+from avow.language.subterms import subterms
 from avow.language.syntax import (
     Binder,
     BuiltinType,
@@ -59,7 +60,7 @@ from avow.language.syntax import (
     unparenthesised,
     walk,
 )
-from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Term, Variable, subterms
+from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Term, Variable
 from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 

@@ -14,6 +14,7 @@ from itertools import combinations
 
 from avow.language.bounds import constant
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
+from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     RESPONSES,
@@ -40,7 +41,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    subterms,
 )
 from avow.tuning.bounds import GUARDS
 

@@ -15,7 +15,8 @@ from avow.language.contract import Clause, Definition, Node
 from avow.language.printer import show_term
 from avow.language.sorts import FunctionSort
 from avow.language.styles import StyleName
-from avow.language.terms import Apply, Quantified, Role, Term, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import Apply, Quantified, Role, Term, Variable
 
 
 def expand(

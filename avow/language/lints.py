@@ -22,6 +22,7 @@ from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.spelling import similar
+from avow.language.subterms import subterms
 from avow.language.syntax import Define, Name, NodePort, Syntax, walk
 from avow.language.terms import (
     TRUE,
@@ -43,7 +44,6 @@ from avow.language.terms import (
     SetTerm,
     Term,
     Variable,
-    subterms,
 )
 
 _ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")

@@ -20,7 +20,8 @@ from avow.language.sorts import (
     StringSort,
     components,
 )
-from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable
 
 _NAMES = (NaturalSort, IntegerSort, StringSort, OpaqueSort)
 """Sorts of which values are names of things; a REAL is a measure, an element of an enumeration a state."""

@@ -17,6 +17,7 @@ from avow.language.contract import Clause, Node
 from avow.language.english import Comparison, both_ways, comparisons, is_one_way, mentions
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
+from avow.language.subterms import subterms
 from avow.language.terms import (
     Builtin,
     Compare,
@@ -31,7 +32,6 @@ from avow.language.terms import (
     Quantifier,
     Term,
     Variable,
-    subterms,
 )
 from avow.tuning.shown import SENTENCE_CHARACTERS
 from avow.tuning.sizes import SENTENCE

@@ -9,7 +9,6 @@ and `rebuild`, itself with others in their place. A node without one of them is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import field, replace
 from fractions import Fraction
 from typing import TypeVar
@@ -485,22 +484,3 @@ Term = (
 
 TRUE = Literal(True, BOOL)
 FALSE = Literal(False, BOOL)
-
-
-def subterms(term: Term) -> Iterator[Term]:
-    """The term and everything in it, in reading order; however deep it is."""
-    stack = [term]
-    while stack:
-        current = stack.pop()
-        yield current
-        stack.extend(reversed(current.children))
-
-
-def histories(term: Term) -> tuple[History, ...]:
-    """What in a term speaks of other steps than this one, in reading order; none in a term of one step."""
-    return tuple(part for part in subterms(term) if isinstance(part, History))
-
-
-def timed(term: Term) -> History | None:
-    """What in a term has a limit in seconds, so that also the time between steps counts; None where nothing has."""
-    return next((part for part in histories(term) if part.limit is not None and not part.limit.steps), None)

@@ -37,7 +37,8 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.styles import StyleName
-from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term
 
 
 def to_rcl(contract: Contract) -> str:

@@ -17,6 +17,7 @@ from avow.language.lexer import Token
 from avow.language.load import clean_text
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.source import Source
+from avow.language.subterms import subterms
 from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.language.terms import Quantified, Variable
 from avow.lsp.background import Answer
@@ -227,13 +228,8 @@ def _about_variable(document: Document, meaning: Meaning) -> str:
 
 
 def _bound(clause: Clause, name: str) -> list[Variable]:
-    found, stack = [], [clause.formula]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Quantified):
-            found += [variable for variable in term.variables if variable.name == name]
-        stack.extend(term.children)
-    return found
+    quantified = (term for term in subterms(clause.formula) if isinstance(term, Quantified))
+    return [variable for term in quantified for variable in term.variables if variable.name == name]
 
 
 def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: SanityLookup) -> str:

@@ -34,7 +34,8 @@ from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
-from avow.language.terms import RESPONSES, TRUE, History, Term, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import RESPONSES, TRUE, History, Term
 
 
 class Property(StrEnum):

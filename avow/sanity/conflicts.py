@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import free_variables, negation
-from avow.formulas.traversal import subterms
 from avow.formulas.values import Data, Value, show
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, DataSort, FunctionSort
+from avow.language.subterms import subterms
 from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import Formulas, Given, Group, Realizability, Search, groups, realizable

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
 from avow.formulas.formula import free_variables, substitute
-from avow.formulas.traversal import subterms
 from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, RealSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     And,
     Arithmetic,

@@ -19,10 +19,11 @@ from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Remembering
-from avow.formulas.traversal import subterms, transform
+from avow.formulas.traversal import transform
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
 from avow.language.sorts import BOOL, Sort, TupleSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,

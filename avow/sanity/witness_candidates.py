@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
-from avow.formulas.traversal import depth, subterms
+from avow.formulas.traversal import depth
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -26,6 +26,7 @@ from avow.language.sorts import (
     SetSort,
     Sort,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
     And,

@@ -12,7 +12,8 @@ from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.sorts import BOOL, DataSort, TupleSort
-from avow.language.terms import TRUE, Apply, History, Index, Length, Quantified, Term, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import TRUE, Apply, History, Index, Length, Quantified, Term, Variable
 from avow.solving.checking import put
 from avow.solving.quantifier_elimination import ELIMINABLE, TermReader
 from avow.solving.translation import Expr, Translator, Unsupported

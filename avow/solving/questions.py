@@ -20,7 +20,6 @@ from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.sequences import flatten
-from avow.formulas.traversal import subterms
 from avow.formulas.values import FunctionValue, Value
 from avow.language.definedness import defined
 from avow.language.sorts import (
@@ -31,6 +30,7 @@ from avow.language.sorts import (
     Sort,
     components,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values

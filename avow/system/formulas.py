@@ -6,7 +6,8 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
-from avow.language.terms import Past, Role, Term, Variable, histories
+from avow.language.subterms import histories, ports_of
+from avow.language.terms import Past, Role, Term, Variable
 from avow.system.folding import holders
 from avow.system.graph import Edge, Graph
 from avow.system.plan import Endpoint, System
@@ -143,18 +144,6 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         faults += rejected.diagnostics
     return tuple(dict.fromkeys(faults))
-
-
-def ports_of(term: Term) -> tuple[Variable, ...]:
-    """The inputs and outputs that a term mentions, each once."""
-    found: dict[Variable, None] = {}
-    stack = [term]
-    while stack:
-        current = stack.pop()
-        if isinstance(current, Variable) and current.role is not Role.BOUND:
-            found[current] = None
-        stack.extend(current.children)
-    return tuple(found)
 
 
 def _parse(system: System, text: str, node: str, span: Span | None, *, clause: bool = False) -> Term:

@@ -11,8 +11,9 @@ from itertools import product
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.formulas.renaming import bound_names
-from avow.formulas.traversal import depth, subterms
+from avow.formulas.traversal import depth
 from avow.language.contract import Clause
+from avow.language.subterms import subterms
 from avow.language.terms import TRUE, And, Implies, Quantified, Quantifier, Term, Variable
 
 from . import psl

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from avow.base.diagnostics import Span
 from avow.formulas.formula import substitute
 from avow.formulas.renaming import bound_names
-from avow.formulas.traversal import subterms
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
+from avow.language.subterms import subterms
 from avow.language.terms import TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
 
 from . import psl

@@ -12,9 +12,9 @@ from typing import Any
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.renaming import bound_names
-from avow.formulas.traversal import subterms
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import Not, Quantified, Role, Term, Variable
 from avow.system.paths import inside
 from avow.system.schema import violations

@@ -3,9 +3,9 @@ What compares or computes measured values is a program's affair, and Gwendolen h
 
 from __future__ import annotations
 
-from avow.formulas.traversal import subterms
 from avow.language.contract import Node
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Negative, Operation, Term
 
 

@@ -14,7 +14,8 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.temporal.responses import responding
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quantifier, Role, Term, histories
+from avow.language.subterms import histories
+from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quantifier, Role, Term
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from avow.base.records import dataclass
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.bounds import constant
 from avow.language.operators import FLIPPED, OPPOSITE
+from avow.language.subterms import subterms
 from avow.language.terms import (
     And,
     Apply,
@@ -28,7 +29,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    subterms,
 )
 
 from .statistics import root

@@ -12,7 +12,8 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.bounds import constant
-from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable
 from avow.system.paths import inside
 
 from .bound import Bound, upper_bound

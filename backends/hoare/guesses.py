@@ -10,7 +10,6 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.formulas.formula import free_variables
-from avow.formulas.traversal import subterms
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     INTEGER,
@@ -26,6 +25,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import Compare, Length, Literal, Term, Variable
 from avow.solving.models import default_value
 from avow.solving.questions import solve

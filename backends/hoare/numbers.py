@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Severity
-from avow.formulas.traversal import subterms
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause
 from avow.language.printer import show_number
+from avow.language.subterms import subterms
 from avow.language.terms import Term
 
 from .program import Assign, If, Program, Update, While, statements

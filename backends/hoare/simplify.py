@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite
-from avow.formulas.traversal import subterms, transform
+from avow.formulas.traversal import transform
 from avow.language.sorts import BOOL
+from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,

@@ -11,9 +11,9 @@ from fractions import Fraction
 from avow.base.records import dataclass
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables, negation
-from avow.formulas.traversal import subterms
 from avow.formulas.values import Value, show
 from avow.language.sorts import REAL, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     Apply,
     Arithmetic,

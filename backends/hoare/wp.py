@@ -14,8 +14,9 @@ from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
-from avow.formulas.traversal import subterms, transform
+from avow.formulas.traversal import transform
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
+from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
     And,

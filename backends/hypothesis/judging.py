@@ -15,7 +15,8 @@ from avow.formulas.temporal.cells import Records
 from avow.formulas.temporal.responses import due
 from avow.formulas.values import Value
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable, histories
+from avow.language.subterms import histories
+from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable
 
 from .generate import Inputs
 from .tuning import CONFIDENCE

@@ -12,7 +12,6 @@ from fractions import Fraction
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
-from avow.formulas.traversal import subterms
 from avow.formulas.values import Element, Value
 from avow.language.sorts import (
     INTEGER,
@@ -27,6 +26,7 @@ from avow.language.sorts import (
     RealSort,
     Sort,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
 
 from .tuning import (

@@ -326,7 +326,7 @@ def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation)
 
 def _excuse(job: Job, runs: list[_Run]) -> str:
     """The first assumption that was broken, by whom, and where that began."""
-    from avow.system.formulas import ports_of
+    from avow.language.subterms import ports_of
     from avow.system.graph import dataflow
 
     from .watched import Fault

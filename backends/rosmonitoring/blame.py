@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from avow.language.contract import Node
+from avow.language.subterms import ports_of
 from avow.language.terms import Role
-from avow.system.formulas import ports_of
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import System
 

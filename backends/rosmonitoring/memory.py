@@ -24,7 +24,8 @@ from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pendin
 from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
-from avow.language.terms import History, Implies, Literal, Past, Quantified, Role, Term, Variable, histories, timed
+from avow.language.subterms import histories, timed
+from avow.language.terms import History, Implies, Literal, Past, Quantified, Role, Term, Variable
 
 from .coverage import Tally
 from .options import Setup

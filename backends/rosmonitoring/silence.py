@@ -11,8 +11,8 @@ from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.evaluation.tables import unnamed
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.ages import ELAPSED, Side
-from avow.formulas.traversal import subterms
 from avow.formulas.values import FunctionValue, Value
+from avow.language.subterms import subterms
 from avow.language.terms import Apply, Role, Term, Variable
 from avow.tuning.bounds import POINTS_OF_ARGUMENTS
 

@@ -13,6 +13,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.values import show
 from avow.language.contract import Clause
 from avow.language.sorts import RealSort
+from avow.language.subterms import subterms
 from avow.language.terms import Compare, Literal, Negative, Role, Term, Variable, Widen
 from avow.ros.calls import is_service_part
 from avow.ros.definitions import FLOATS, Scalar
@@ -80,10 +81,7 @@ def reading(name: str, rule: Rule) -> str:
 
 def unholdable(setup: Setup, clause: Clause) -> Iterator[Diagnostic]:
     """A warning for each number that a variable is asked to equal and that its field's type has no room for."""
-    stack: list[Term] = [clause.formula]
-    while stack:
-        term = stack.pop()
-        stack.extend(term.children)
+    for term in subterms(clause.formula):
         if not isinstance(term, Compare) or term.operator not in ("==", "!="):
             continue
         for one, other in ((term.left, term.right), (term.right, term.left)):

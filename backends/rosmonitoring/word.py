@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause
-from avow.language.terms import Role, histories, timed
+from avow.language.subterms import histories, timed
+from avow.language.terms import Role
 
 from .options import Setup, same_topic
 from .pairing import Answers, Pairing, time_of

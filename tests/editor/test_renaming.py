@@ -11,7 +11,8 @@ pytest.importorskip("pygls")
 
 from avow.formulas.formula import digest, rename
 from avow.language.load import load_contract
-from avow.language.terms import Role, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import Role, Variable
 from avow.lsp.names import PORTS, What
 from avow.lsp.project import Project, project_of
 from avow.lsp.renaming import Edit, Refused, all_occurrences

@@ -9,7 +9,8 @@ from avow.language.contract import Contract
 from avow.language.definitions import expand, folded, show_clause
 from avow.language.format import format_text
 from avow.language.load import check_text, parse_formula
-from avow.language.terms import History, Quantified, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import History, Quantified
 
 HEAD = "inputs( temp : NATURAL --> REAL, on : BOOL, s : <REAL> ) outputs( fan : BOOL, x : REAL ) topics()"
 

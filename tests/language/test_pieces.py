@@ -16,7 +16,7 @@ from avow.language.contract import Node
 from avow.language.load import _whole
 from avow.language.pieces import by_pieces
 from avow.language.source import Source
-from avow.language.terms import subterms
+from avow.language.subterms import subterms
 
 ROOT = Path(__file__).parents[2]
 CONTEXT = """// avow: allow RCL405

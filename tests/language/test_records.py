@@ -20,7 +20,8 @@ from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text, parse_formula
 from avow.language.sorts import TupleSort
-from avow.language.terms import Compare, Term, TupleTerm, Variable, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import Compare, Term, TupleTerm, Variable
 from avow.language.translate import to_rcl
 from avow.sanity.analysis import analyse
 from avow.solving.questions import solve

@@ -8,8 +8,8 @@ from avow.base.verdict import Verdict
 from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.variables import frame
 from avow.formulas.finite import Ranges
-from avow.formulas.traversal import subterms
 from avow.language.sorts import NATURAL
+from avow.language.subterms import subterms
 from avow.language.terms import Quantified
 from avow.sanity.analysis import Bounds, SanityResult, analyse
 from avow.solving.questions import entails

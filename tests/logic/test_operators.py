@@ -21,7 +21,6 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.formula import digest, free_variables, normalise
 from avow.formulas.negation_normal_form import push_negations
-from avow.formulas.traversal import subterms
 from avow.kernel.text import Text
 from avow.language.contract import Node
 from avow.language.definedness import defined
@@ -30,6 +29,7 @@ from avow.language.operators import OPERATORS, Operator, Why, definition
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL
 from avow.language.styles import STYLES
+from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Iff, Literal, Operation, Term, Variable
 from avow.sanity.mutants import mutants
 from avow.solving.questions import entails, solve

@@ -19,7 +19,8 @@ from avow.base.diagnostics import Rejected
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
-from avow.language.terms import Implies, Past, Term, histories, timed
+from avow.language.subterms import histories, timed
+from avow.language.terms import Implies, Past, Term
 
 from .test_other_steps import Make, found, made
 

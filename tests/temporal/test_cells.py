@@ -19,6 +19,7 @@ from avow.formulas.values import Value
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL
+from avow.language.subterms import histories
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -32,7 +33,6 @@ from avow.language.terms import (
     Or,
     Past,
     Term,
-    histories,
 )
 
 

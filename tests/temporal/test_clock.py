@@ -20,12 +20,8 @@ from avow.formulas.values import Value
 from avow.language.load import parse_formula
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL
-from avow.language.terms import (
-    FALSE,
-    Implies,
-    Term,
-    timed,
-)
+from avow.language.subterms import timed
+from avow.language.terms import FALSE, Implies, Term
 
 
 def ports(word: Word, k: int) -> dict[str, Value]:

@@ -18,7 +18,8 @@ from avow.formulas.temporal.cell import Unsaid
 from avow.formulas.temporal.clock import Timed, one_step
 from avow.language.load import check_text
 from avow.language.sorts import REAL
-from avow.language.terms import Implies, Literal, Past, Term, histories, timed
+from avow.language.subterms import histories, timed
+from avow.language.terms import Implies, Literal, Past, Term
 from avow.sanity.viability import viable
 from temporal.test_systems import Enumeration, system, verdicts
 

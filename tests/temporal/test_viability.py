@@ -18,10 +18,10 @@ from avow.formulas.temporal.cells import Records, compile_node, remembers
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.load import check_text
 from avow.language.sorts import NATURAL
+from avow.language.subterms import ports_of
 from avow.language.terms import Literal, Not, Term, Variable
 from avow.sanity.analysis import analyse
 from avow.sanity.viability import viable
-from avow.system.formulas import ports_of
 
 DEPTH = 5
 

@@ -12,9 +12,9 @@ from fractions import Fraction
 from typing import Any
 
 from avow.base.records import dataclass
-from avow.formulas.traversal import subterms
 from avow.language.bounds import constant
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.subterms import subterms
 from avow.language.terms import Term
 from avow.tuning.running import SAMPLE_LENGTHS, SAMPLE_TRIES, SAMPLES_SHIFTED
 

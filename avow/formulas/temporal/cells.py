@@ -18,6 +18,7 @@ from avow.formulas.temporal.responses import in_the_past
 from avow.language.contract import Clause, Node
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, Sort
+from avow.language.subterms import histories
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -32,7 +33,6 @@ from avow.language.terms import (
     Role,
     Term,
     Variable,
-    histories,
 )
 
 

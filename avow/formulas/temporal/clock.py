@@ -35,6 +35,7 @@ from avow.formulas.temporal.cells import Records, Remembering, compiled
 from avow.formulas.temporal.responses import in_the_past
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.sorts import BOOL, REAL
+from avow.language.subterms import histories, timed
 from avow.language.terms import (
     FALSE,
     RESPONSES,
@@ -58,8 +59,6 @@ from avow.language.terms import (
     Role,
     Term,
     Variable,
-    histories,
-    timed,
 )
 from avow.tuning.bounds import CLOCKED_SIZE, LIMITS_NESTED
 
