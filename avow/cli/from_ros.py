@@ -82,7 +82,8 @@ _OPTION = (
 
 def _listing(graph: str) -> Listing:
     from avow.ros.dds import LOOPBACK, ask_domain, domain_of
-    from avow.ros.listing import NoListing, ask_master, parse_listing
+    from avow.ros.listing import NoListing, parse_listing
+    from avow.ros.master import ask_master
     from avow.tuning.sizes import ROS_GRAPH_BYTES
 
     try:

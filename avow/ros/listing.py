@@ -1,23 +1,16 @@
-"""Who publishes and who listens: from ``rosnode info`` or ``ros2 node info``, from JSON, from a ROS 1 master.
-
-A master is asked by its XML-RPC interface alone (http://wiki.ros.org/ROS/Master_API): no ROS has to be installed.
-"""
+"""Who publishes and who listens: from ``rosnode info`` or ``ros2 node info``, from JSON (from a ROS 1 master:
+`avow.ros.master`)."""
 
 from __future__ import annotations
 
 import json
 import re
-import xmlrpc.client
 from collections.abc import Iterable, Mapping
 from dataclasses import field
-from http.client import HTTPConnection, HTTPException
-from typing import Any
-from xml.parsers.expat import ExpatError
 
 from avow.base.records import dataclass
 from avow.ros.definitions import canonical
 from avow.ros.names import is_name
-from avow.tuning.running import MASTER_SECONDS
 
 
 class NoListing(Exception):  # noqa: N818 - it is what was found wrong
@@ -110,10 +103,11 @@ def parse_info(text: str) -> Listing:
         elif section := _SECTION.match(line):
             side = _SIDES.get(section[1].strip().lower())
             into = sides.setdefault(side, {}) if side is not None else None
-    return Listing(tuple(_listed(name, {k: tuple(v) for k, v in s.items()}) for name, s in found.items()), types)
+    return Listing(tuple(listed(name, {k: tuple(v) for k, v in s.items()}) for name, s in found.items()), types)
 
 
-def _listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
+def listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
+    """A node by its name, and by side the topics that it has there."""
     return Listed(name, **{side: tuple(sides.get(side, ())) for side in EVERY_SIDE})
 
 
@@ -132,7 +126,7 @@ def _of_json(text: str) -> Listing:
                 sides[words[word]] = tuple(names)
                 if isinstance(names, dict):
                     types |= {topic: canonical(kind) for topic, kind in names.items() if kind}
-            nodes.append(_listed(name, sides))
+            nodes.append(listed(name, sides))
     except (ValueError, AttributeError, TypeError, RecursionError) as error:
         raise NoListing(f"it is no JSON of nodes and their topics: {error}") from None
     except KeyError as error:
@@ -141,42 +135,3 @@ def _of_json(text: str) -> Listing:
     if wrong:
         raise NoListing(f"{wrong[0][:60]!r} is no name that ROS takes")
     return Listing(tuple(nodes), types)
-
-
-class _Bounded(xmlrpc.client.Transport):
-    """Waits `MASTER_SECONDS` for an answer, not for ever."""
-
-    def make_connection(self, host: Any) -> HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = MASTER_SECONDS
-        return connection
-
-
-FAILURES = (OSError, HTTPException, ExpatError, xmlrpc.client.Error, ValueError, TypeError)
-"""What a call of `interface` raises where nobody answers, or not as ROS does."""
-
-
-def interface(uri: str) -> Any:
-    """The XML-RPC interface of a ROS 1 master or node; a context."""
-    return xmlrpc.client.ServerProxy(uri, transport=_Bounded(), allow_none=True)
-
-
-def ask_master(uri: str) -> Listing:
-    """The graph that a running ROS 1 master knows. Raises NoListing where none answers."""
-    try:
-        with interface(uri) as master:
-            graph = master.getSystemState("/avow")
-            topics = master.getTopicTypes("/avow")
-    except FAILURES as error:
-        raise NoListing(f"no ROS 1 master answers at {uri}: {error}") from None
-    try:
-        sides: dict[str, dict[str, list[str]]] = {}
-        for side, entries in zip(("publishes", "subscribes", "serves"), graph[2], strict=True):
-            for topic, names in entries:
-                for name in names:
-                    sides.setdefault(str(name), {}).setdefault(side, []).append(str(topic))
-        types = {str(topic): canonical(str(kind)) for topic, kind in topics[2] if kind != "*"}
-    except (TypeError, ValueError, LookupError) as error:
-        raise NoListing(f"what answers at {uri} is no ROS 1 master: {error}") from None
-    listed = (_listed(name, {k: sorted(v) for k, v in found.items()}) for name, found in sorted(sides.items()))
-    return Listing(tuple(listed), types)

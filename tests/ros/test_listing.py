@@ -8,7 +8,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from avow.ros.listing import Listed, Listing, NoListing, ask_master, parse_listing
+from avow.ros.listing import Listed, Listing, NoListing, parse_listing
+from avow.ros.master import ask_master
 
 ROS1 = """\
 --------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
-from avow.ros.listing import FAILURES, interface
+from avow.ros.master import FAILURES, interface
 
 from ..enforce import raw
 from ..tuning import AGAIN_SECONDS, FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS, MASTER_ATTEMPTS, PUBLISHER_SECONDS
