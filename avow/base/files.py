@@ -44,10 +44,15 @@ def _must_be_regular(path: Path) -> None:
 def is_intact(path: Path, sha: str) -> bool:
     """Whether the file is there and has this SHA-256."""
     try:
-        info = path.stat()
-        return _digest_as(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns)) == sha
+        return digest_once(path) == sha
     except OSError:
         return False
+
+
+def digest_once(path: Path) -> str:
+    """As `digest_file`; a file that this process has read is not read again while it is the same."""
+    info = path.stat()
+    return _digest_as(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
 
 
 @functools.lru_cache(maxsize=100_000)

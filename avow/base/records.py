@@ -57,7 +57,7 @@ def _first(owner: list[type], name: str) -> Callable[..., Any]:
 
 
 def _init(kind: Any) -> Any:
-    scope: dict[str, Any] = {"_set": object.__setattr__, "_unset": dataclasses.MISSING}
+    scope: dict[str, Any] = {"_unset": dataclasses.MISSING}
     listed, named, body = ["self"], list[str](), list[str]()
     for at, field in enumerate(dataclasses.fields(kind)):
         name, makes = field.name, field.default_factory is not dataclasses.MISSING
@@ -70,8 +70,11 @@ def _init(kind: Any) -> Any:
             value = f"{value} if {name} is _unset else {name}" if makes else name
         elif not has:
             continue
-        frozen = vars(kind).get("__setattr__") is _fixed
-        body.append(f"_set(self, {name!r}, {value})" if frozen else f"self.{name} = {value}")
+        if vars(kind).get("__setattr__") is _fixed:
+            scope[f"_s{at}"] = getattr(kind, name).__set__  # the slot itself: quicker than to look it up each time
+            body.append(f"_s{at}(self, {value})")
+        else:
+            body.append(f"self.{name} = {value}")
     if hasattr(kind, "__post_init__"):
         body.append("self.__post_init__()")
     parameters = ", ".join([*listed, *(["*", *named] if named else [])])

@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
-from avow.base.files import digest_file
+from avow.base.files import digest_once
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry, Ledger
@@ -228,7 +228,7 @@ def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, seri
         text = f"{behind} is a symbolic link, or a path, that leads elsewhere"
         yield Discrepancy(Fault.REDIRECTED, path, text, serious)
     try:
-        now = digest_file(root / path)
+        now = digest_once(root / path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         yield Discrepancy(Fault.GONE if made else Fault.OUTDATED, path, f"{behind} cannot be read: {reason}", serious)

@@ -62,8 +62,10 @@ def judge(claims: Iterable[Claim]) -> Mapping[str, Standing]:
     for claim in tuple(known.values()):
         for name in claim.rests_on:
             known.setdefault(name, Claim(name, Status.MISSING))
-    result: dict[str, Standing] = {}
-    for members in strong_components(sorted(known), lambda name: known[name].rests_on):
+    alone = {name for name, claim in known.items() if not claim.rests_on}  # nearly all
+    result = {name: _stand(known[name], {}) for name in alone}
+    further = {name: [n for n in c.rests_on if n not in alone] for name, c in known.items() if name not in alone}
+    for members in strong_components(sorted(further), further.__getitem__):
         component = tuple(sorted(members))
         circle = _circle(component, known)
         for name in component:
@@ -72,8 +74,11 @@ def judge(claims: Iterable[Claim]) -> Mapping[str, Standing]:
 
 
 def _stand(claim: Claim, done: Mapping[str, Standing]) -> Standing:
-    under = [(name, done[name]) for name in dict.fromkeys(claim.rests_on)]
     own = claim.own
+    if own is not None and not (claim.rests_on or claim.prose):
+        hypotheses = tuple(sorted({*claim.hypotheses})) if claim.hypotheses else ()
+        return Standing(own, not own.supports, (), (claim.id, own), hypotheses, claim.link)
+    under = [(name, done[name]) for name in dict.fromkeys(claim.rests_on)]
     direct = own is not None and not own.supports
     below = tuple(dict.fromkeys(cause for name, s in under for cause in _causes(name, s)))
     candidates = [(claim.id, own)] if own is not None else []
