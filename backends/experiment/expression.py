@@ -1,10 +1,7 @@
 """A tiny language for what is measured: ``hypot(x - goal_x, y - goal_y)`` over the columns of a data set.
 
-Own grammar, own evaluator: text from a plan is never Python. Nothing can be written down that is the same in every run
-or less than what was measured: no numbers, no products, no column held against itself.
-
-    part: ("abs" | "hypot" | "max") "(" part ("," part)* ")" | column | column "-" column | half a width
-    half a width: (column | "max" "(" column "," column ")") "-" "mean" "(" column "," column ")", of the same two
+Own grammar (`measure.lark`), own evaluator: text from a plan is never Python. Nothing can be written down that is the
+same in every run or less than what was measured: no numbers, no products, no column held against itself.
 
 Arithmetic is exact; a square root is enclosed between two fractions that are 10^-12 apart, and the enclosure is carried
 along, so a comparison is decided or known not to be.
@@ -15,13 +12,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
+from lark import Token
+from lark.exceptions import UnexpectedInput, UnexpectedToken
+
+from avow.base.grammars import lark_of
 from avow.base.records import dataclass
 
 from .statistics import root
 from .tuning import EXPRESSION_DEPTH, EXPRESSION_LENGTH
 
-_TOKEN = re.compile(r"\s*(?:(\d{1,40}(?:\.\d{1,40})?)|([^\W\d]\w*)|([-+*/(),]))")
 ALLOWED = "a measure is a column, the difference of two columns, or abs, hypot or max of these"
 
 
@@ -63,10 +65,11 @@ def parse(text: str) -> Expression:
     """Raises Malformed."""
     if len(text) > EXPRESSION_LENGTH:
         raise Malformed(f"longer than {EXPRESSION_LENGTH} characters", 0)
-    parser = _Parser(text)
-    value = parser.part(0)
-    parser.end()
-    return Expression(text, tuple(dict.fromkeys(parser.columns)), value, parser.halves)
+    try:
+        part: _Part = lark_of(Path(__file__).with_name("measure.lark"), "measure", ("measure",), _Build).parse(text)
+    except UnexpectedInput as error:
+        raise _unexpected(text, error) from None
+    return Expression(text, tuple(dict.fromkeys(part.columns)), part.value, part.halves)
 
 
 _Eval = Callable[[Mapping[str, Fraction]], Interval]
@@ -114,100 +117,66 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., Interval], int]] = {
 """Name → function, greatest number of arguments. No `min`, `sqrt` or `mean`: they make less of what was measured."""
 
 
-class _Parser:
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.columns: list[str] = []
-        self.halves = False
-        self.tokens: list[tuple[str, str, int]] = []
-        position = 0
-        while text[position:].strip():
-            match = _TOKEN.match(text, position)
-            if match is None:
-                at = position + len(text[position:]) - len(text[position:].lstrip())
-                raise Malformed(f"unexpected {text[at]!r}", at)
-            kind = ("number", "name", "sign")[(match.lastindex or 1) - 1]
-            self.tokens.append((kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1)))
-            position = match.end()
-        self.next = 0
+def _unexpected(text: str, error: UnexpectedInput) -> Malformed:
+    at = len(text) if isinstance(error, UnexpectedToken) and error.token.type == "$END" else error.pos_in_stream or 0
+    wanted = "a column" if isinstance(error, UnexpectedToken) and "NAME" in error.accepts else "',' or ')'"
+    if at == len(text):
+        return Malformed(f"expected {wanted} at the end", at)
+    whole = isinstance(error, UnexpectedToken) and "$END" in error.accepts
+    flatters = whole or re.match(r"[\d+*/(-]", text[at:])
+    return Malformed(f"unexpected {text[at]!r}: {ALLOWED}", at, "EXP106" if flatters else "EXP103")
 
-    def peek(self) -> tuple[str, str, int]:
-        return self.tokens[self.next] if self.next < len(self.tokens) else ("end", "", len(self.text))
 
-    def take(self) -> tuple[str, str, int]:
-        token = self.peek()
-        self.next += 1
-        return token
+@dataclass(frozen=True, slots=True)
+class _Part:
+    value: _Eval
+    columns: tuple[str, ...]
+    at: int
+    depth: int = 0
+    name: str = ""
+    """Of a column by itself."""
+    of: frozenset[str] = frozenset()
+    """Of which two columns it may be one end: the column, or those of a `max` of two."""
+    halves: bool = False
 
-    def accept(self, *signs: str) -> str | None:
-        kind, text, _ = self.peek()
-        if kind == "sign" and text in signs:
-            self.next += 1
-            return text
-        return None
 
-    def expect(self, sign: str) -> None:
-        if self.accept(sign) is None:
-            _, text, position = self.peek()
-            found = f"expected '{sign}', found {text!r}: {ALLOWED}" if text else f"expected '{sign}' at the end"
-            raise Malformed(found, position, "EXP106" if text in "+-*/" and text else "EXP103")
+class _Build:
+    """A callback for each rule; Lark's loop does not recurse."""
 
-    def end(self) -> None:
-        kind, text, position = self.peek()
-        if kind != "end":
-            raise Malformed(f"unexpected {text!r}: {ALLOWED}", position, "EXP106")
+    def column(self, c: list[Token]) -> _Part:
+        name = str(c[0])
+        return _Part(lambda row: Interval.of(row[name]), (name,), c[0].start_pos or 0, name=name, of=frozenset((name,)))
 
-    def part(self, depth: int) -> _Eval:
-        if depth > EXPRESSION_DEPTH:
-            raise Malformed(f"nested deeper than {EXPRESSION_DEPTH} levels", self.peek()[2])
-        name, position = self.name()
-        if not self.accept("("):
-            self.columns.append(name)
-            return self.difference(name, lambda row: Interval.of(row[name]), {name}, position)
+    def difference(self, c: list[Any]) -> _Part:
+        left, other = c[0], str(c[1])
+        if not left.name:
+            raise Malformed(f"a difference is of two columns: {ALLOWED}", left.at, "EXP106")
+        if left.name == other:
+            raise Malformed(f"'{other} - {other}' is 0 in every run", left.at, "EXP106")
+        return _Part(lambda row: Interval.of(row[left.name] - row[other]), (left.name, other), left.at)
+
+    def half(self, c: list[Any]) -> _Part:
+        left, word, *ends = c
+        if word != "mean":
+            raise Malformed(f"a difference is of two columns: {ALLOWED}", word.start_pos, "EXP106")
+        one, two = [end.name for end in ends] if len(ends) == 2 else ("", "")
+        if one == two or not left.of or not left.of <= {one, two}:
+            raise Malformed("half a width is max(a, b) - mean(a, b), of two different columns", left.at, "EXP106")
+        value: _Eval = lambda row: _minus(left.value(row), Interval.of((row[one] + row[two]) / 2))  # noqa: E731
+        return _Part(value, (*left.columns, one, two), left.at, left.depth, halves=True)
+
+    def call(self, c: list[Any]) -> _Part:
+        name, parts, at = str(c[0]), c[1:], c[0].start_pos
         if name not in FUNCTIONS:
-            raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", position, "EXP106")
-        first = self.next
-        arguments = [self.part(depth + 1)]
-        while self.accept(","):
-            arguments.append(self.part(depth + 1))
-        read = {text for kind, text, _ in self.tokens[first : self.next] if kind == "name"}
-        plain = self.next - first == 3  # column, comma, column
-        self.expect(")")
+            raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", at, "EXP106")
         function, greatest = FUNCTIONS[name]
-        if len(arguments) > greatest:
-            raise Malformed(f"'{name}' takes at most {greatest} arguments, not {len(arguments)}", position)
-        value: _Eval = lambda row: function(*(argument(row) for argument in arguments))  # noqa: E731 - as the others
-        return self.difference("", value, read if name == "max" and plain else set(), position)
-
-    def difference(self, column: str, left: _Eval, read: set[str], position: int) -> _Eval:
-        """What follows a column, or a `max`: nothing, another column, or the mean of two columns, each of them read."""
-        if not self.accept("-"):
-            return left
-        other, at = self.name()
-        if not self.accept("("):
-            if not column:
-                raise Malformed(f"a difference is of two columns: {ALLOWED}", position, "EXP106")
-            if column == other:
-                raise Malformed(f"'{column} - {other}' is 0 in every run", position, "EXP106")
-            self.columns.append(other)
-            return lambda row: Interval.of(row[column] - row[other])
-        if other != "mean":
-            raise Malformed(f"a difference is of two columns: {ALLOWED}", at, "EXP106")
-        one, _ = self.name()
-        self.expect(",")
-        two, _ = self.name()
-        self.expect(")")
-        if one == two or not read or not read <= {one, two}:
-            raise Malformed("half a width is max(a, b) - mean(a, b), of two different columns", position, "EXP106")
-        self.columns += [one, two]
-        self.halves = True
-        return lambda row: _minus(left(row), Interval.of((row[one] + row[two]) / 2))
-
-    def name(self) -> tuple[str, int]:
-        kind, text, position = self.take()
-        if kind == "name":
-            return text, position
-        if kind == "end":
-            raise Malformed("expected a column, found the end", position)
-        code = "EXP106" if kind == "number" or text in "-(" else "EXP103"
-        raise Malformed(f"expected a column, found {text!r}: {ALLOWED}", position, code)
+        if len(parts) > greatest:
+            raise Malformed(f"'{name}' takes at most {greatest} arguments, not {len(parts)}", at)
+        depth = 1 + max(part.depth for part in parts)
+        if depth > EXPRESSION_DEPTH:
+            raise Malformed(f"nested deeper than {EXPRESSION_DEPTH} levels", at)
+        ends = frozenset(part.name for part in parts) if name == "max" and len(parts) == 2 else frozenset()
+        value: _Eval = lambda row: function(*(part.value(row) for part in parts))  # noqa: E731 - as the others
+        columns = tuple(column for part in parts for column in part.columns)
+        halves = any(part.halves for part in parts)
+        return _Part(value, columns, at, depth, of=frozenset() if "" in ends else ends, halves=halves)

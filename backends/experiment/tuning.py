@@ -4,7 +4,7 @@ EXPRESSION_LENGTH = 500
 """Characters; a sum of so many terms is still far from Python's recursion limit."""
 
 EXPRESSION_DEPTH = 50
-"""Brackets of an expression over columns: its reader recurses."""
+"""Brackets of an expression over columns: its evaluator recurses."""
 
 FAILURES_SHOWN = 20
 """Failing runs that are spelt out."""
