@@ -347,7 +347,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
     )
 
 
-def _triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
+def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
     """The variables whose publication makes a clause judged, of those that it speaks of."""
     direct = tuple(n for n in names if isinstance(setup.rules[n], Fields | Choice))
     outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
@@ -377,7 +377,7 @@ def watching(
         return None
     tally.triggered = watched.trigger is None
     every = watched.steps is not None and watched.steps.every
-    triggers = _triggers_of(setup, names, every=every)
+    triggers = triggers_of(setup, names, every=every)
     answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
     if setup.when == "outputs" and answers and not every:
         watched.outputs = frozenset(triggers)
@@ -410,7 +410,7 @@ def unmonitored(setup: Setup, clause: Clause) -> str:
         hidden = [setup.hidden[name] for name in names if name in setup.hidden]
         if hidden and about is not clause:
             return where + hidden[0]
-        if not hidden and not _triggers_of(setup, names):
+        if not hidden and not triggers_of(setup, names):
             return f"{where}it speaks of other steps, and no message makes one"
     return ""
 

@@ -14,11 +14,12 @@ from avow.formulas.values import show
 from avow.language.contract import Clause
 from avow.language.sorts import RealSort
 from avow.language.subterms import subterms
-from avow.language.terms import Compare, Literal, Negative, Role, Term, Variable, Widen
+from avow.language.terms import Compare, Role, Term, Variable, Widen
 from avow.ros.calls import is_service_part
 from avow.ros.definitions import FLOATS, Scalar
 
 from .bags import Origin, carried, conflicts, is_bag
+from .compiled.regions import number_of
 from .options import Setup, same_topic
 from .reading import shown
 from .rules import Choice, Constant, Fields, Previous, Rule
@@ -85,7 +86,7 @@ def unholdable(setup: Setup, clause: Clause) -> Iterator[Diagnostic]:
         if not isinstance(term, Compare) or term.operator not in ("==", "!="):
             continue
         for one, other in ((term.left, term.right), (term.right, term.left)):
-            variable, number = _bare(one), _number(other)
+            variable, number = _bare(one), number_of(other)
             if isinstance(variable, Variable) and number is not None:
                 yield from _unholdable(setup, clause, variable, number)
 
@@ -111,18 +112,3 @@ def _unholdable(setup: Setup, clause: Clause, variable: Variable, number: Fracti
 
 def _bare(term: Term) -> Term:
     return term.term if isinstance(term, Widen) else term
-
-
-def _number(term: Term) -> Fraction | None:
-    match term:
-        case Widen(term=inner):
-            return _number(inner)
-        case Negative(term=inner):
-            number = _number(inner)
-            return None if number is None else -number
-        case Literal(value=bool() | str()):
-            return None
-        case Literal(value=value):
-            return Fraction(value)
-        case _:  # no number that is written down
-            return None

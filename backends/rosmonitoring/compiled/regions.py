@@ -70,11 +70,11 @@ def _compared(term: Term, variable: Variable) -> Iterator[Fraction | None]:
             if term.qualified == variable.qualified:
                 yield None
         case Compare(left=left, right=right) if _is(left, variable) or _is(right, variable):
-            yield _number(right if _is(left, variable) else left)
+            yield number_of(right if _is(left, variable) else left)
         case In(item=item, collection=SetTerm(items=items)) if _is(item, variable):
-            yield from map(_number, items)
+            yield from map(number_of, items)
         case In(item=item, collection=SequenceRange(low=low, high=high)) if _is(item, variable):
-            yield from (_number(low), _number(high))
+            yield from (number_of(low), number_of(high))
         case _:  # compares nothing itself
             for child in term.children:
                 yield from _compared(child, variable)
@@ -84,18 +84,18 @@ def _is(term: Term, variable: Variable) -> bool:
     return isinstance(term, Variable) and term.qualified == variable.qualified
 
 
-def _number(term: Term) -> Fraction | None:
+def number_of(term: Term) -> Fraction | None:
     """The value of a term without variables."""
     match term:
         case Literal(value=int() | Fraction() as value) if not isinstance(value, bool):
             return Fraction(value)
         case Widen(term=inner):
-            return _number(inner)
+            return number_of(inner)
         case Negative(term=inner):
-            number = _number(inner)
+            number = number_of(inner)
             return None if number is None else -number
         case Arithmetic(operator="+" | "-" | "*" as operator, left=left, right=right):
-            one, other = _number(left), _number(right)
+            one, other = number_of(left), number_of(right)
             if one is None or other is None:
                 return None
             return one + other if operator == "+" else one - other if operator == "-" else one * other

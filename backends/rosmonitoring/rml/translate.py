@@ -24,6 +24,7 @@ from avow.language.terms import Role
 from avow.ros.bags import ENVELOPE
 from avow.ros.calls import is_part
 
+from ..memory import triggers_of
 from ..options import Setup, same_topic
 from ..rules import Choice, Constant, FieldPath, Fields, Lookup, Previous, Rule
 from ..tuning import CASES
@@ -151,7 +152,7 @@ class _Machine:
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = every([compare("==", Name(self.flags[n]), Number(Fraction(1))) for n in names if n in self.flags])
         judged = some([*negations(complete), guard])
-        triggers = self._triggers(names)
+        triggers = triggers_of(self.setup, tuple(names))
         together = self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
         if together and len(triggers) > 1:
             self.fresh = {name: f"f{at}" for at, name in enumerate(triggers, start=1)}
@@ -239,13 +240,6 @@ class _Machine:
             if same_topic(name) == topic:
                 return name
         return topic
-
-    def _triggers(self, names: Sequence[str]) -> tuple[str, ...]:
-        """As `engine.Monitor` has it."""
-        direct = tuple(n for n in names if isinstance(self.rules[n], Fields | Choice))
-        outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
-        sources = tuple(r.source for n in names if isinstance(r := self.rules[n], Previous))
-        return outputs if outputs and self.setup.when != "every" else direct or sources
 
     def _state(self) -> list[str]:
         found: list[str] = []
