@@ -1,4 +1,8 @@
-"""The Dafny backend (see `docs/backends/dafny.md`)."""
+"""A Dafny implementation of the node, verified against the contract (see `docs/backends/dafny.md`).
+
+`modules` writes the specification, `scanner` finds what a person's file leaves unproved, `runner` runs Dafny, and
+`judge` makes verdicts of what it said.
+"""
 
 from .backend import DafnyBackend
 
