@@ -44,7 +44,7 @@ from avow.language.terms import (
     Widen,
 )
 from avow.sanity.witness_candidates import Candidates, Definition
-from avow.sanity.witnesses import Fixed, Witness, meanings_of
+from avow.sanity.witnesses import Fixed, Witness, applied, meanings_of
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
@@ -197,7 +197,9 @@ def _meets(
     meanings = {**fixed, **meanings_of(translator, alternative, fixed)}
     members = translator.background(alternative, meanings)
     left = {**fixed, **{v: meanings[v] for v in others}}
-    return z3.And([*members, *(translator.term(substitute(formula, terms), left) for formula in shown)])
+    return z3.And(
+        [*members, *(translator.term(substitute(applied(formula, alternative), terms), left) for formula in shown)]
+    )
 
 
 def _widened(value: object, output: Variable) -> Term:

@@ -15,7 +15,7 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
-from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
+from avow.sanity.witnesses import Cases, Fixed, Witness, applied, instantiate, meanings_of, witnesses
 from avow.solving.limits import allowed, effort_left, spend, spent, tried, until
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
@@ -215,7 +215,10 @@ class Search:
                 whole = {**meanings, **meanings_of(translator, witness, meanings)}
             except Unsupported:  # `<1 upto in.n>` as a value: to suggest less is sound
                 continue
-            met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
+            met = [
+                *translator.background(witness, whole),
+                *(translator.term(applied(g, witness), whole) for g in guarantees),
+            ]
             facts.append(z3.Not(z3.And(met)))
         return [*facts, *translator.opaque_facts()]
 

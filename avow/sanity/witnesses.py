@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import islice, pairwise, product
+from itertools import chain, islice, pairwise, product
 from typing import assert_never
 
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
-from avow.formulas.traversal import depth
+from avow.formulas.renaming import rename_apart
+from avow.formulas.traversal import depth, transform
 from avow.formulas.values import Value
 from avow.language.sorts import (
     BOOL,
@@ -44,6 +45,7 @@ from avow.language.terms import (
     And,
     Apply,
     Arithmetic,
+    Conditional,
     Construct,
     EnumValue,
     Literal,
@@ -307,6 +309,26 @@ def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> lis
 
 
 # -- meanings ----------------------------------------------------------------------------------------------------------
+
+
+def applied(formula: Term, witness: Witness) -> Term:
+    """The formula with what a witness defines in the place of each application of it: what a quantified variable is
+    equal to is then seen (`avow.formulas.one_point_rule`)."""
+    defined = {output: value for output, value in witness.items() if isinstance(value, Definition)}
+    if not defined:
+        return formula
+
+    def at(part: Term) -> Term:
+        if not isinstance(part, Apply) or part.function not in defined:
+            return part
+        definition = defined[part.function]
+        whole = definition.body
+        for condition, value in reversed(definition.cases if isinstance(definition, Cases) else ()):
+            whole = Conditional(condition, value, whole, part.sort)
+        return substitute(whole, dict(zip(definition.parameters, part.arguments, strict=True)))
+
+    terms = (term for d in defined.values() for term in (d.body, *chain(*(d.cases if isinstance(d, Cases) else ()))))
+    return transform(rename_apart(formula, {v.name for term in terms for v in free_variables(term)}), at)
 
 
 def meanings_of(
