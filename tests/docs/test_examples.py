@@ -68,6 +68,7 @@ def test_examples_and_what_init_makes_are_in_the_layout_that_the_hook_asks_for()
     assert avow("fmt", "--check", *map(str, files), cwd=ROOT).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("template", some(["plain", "ros1", "ros2"], 1))
 def test_what_init_makes_has_nothing_to_remark(template: str, tmp_path: Path) -> None:
     assert avow("init", "robot", "--template", template, cwd=tmp_path).returncode == 0

@@ -79,7 +79,7 @@ def test_a_right_subject_is_tested_and_no_more(tmp_path: Path) -> None:
         ),
         pytest.param("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None, marks=pytest.mark.nightly),
         pytest.param("done.add(command[1])", "done = {command[1]}", {"marks"}, None, marks=pytest.mark.slow),
-        ('== "inspect"', '!= "halt"', {"marks"}, None),
+        pytest.param('== "inspect"', '!= "halt"', {"marks"}, None, marks=pytest.mark.slow),
     ],
 )
 def test_seeded_faults_are_found(

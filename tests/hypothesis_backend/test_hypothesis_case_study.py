@@ -48,7 +48,7 @@ def test_the_repaired_nodes_pass(tmp_path: Path, root: Path, node: str, file: st
 @pytest.mark.parametrize(
     ("old", "new", "broken"),
     [
-        ("here + 1", "here + 2", {"next_waypoint", "end_of_mission"}),
+        pytest.param("here + 1", "here + 2", {"next_waypoint", "end_of_mission"}, marks=pytest.mark.slow),
         pytest.param(
             '("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}, marks=pytest.mark.nightly
         ),

@@ -119,7 +119,7 @@ SPECIALS = [
 ]
 
 
-@pytest.mark.parametrize(("node", "program", "numbers", "verdict"), some(SPECIALS, 1, slow=1))
+@pytest.mark.parametrize(("node", "program", "numbers", "verdict"), some(SPECIALS, 0, slow=2))
 def test_machine_numbers(tmp_path: Path, node: str, program: str, numbers: str, verdict: Verdict) -> None:
     outcome = settle(tmp_path, node, program, numbers=numbers)
     assert outcome.verdict is verdict, outcome.summary

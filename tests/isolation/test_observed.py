@@ -218,7 +218,8 @@ def started(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(not traces(), reason="strace does not run here")
-@pytest.mark.parametrize("sandbox", [pytest.param("off", marks=pytest.mark.slow), "required"])
+@pytest.mark.slow
+@pytest.mark.parametrize("sandbox", ["off", "required"])
 def test_what_a_started_program_reads_is_an_input(
     started: Path, tmp_path: Path, sandbox: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -160,7 +160,8 @@ def test_a_loop_of_refused_questions_comes_to_an_end() -> None:
     assert spent() > before
 
 
-@pytest.mark.parametrize("effort", [2, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("effort", [2, 10])
 def test_with_next_to_no_effort_the_analysis_of_a_node_ends_at_once(effort: int, root: Path) -> None:
     """Seen: minutes of writing down questions that were refused, in searches that began when all was used up."""
     contract = load_path(root / "contracts" / "remote_inspection").contract

@@ -302,6 +302,7 @@ def test_obligations_are_shown_as_a_table(robot: Path) -> None:
     assert "thermostat/guarantee/warms" in done.stdout
 
 
+@pytest.mark.slow
 def test_doctor_names_every_backends_tools(made: Path) -> None:
     done = run(made, "avow", "doctor", "--json")
     used = {t["used_by"] for t in json.loads(done.stdout)["tools"]}

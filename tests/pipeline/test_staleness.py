@@ -340,6 +340,7 @@ def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_steps_of_the_scenario_re_ask_what_goes_so_far(tmp_path: Path) -> None:
     folder = copied(SHIPPED, tmp_path)
     before = keys(folder)
@@ -373,7 +374,7 @@ def watched(folder: Path) -> System:
     "method",
     [
         pytest.param("hypothesis", marks=pytest.mark.slow),
-        "rosmonitoring",
+        pytest.param("rosmonitoring", marks=pytest.mark.slow),
         pytest.param("ajpf", marks=pytest.mark.nightly),
         "sanity",
     ],

@@ -89,8 +89,7 @@ def test_every_published_requirement_stands_in_the_plan_with_its_sentence() -> N
     [
         *(pytest.param(name, marks=pytest.mark.nightly) for name in ("R1_kept", "R1_4")),
         pytest.param("R1_2", marks=pytest.mark.slow),
-        "R1_3",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("R1_5", "R1_6")),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("R1_3", "R1_5", "R1_6")),
         "R2",
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("R2_2_2", "R3_2")),
         "R3_5",
@@ -345,9 +344,8 @@ def test_the_environment_assumptions_hold_of_the_grid() -> None:
     assert all(AWAY[b, g] <= AWAY[a, g] + 1 for a, b in STEPS for g in FREE)
 
 
-@pytest.mark.parametrize(
-    "planner", ["ComputePlan2Charging", pytest.param("ComputePlan2Destination", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("planner", ["ComputePlan2Charging", "ComputePlan2Destination"])
 def test_that_a_plan_begins_at_the_start_does_not_follow_from_the_rest(planner: str) -> None:
     """What shows it is a table that the solver finds late, for the scenario's map: it must not be lost unseen."""
     system = load_system(FOLDER)

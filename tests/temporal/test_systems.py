@@ -198,7 +198,9 @@ REFUTED = """node a {{ inputs( e : BOOL ) outputs( w : BOOL ) topics() guarantee
 node b {{ inputs( w : BOOL ) outputs( v : BOOL ) topics() assume m ( {} ) guarantee h ( out.v == in.w ) }}"""
 
 
-@pytest.mark.parametrize(("assumed", "length"), [("not in.w", 2), ("not held[2 steps](in.w)", 4)])
+@pytest.mark.parametrize(
+    ("assumed", "length"), [("not in.w", 2), pytest.param("not held[2 steps](in.w)", 4, marks=pytest.mark.slow)]
+)
 def test_a_refutation_is_shown_as_a_run_and_says_nothing_of_cells(assumed: str, length: int, tmp_path: Path) -> None:
     """In the answer, and in what would make it hold."""
     (tmp_path / "system.rcl").write_text(REFUTED.format(assumed))
