@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import product
 from pathlib import Path
 
 import pytest
+from oracle.values import holds
 
 from avow.base.verdict import Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.variables import Frame
-from avow.evaluation.evaluate import compile_term
 from avow.system.plan import Endpoint
 
 from .make import make, node, settled
@@ -81,10 +82,10 @@ class Enumeration:
         self.delayed = sorted({str(e.source) for e in self.graph.edges if e.delayed})
         self.outside = sorted({e.port for e in self.graph.environment})
         self.clauses = {
-            f"{n.name}.{c.name}": (n.name, compile_term(c.formula)) for n in contract.nodes for c in n.clauses
+            f"{n.name}.{c.name}": (n.name, partial(holds, c.formula)) for n in contract.nodes for c in n.clauses
         }
         self.assumed = {str(name) for name in composition.whole.root.assumed}
-        self.given = [compile_term(a.formula) for a in self.frame.assumed]
+        self.given = [partial(holds, a.formula) for a in self.frame.assumed]
 
     def local(self, name: str, values: Mapping[str, object], before: Mapping[str, object]) -> Values:
         found: Values = {}
@@ -125,7 +126,7 @@ class Enumeration:
                 local = {n: self.local(n, values, before) for n in self.graph.nodes}
                 if not all(given({f"in.{p}": values[f"in.{p}"] for p in self.outside}) for given in self.given):
                     continue
-                truth = {label: bool(judge(local[n])) for label, (n, judge) in self.clauses.items()}  # type: ignore[arg-type]
+                truth = {label: judge(local[n]) for label, (n, judge) in self.clauses.items()}
                 if not all(truth[name] for name in self.assumed):
                     continue
                 assumptions = {n: [f"{n}.{a.name}" for a in self.frame.node(n).assumptions] for n in self.graph.nodes}
