@@ -3,147 +3,67 @@
 A system has delays, circles, constants and other inputs from the environment with and without assumptions about them,
 topics with several publishers, clauses that speak of other steps, subsystems and derivations with named rules. A node
 keeps its guarantees as long as its assumptions have held; else it may put out anything. What follows here is a reading
-of its own of what all that means: nothing of Avow is used.
+of its own of what all that means: nothing of Avow is used but its parser.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from random import Random
 
+from drawn.formulas import BOOL, PLAIN, Formulas
+from oracle.stepping import Memory, Watch
+
+from avow.language.load import parse_formula
+from avow.language.sorts import BOOL as BOOL_SORT
+
 Values = dict[str, bool]
-Memory = tuple[bool, ...]
 MOST_STATES = 4000
 ENVIRONMENT = ("e0", "e1", "c0")
 CONSTANT = "c0"
 TOPIC = "bus"
 
 
-@dataclass(frozen=True)
-class Formula:
-    """`head` with its parts; a leaf says that a value (`name`) is `wanted`."""
+class Formula(Watch):
+    """A clause as text, and what it says, by its own memory."""
 
-    head: str
-    parts: tuple[Formula, ...] = ()
-    name: str = ""
-    wanted: bool = True
+    def __init__(self, text: str) -> None:
+        said = re.sub(r"(\w+)\.(\w+)", r"\1_\2", text)
+        self.text, self.names = text, frozenset(re.findall(r"\w+\.\w+", text))
+        extra = {_word(name): BOOL_SORT for name in self.names}
+        super().__init__(parse_formula(said, extra=extra, remembers=True, clause=True))
 
-    @property
-    def text(self) -> str:
-        said = [part.text for part in self.parts]
-        match self.head:
-            case "is":
-                return f"({self.name} == {str(self.wanted).upper()})"
-            case "and" | "or" | "->" | "<=>" | "since":
-                return f"(({said[0]}) {self.head} ({said[1]}))"
-            case "previous":
-                return f"previous({said[0]}, {str(self.wanted).upper()})"
-            case "once" | "historically" | "rose" | "fell" | "changed":
-                return f"{self.head}({said[0]})"
-            case "next":
-                return f"({said[0]}) -> next({said[1]})"
-            case "within":
-                return f"({said[0]}) -> within[2 steps]({said[1]})"
-            case "until":
-                return f"({said[0]}) -> (({said[1]}) until ({said[2]}))"
-        raise AssertionError(self.head)
-
-    @property
-    def begins(self) -> Memory:
-        """What it remembers before the first step."""
-        own: Memory = ()
-        match self.head:
-            case "previous":
-                own = (self.wanted,)
-            case "once" | "since" | "rose" | "fell" | "next" | "until":
-                own = (False,)
-            case "historically":
-                own = (True,)
-            case "changed" | "within":
-                own = (False, False)
-        return own + tuple(bit for part in self.parts for bit in part.begins)
-
-    def at(self, values: Mapping[str, bool], memory: Iterator[bool], after: list[bool]) -> bool:
+    def at(self, values: Mapping[str, bool], memory: Iterator[Memory], after: list[Memory]) -> bool:
         """Whether it holds at a step; what it remembers then goes to `after`."""
-        match self.head:
-            case "is":
-                return values[self.name] == self.wanted
-        size = {"changed": 2, "within": 2, "and": 0, "or": 0, "->": 0, "<=>": 0}.get(self.head, 1)
-        was = [next(memory) for _ in range(size)]
-        place = len(after)
-        after += was
-        now = [part.at(values, memory, after) for part in self.parts]
-        kept: list[bool] = []
-        match self.head:
-            case "and":
-                found = now[0] and now[1]
-            case "or":
-                found = now[0] or now[1]
-            case "->":
-                found = not now[0] or now[1]
-            case "<=>":
-                found = now[0] == now[1]
-            case "previous":
-                found, kept = was[0], [now[0]]
-            case "once":
-                found = was[0] or now[0]
-                kept = [found]
-            case "historically":
-                found = was[0] and now[0]
-                kept = [found]
-            case "since":
-                found = now[1] or (now[0] and was[0])
-                kept = [found]
-            case "rose":
-                found, kept = now[0] and not was[0], [now[0]]
-            case "fell":
-                found, kept = not now[0] and was[0], [now[0]]
-            case "changed":  # whether there was a step, and what it was then
-                found, kept = was[0] and was[1] != now[0], [True, now[0]]
-            case "next":
-                found, kept = not was[0] or now[1], [now[0]]
-            case "within":  # asked for one step ago and not answered since; two steps ago or more
-                one, more = was
-                found = not (more and not now[1])
-                kept = [now[0] and not now[1], (one or more) and not now[1]]
-            case "until":  # waiting
-                waiting = (was[0] or now[0]) and not now[2]
-                found, kept = not waiting or now[1], [waiting]
-            case _:
-                raise AssertionError(self.head)
-        after[place : place + size] = kept
-        return found
+        held, left = self.step({_word(name): values[name] for name in self.names}, next(memory))
+        after.append(left)
+        return held
 
     def __call__(self, values: Mapping[str, bool]) -> bool:
         """Of one that speaks of this step alone."""
-        assert not self.begins
-        return self.at(values, iter(()), [])
+        return self.at(values, iter((self.begins,)), [])
 
-    @property
-    def names(self) -> frozenset[str]:
-        return frozenset({self.name} if self.name else ()).union(*(part.names for part in self.parts))
+
+def _word(name: str) -> str:
+    return name.replace(".", "_")
 
 
 def formula(random: Random, names: Sequence[str], depth: int = 2, *, remembers: float = 0.0) -> Formula:
     """A formula over some names; with that chance, a part of it speaks of other steps."""
-    if depth > 0 and random.random() < remembers:
-        head = random.choice(["previous", "once", "historically", "since", "rose", "fell", "changed"])
-        parts = tuple(formula(random, names, depth - 1) for _ in range(2 if head == "since" else 1))
-        return Formula(head, parts, wanted=random.random() < 0.5)
-    if depth == 0 or random.random() < 0.25:
-        return Formula("is", name=random.choice(list(names)), wanted=random.random() < 0.6)
-    return Formula(
-        random.choice(["and", "or", "->", "<=>"]),
-        tuple(formula(random, names, depth - 1, remembers=remembers) for _ in range(2)),
-    )
+    return Formula(Formulas(random, replace(PLAIN, past=remembers)).formula(depth, dict.fromkeys(names, BOOL)))
 
 
 def response(random: Random, names: Sequence[str]) -> Formula:
     """A clause that demands something of later steps."""
-    head = random.choice(["next", "within", "until"])
-    return Formula(head, tuple(formula(random, names, 1) for _ in range(3 if head == "until" else 2)))
+    return Formula(Formulas(random, PLAIN).response(1, dict.fromkeys(names, BOOL)))
+
+
+def says(random: Random, name: str) -> Formula:
+    """That a value is so, or not."""
+    return Formula(f"({name} == {str(random.random() < 0.5).upper()})")
 
 
 @dataclass(frozen=True)
@@ -183,7 +103,7 @@ class System:
                 self.initial[name] = CONSTANT
         self.outside: dict[str, tuple[Formula | None, bool]] = {}
         for name in sorted({wire.outside for wire in self.wires.values() if rich} & set(ENVIRONMENT)):
-            assume = Formula("is", name=f"in.{name}", wanted=random.random() < 0.5) if random.random() < 0.4 else None
+            assume = says(random, f"in.{name}") if random.random() < 0.4 else None
             if self.remembers and name != CONSTANT and random.random() < 0.4:
                 assume = self.demand(random, [f"in.{name}"])
             if assume is not None or name == CONSTANT:
@@ -328,7 +248,7 @@ class System:
         clauses = [(n, each) for n in self.nodes for each in self.kept_of(n)]
         given = [(port, each) for port, (each, _) in self.outside.items() if each is not None]
         every = [*(each for _, each in given), *(each for _, each in clauses), *self.required]
-        memory = tuple(bit for each in every for bit in each.begins)
+        memory = tuple(each.begins for each in every)
         first = [
             (tuple(fixed.items()), tuple(last[n] for n in self.nodes), memory, (True,) * len(self.nodes))
             for fixed, last in self.begins(free)
@@ -345,7 +265,7 @@ class System:
                     if self.publishers and heard not in {now[n] for n in self.publishers}:
                         continue
                     outside = {**fixed, **dict(zip(changing, values, strict=True))}
-                    bits, after = iter(kept_bits), list[bool]()
+                    bits, after = iter(kept_bits), list[Memory]()
                     if not min([each.at({f"in.{port}": outside[port]}, bits, after) for port, each in given] or [True]):
                         continue
                     read = {n: self.inputs(n, before, now, outside, heard) for n in self.nodes}

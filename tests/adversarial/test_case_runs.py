@@ -48,7 +48,7 @@ class Judged(System):
                 self.promised[n][0] = formula(self.chance, [f"out.o{n}"], 0)
         outputs = [f"{n}.o{n}" for n in self.nodes]
         pairs = [(formula(self.chance, outputs, 1), formula(self.chance, outputs, 1)) for _ in self.required]
-        self.required = [Formula("or", pair) for pair in pairs]
+        self.required = [Formula(f"({one.text}) or ({other.text})") for one, other in pairs]
         self.text, self.plan = self.written(), self.planned(self.chance)
         self.refuted = {(n, k) for n in self.nodes for k in range(len(self.promised[n])) if self.chance.random() < 0.15}
         self.told()

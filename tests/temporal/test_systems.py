@@ -4,15 +4,16 @@ and nothing refuted is kept by all."""
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping
-from fractions import Fraction
+from collections.abc import Callable, Iterator, Mapping
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from drawn.memory import clause
 from helpers import some
+from oracle.stepping import Watch
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
@@ -21,18 +22,13 @@ from avow.calculus.export import derived_contract
 from avow.calculus.obligations import all_obligations, settle_all
 from avow.cli.compose import command as compose_command
 from avow.cli.simulate import command as simulate
-from avow.evaluation.evaluate import compile_term
-from avow.evaluation.running import Keeper
-from avow.formulas.temporal.ages import CLOCK
-from avow.formulas.temporal.cells import CELL, Records
-from avow.formulas.temporal.clock import Timed
-from avow.formulas.values import Value
+from avow.formulas.temporal.cells import CELL
 from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.system.load import load_system
 
-Step = Mapping[str, Value]
+Step = Mapping[str, bool]
 STATES = 400
 PLAN = """requirements:
   R: {{text: "R", formula: "{}", supported_by: [a, b]}}
@@ -42,31 +38,24 @@ PLAN = """requirements:
 class Enumeration:
     """Every run of two nodes over truth values: `a` reads `e` and says `w`, `b` reads `w` and says `v`."""
 
-    def __init__(self, said: Term, assumed: Term, promised: Term, kind: type[Records | Timed] = Records) -> None:
-        """`kind`: `Timed` where clauses speak of seconds; each step takes one."""
-        self.parts = []
-        self.always: dict[str, Value] = {CLOCK.qualified: Fraction(1)} if kind is Timed else {}
-        for term, names in ((said, "ew"), (assumed, "ww"), (promised, "wv")):
-            records = kind()
-            self.parts.append((compile_term(records.clause(term)), Keeper(records.cells), names))
+    def __init__(self, said: Term, assumed: Term, promised: Term, watch: Callable[[Term], Any] = Watch) -> None:
+        """`watch`: how a clause is read, a step at a time."""
+        self.parts = [(watch(term), names) for term, names in ((said, "ew"), (assumed, "ww"), (promised, "wv"))]
 
     def reach(self) -> Iterator[tuple[bool, bool, Step]]:
         """Of every step that a run can come to: whether b's assumption holds, whether it and all before did, and the
         step's values. Raises OverflowError where there are too many states."""
-        first = (*(tuple(keeper.memory.items()) for _, keeper, _ in self.parts), True)
+        first = (*(watch.begins for watch, _ in self.parts), True)
         seen, waiting = {first}, [first]
         while waiting:
             *memories, kept = waiting.pop()
             for e, w, v in product((False, True), repeat=3):
                 values = {"e": e, "w": w, "v": v}
-                holds, after = [], []
-                for (judge, keeper, (one, other)), memory in zip(self.parts, memories, strict=True):
-                    keeper.memory = dict(memory)
-                    ports: dict[str, Value] = {"in.a": values[one], "out.b": values[other], **self.always}
-                    holds.append(bool(judge(keeper.at(ports))))
-                    keeper.advance(ports)
-                    after.append(tuple(keeper.memory.items()))
-                said, assumed, promised = holds
+                walked = [
+                    watch.step({"in.a": values[one], "out.b": values[other]}, memory)
+                    for (watch, (one, other)), memory in zip(self.parts, memories, strict=True)
+                ]
+                (said, assumed, promised), after = zip(*walked, strict=True)
                 still = kept and assumed
                 if not said or (still and not promised):
                     continue
