@@ -154,7 +154,7 @@ def told(folder: Path, seed: int, edits: int = 3, *, rich: bool = False) -> int:
 @pytest.mark.slow
 @pytest.mark.parametrize("rich", [False, True])
 def test_no_case_says_what_some_run_breaks(tmp_path: Path, rich: bool) -> None:
-    assert sum(told(tmp_path, seed, rich=rich) for seed in ((1,) if rich else range(5))) > 0
+    assert sum(told(tmp_path, seed, rich=rich) for seed in ((7,) if rich else range(5))) > 0
 
 
 @pytest.mark.nightly

@@ -304,6 +304,12 @@ def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
     assert environment(risk(expires="2026-11-21")).exit_code == environment(risk()).exit_code  # its last day counts
 
 
+def test_of_a_slip_the_word_that_was_meant_is_told() -> None:
+    with pytest.raises(Rejected) as caught:
+        read_policy(located({"requirments": ["proved"]}))
+    assert caught.value.diagnostics[0].hint == "did you mean 'requirements'?"
+
+
 def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:
     found = environment(risk(), policy={"requirements": ["proved"], "composition": ["proved"]})
     passed, reason = gate(found, "requirements")

@@ -26,8 +26,10 @@ from avow.language.sorts import (
     SequenceSort,
     SetSort,
     Sort,
+    TupleSort,
 )
 from avow.language.terms import (
+    TRUE,
     And,
     Apply,
     Arithmetic,
@@ -50,6 +52,7 @@ from avow.language.terms import (
     SequenceTerm,
     SetTerm,
     Term,
+    TupleTerm,
     Variable,
     Widen,
 )
@@ -358,6 +361,13 @@ def test_deep_nesting_is_an_answer_not_a_crash() -> None:
         term = Not(term)
     with pytest.raises(NotEvaluable, match="too deeply"):
         compile_term(term)
+
+
+def test_a_variable_over_tuples_takes_each_value() -> None:
+    pair = bound("t", TupleSort((COLOUR, BOOL)))
+    red, green = (TupleTerm((EnumValue(c, COLOUR), TRUE), TupleSort((COLOUR, BOOL))) for c in ("red", "green"))
+    assert evaluate(unique((pair,), Or((eq(pair, red), eq(pair, green)))), {}) is False
+    assert evaluate(forall((pair,), Or((eq(pair, red), Not(eq(pair, red))))), {}) is True
 
 
 def test_negative_and_widen() -> None:

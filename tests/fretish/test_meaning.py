@@ -11,8 +11,8 @@ from itertools import product
 import pytest
 from oracle.values import broken, value
 
-from avow.fretish.meaning import Unsaid, demands
-from avow.fretish.sentence import Condition, Denied, Duration, Expression, Name, Scope, Sentence, Timing
+from avow.fretish.meaning import Unsaid, demands, remarks
+from avow.fretish.sentence import Condition, Denied, Duration, Expression, Name, Scope, Sentence, Timing, parse
 from avow.language.load import check_text
 from avow.language.terms import RESPONSES, TRUE, History, Implies, Past, Term
 
@@ -183,3 +183,17 @@ def test_clauses_say_what_fret_says(scope: Scope) -> None:
     only = {Timing.AFTER} if scope in (Scope.ONLY_IN, Scope.ONLY_BEFORE, Scope.ONLY_AFTER) else set()
     never_ending = {Timing.FINALLY} if scope in (Scope.ALWAYS, Scope.AFTER, Scope.ONLY_BEFORE) else set()
     assert unsaid == only | never_ending
+
+
+@pytest.mark.parametrize(
+    ("text", "remarked"),
+    [
+        ("in m mode the node shall at the next timepoint satisfy r", 1),
+        ("in m mode the node shall immediately satisfy r", 0),
+        ("upon c the node shall always satisfy r", 1),
+        ("whenever c the node shall always satisfy r", 0),
+        ("after m mode the node shall immediately satisfy r", 1),
+    ],
+)
+def test_what_is_often_not_meant_is_remarked(text: str, remarked: int) -> None:
+    assert len(remarks(parse(text))) == remarked

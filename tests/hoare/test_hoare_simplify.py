@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from drawn.contracts import INPUTS, OUTPUTS, finite_formulas
+from drawn.formulas import checked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -131,6 +132,21 @@ def settle(folder: Path, formula: str) -> Outcome:
 def test_exactly_one_of_what_always_holds(tmp_path: Path, formula: str, holds: bool) -> None:
     outcome = settle(tmp_path, formula)
     assert outcome.verdict is (Verdict.PROVED if holds else Verdict.REFUTED), outcome.summary
+
+
+@pytest.mark.parametrize(
+    ("text", "short"),
+    [
+        ("mark(out.y) == mark(1)", "out.y == 1"),
+        ("mark(out.y) != mark(1)", "out.y != 1"),
+        ("mark(out.y) == halt", "FALSE"),
+        ("mark(out.y) != halt", "TRUE"),
+    ],
+)
+def test_constructors_are_injective_and_differ(text: str, short: str) -> None:
+    whole = "context {{ C : {{mark(INTEGER), halt}}; }}" + CONTRACT.partition("}}; }}")[2]
+    simple, wanted = (checked(whole.format(formula=each)).nodes[0].guarantees[0].formula for each in (text, short))
+    assert simplify(simple) == wanted
 
 
 @pytest.mark.parametrize("wrong", [lambda _: TRUE, lambda _: FALSE, lambda term: getattr(term, "items", (term,))[0]])

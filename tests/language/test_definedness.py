@@ -168,6 +168,7 @@ def test_a_claim_holds_where_it_is_true_and_nowhere_else(seed: int) -> None:
         ("forall(j in NATURAL | j + 1 < length(s) -> s(j) <= s(j + 1))", ""),
         ("length(s) == 2 and s(0) < s(1)", ""),
         ("s != <> -> s(0) == 1", ""),
+        ("k != 1 -> s(k - 2) == 0", "k != 1 -> 0 <= k - 2 and k - 2 < length(s)"),  # only of 0 it says: it is more
         ("exists(j in NATURAL | s(j) == 1)", "forall(j in NATURAL | j < length(s))"),
     ],
 )
