@@ -9,6 +9,7 @@ from fractions import Fraction
 import pytest
 from helpers import some
 
+from avow.evaluation.compiler import finite_values
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.evaluation.truth import judge
 from avow.formulas.values import Data, Element, FunctionValue, SequenceValue, Value
@@ -29,7 +30,6 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.terms import (
-    TRUE,
     And,
     Apply,
     Arithmetic,
@@ -52,7 +52,6 @@ from avow.language.terms import (
     SequenceTerm,
     SetTerm,
     Term,
-    TupleTerm,
     Variable,
     Widen,
 )
@@ -363,11 +362,11 @@ def test_deep_nesting_is_an_answer_not_a_crash() -> None:
         compile_term(term)
 
 
-def test_a_variable_over_tuples_takes_each_value() -> None:
-    pair = bound("t", TupleSort((COLOUR, BOOL)))
-    red, green = (TupleTerm((EnumValue(c, COLOUR), TRUE), TupleSort((COLOUR, BOOL))) for c in ("red", "green"))
-    assert evaluate(unique((pair,), Or((eq(pair, red), eq(pair, green)))), {}) is False
-    assert evaluate(forall((pair,), Or((eq(pair, red), Not(eq(pair, red))))), {}) is True
+def test_all_values_of_a_finite_sort() -> None:
+    pairs = finite_values(TupleSort((COLOUR, BOOL)))
+    assert pairs is not None
+    assert len(set(pairs)) == 2 * len(COLOUR.members)
+    assert finite_values(TupleSort((COLOUR, REAL))) is None
 
 
 def test_negative_and_widen() -> None:
