@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from avow.language.terms import RESPONSES, History, Implies, Literal, Past, Term, subterms
+from avow.language.subterms import subterms
+from avow.language.terms import RESPONSES, History, Implies, Literal, Past, Term
 
 from .values import COMPARED, NOWHERE, Meaning, Run, Step
 
