@@ -211,8 +211,7 @@ class _Work:
         try:
             return duration(str(written))
         except (ValueError, KeyError):
-            span = self.options.at(*place.split(".", 1)) if self.options is not None else None
-            self.faults.append(Diagnostic("MON101", f"{place}: {NO_TIME}, not {written}", span))
+            self.wrong(f"{place}: {NO_TIME}, not {written}", *place.split(".", 1))
             return Fraction(0)
 
     def answers(self, entry: Any) -> Answers | None:
@@ -249,9 +248,8 @@ class _Work:
             hertz, share = (Fraction(part) for part in written.groups()) if written else (Fraction(0), Fraction(0))
             if hertz and share < 100:
                 found[name] = Rate.of(hertz, share / 100, str(entry[name]))
-            elif self.options is not None:
-                text = f"rate.{name}: a frequency and a share below 100 % are wanted: 10 Hz ± 20 %"
-                self.faults.append(Diagnostic("MON101", text, self.options.at("rate", name)))
+            else:
+                self.wrong(f"rate.{name}: a frequency and a share below 100 % are wanted: 10 Hz ± 20 %", "rate", name)
         return found
 
     def filtered(self) -> frozenset[str]:
@@ -259,10 +257,9 @@ class _Work:
         names = said(self.options).get("filter", ())
         outputs = [n for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)]
         for at, name in enumerate(names):
-            if self.options is not None and name not in outputs:
-                text = f"filter: {name} is no output that messages carry"
-                span = self.options.at("filter", at)
-                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(str(name), outputs)))
+            if name not in outputs:
+                hint = suggest(str(name), outputs)
+                self.wrong(f"filter: {name} is no output that messages carry", "filter", at, hint=hint)
         rules = (self.rules[name] for name in names if name in outputs)
         return frozenset(same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice))
 
@@ -270,16 +267,19 @@ class _Work:
         """The variables of an option that messages carry; the others are faults."""
         observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
         for name in entry or ():
-            if name not in observed and self.options is not None:
-                text = f"{key}.{name}: no message that is observed carries it"
-                span = self.options.at(key, name)
-                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(name, observed)))
+            if name not in observed:
+                hint = suggest(name, observed)
+                self.wrong(f"{key}.{name}: no message that is observed carries it", key, name, hint=hint)
         return [name for name in entry or () if name in observed]
 
     def fault(self, message: str, *path: str | int, hint: str | None = None) -> None:
-        span = self.options.at("mapping", *path) if self.options is not None else None
         where = ".".join(str(p) for p in path)
-        self.faults.append(Diagnostic("MON101", f"mapping.{where}: {message}", span, hint=hint))
+        self.wrong(f"mapping.{where}: {message}", "mapping", *path, hint=hint)
+
+    def wrong(self, text: str, *place: str | int, hint: str | None = None) -> None:
+        """A fault of the options, at its place in the plan."""
+        span = self.options.at(*place) if self.options is not None else None
+        self.faults.append(Diagnostic("MON101", text, span, hint=hint))
 
     def port(self, port: Port) -> None:
         name = port.variable.qualified
