@@ -42,6 +42,8 @@ def explain(
         reports.error("RCL120", message, last.start, last.end, hint=hint)
         return
     message = f"expected {_expected(start, expected)} and not `{found.text[:40]}`"
+    if found.type == "RPAR" and start == "formula" and "$END" in expected:
+        message = "this `)` closes nothing"
     reports.error("RCL120", message, found.start, found.end, hint=hint)
 
 
