@@ -16,6 +16,7 @@ from avow.cli.options import ContractArgument, json_option
 if TYPE_CHECKING:
     from avow.base.codes import Code
     from avow.base.diagnostics import Diagnostic
+    from avow.base.remembered import Shelf
 
 
 @click.command()
@@ -46,13 +47,19 @@ def command(
 
     found: list[Diagnostic] = []
     files = 0
+    folders = dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file())
+    shelves = {folder: _shelf(folder) for folder in folders}
     for group, group_off in _groups(paths, separately, found):
         from avow.language.load import check_paths
 
         files += len(group)
-        found.extend(check_paths(group, off=group_off | frozenset(off))[1])
-    for folder in dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file()):
-        found.extend(d for d in _of_plan(folder) if d not in found and (d.is_error or d.code not in off))
+        shelf = shelves.get(group[0].parent) if group else None
+        found.extend(check_paths(group, off=group_off | frozenset(off), shelf=shelf)[1])
+    for folder in folders:
+        found.extend(
+            d for d in _of_plan(folder, shelves[folder]) if d not in found and (d.is_error or d.code not in off)
+        )
+        shelves[folder].keep()
     if as_json:
         click.echo(document(to_json(found)))
     elif sarif:
@@ -136,14 +143,22 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
     return files, frozenset()
 
 
-def _of_plan(folder: Path) -> Iterator[Diagnostic]:
+def _shelf(folder: Path) -> Shelf:
+    """Where it is kept what the nodes of a system say, as `avow verify` has it."""
+    from avow.base.remembered import Shelf
+    from avow.pipeline.engine_code import reading_digest
+
+    return Shelf(folder, reading_digest())
+
+
+def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
     """What there is to say of the folder's plan beside its contract files (which are checked already)."""
     from avow.base.diagnostics import Rejected
     from avow.pipeline.check import of_plan, of_rest
     from avow.system.load import load_system
 
     try:
-        found = of_plan(load_system(folder))
+        found = of_plan(load_system(folder, shelf), shelf=shelf)
     except Rejected as rejected:
         # what is wrong in contract files is told already; a formula of the plan has faults of the same codes
         every = (*rejected.diagnostics, *of_rest(folder))
