@@ -81,7 +81,7 @@ def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -
     installed, for so many steps of its own. Asked once in a run for the same entries."""
     records = [e.evidence for e in entries if e.evidence.method == COMPOSE and e.evidence.verdict is Verdict.PROVED]
     records = [r for r in records if isinstance(r.details.get("certificate"), dict)]
-    texts = {path: _kept_text(r, root) for r in records if (path := _kept(r)) is not None}
+    texts = {_kept(r): _kept_text(r, root) for r in records}
     asked = sha256(json.dumps([run.id, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
     checked = _checked(system, run)
     if asked not in checked.runs:
@@ -98,11 +98,12 @@ def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, r
     with Both(KERNEL_SECOND_ALL, asked.known) as solvers:
         each = {text: Certificates(composition, _read(text), solvers=solvers) for text in texts.values()}
         for record in records:
-            certificates = each[texts[_kept(record) or ""]]
+            certificates = each[texts[_kept(record)]]
             one = reestablished(certificates, record.obligation)
             if one is not None and one.key == record.details["certificate"].get("key"):
                 found[record.obligation] = one
-                used[one.scope] = to_json(certificates.kept[one.scope])
+                if one.scope in certificates.kept:  # a loop with nothing to show rests on no certificate
+                    used[one.scope] = to_json(certificates.kept[one.scope])
     version = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     parts = (*trusted_parts(), ("Python", version))
     return KernelRun(run, tuple(found[name] for name in sorted(found)), versions(), used, parts)
@@ -116,15 +117,15 @@ def _checked(system: System, run: Run) -> Checked:
     return checked
 
 
-def _kept(record: Evidence) -> str | None:
-    """The file of certificates that a record keeps."""
-    return next((path for path in record.outputs if path.endswith(f"/{FILE}")), None)
+def _kept(record: Evidence) -> str:
+    """The file of certificates that a record keeps; empty where it rests on none, as a loop with nothing to show."""
+    return next((path for path in record.outputs if path.endswith(f"/{FILE}")), "")
 
 
 def _kept_text(record: Evidence, root: Path) -> str:
     path = _kept(record)
     try:
-        return (root / path).read_text() if path is not None else ""
+        return (root / path).read_text() if path else ""
     except (OSError, UnicodeDecodeError):
         return ""
 

@@ -127,3 +127,16 @@ def test_ways_in_through_cached_runs(workspace: Path) -> None:
         cached = statuses(workspace)
         assert "refuted" in cached["requirement R"], "b puts out 5, whoever accepts it"
         assert cached == statuses(workspace, "-a")
+
+
+@pytest.mark.slow
+def test_a_loop_with_nothing_to_show(workspace: Path) -> None:
+    """Nodes without assumptions in a loop: its rule is proved with no certificate, as it asks nothing."""
+    robot = workspace / "contracts/robot"
+    robot.mkdir(parents=True)
+    node = "node {0} {{ inputs( x : BOOL ) outputs( y : BOOL ) topics() guarantee same ( in.x == out.y ) }}\n"
+    (robot / "system.rcl").write_text(node.format("a") + node.format("b"))
+    (robot / "plan.yaml").write_text("connections:\n  - {from: a.y, to: b.x}\n  - {from: b.y, to: a.x}\n")
+    grades, told = verify(workspace)
+    assert "proofs established again" in told
+    assert grades["robot/system/composition/whole.loop.a-b"].startswith("certified-")
