@@ -9,7 +9,7 @@ prove itself. Where proofs would do that, others are looked for; where there are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.graphs import components, cycle_in
@@ -133,28 +133,44 @@ class _Solver:
         """
         allowed = self.selected if allowed is None else allowed
         direct = [p for p in condition.providers if p in allowed]
-        last: Settled | None = None
-        attempts = list(self.attempts(condition, direct, allowed))
-        if (close := self.close(condition, *attempts[0])) is not None:
+        attempts = self.attempts(condition, direct, allowed)
+        widest = next(attempts)
+        if (close := self.close(condition, *widest)) is not None:
             return close
         asked: list[tuple[tuple[Phase, ...], list[tuple[Hypotheses, Term]]]] = []
-        for number, (same, before) in enumerate(attempts):
-            phases = self.phases(condition, before)
-            for wide in (False, True) if len(attempts) == 1 else (number > 0,):
-                found = (phases, [self.question(condition, phase, same, before, wide) for phase in phases])
-                asked += [found] if found not in asked else []
-        for number, (phases, questions) in enumerate(asked):
-            # Only the widest question is worth the whole time: what a narrower one cannot settle, that may.
-            patience = self.bounds.effort
-            if number < len(asked) - 1:
-                patience = min(patience, NARROW_EFFORT)
-            cases = tuple(self.ask(phase, *each, patience) for phase, each in zip(phases, questions, strict=True))
-            answer = _settled(condition, cases)
+        patient = False
+        # Of a node far down a chain all of it are ancestors: wider questions are written down only where one is asked.
+        left = [(widest, False)]
+        for number, (attempt, wide) in enumerate(left):
+            widest = attempt
+            phases = self.phases(condition, attempt[1])
+            found = (phases, [self.question(condition, phase, *attempt, wide) for phase in phases])
+            if found not in asked:
+                asked.append(found)
+                patient = 0 < number == len(left) - 1
+                answer = self.asked(condition, *found, patient=patient)
+                if answer.verdict is Verdict.PROVED:
+                    return answer
+            if number == 0:
+                left += [(each, True) for each in attempts] or [(widest, True)]
+        if not patient:  # the last one that was another question
+            answer = self.asked(condition, *asked[-1], patient=True)
             if answer.verdict is Verdict.PROVED:
                 return answer
-            last = answer  # only the widest hypotheses refute: narrower ones may just have left something out
-        assert last is not None
-        return self.by_itself(condition, *attempts[-1]) or self.deeper(condition, last, *attempts[-1])
+        # Only the widest hypotheses refute: narrower ones may just have left something out.
+        return self.by_itself(condition, *widest) or self.deeper(condition, answer, *widest)
+
+    def asked(
+        self,
+        condition: SideCondition,
+        phases: tuple[Phase, ...],
+        questions: Sequence[tuple[Hypotheses, Term]],
+        *,
+        patient: bool,
+    ) -> Settled:
+        """Only the widest question is worth the whole time: what a narrower one cannot settle, that may."""
+        effort = self.bounds.effort if patient else min(self.bounds.effort, NARROW_EFFORT)
+        return _settled(condition, tuple(self.ask(p, *q, effort) for p, q in zip(phases, questions, strict=True)))
 
     def phases(self, condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
         """One question, or one about the first step and one about every later."""
@@ -251,12 +267,14 @@ class _Solver:
 
     def attempts(
         self, condition: SideCondition, direct: list[str], allowed: frozenset[str]
-    ) -> Iterable[tuple[tuple[str, ...], tuple[str, ...]]]:
+    ) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
         """Ever wider sets of nodes whose contracts serve as hypotheses: at the same step, and one step earlier."""
         consumer = condition.consumer
         near = tuple(p for p in direct if p != consumer and self.feeds(p, consumer, delayed=False))
         before = tuple(p for p in condition.providers if self.feeds(p, consumer, delayed=True))
-        tried: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+        first = before if condition.delayed else ()
+        yield near, first
+        tried = {(near, first)}
         ancestors = self.ancestors(consumer, allowed)
         # What holds one step earlier holds of every selected node: each step's assumptions come before the next's.
         earlier = tuple(
@@ -269,8 +287,7 @@ class _Solver:
         )
         remembering = self.frame.remembering(self.selected)
         everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier or remembering else ()
-        first = before if condition.delayed else ()
-        for attempt in ((near, first), (ancestors, first), (ancestors, earlier), (ancestors, everything)):
+        for attempt in ((ancestors, first), (ancestors, earlier), (ancestors, everything)):
             if attempt not in tried:
                 tried.add(attempt)
                 yield attempt

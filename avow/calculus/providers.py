@@ -142,11 +142,11 @@ def _bearing(whole: Frame, spoken: frozenset[Variable]) -> dict[str, Term]:
 def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
     claim = asked.claim
     about = f"{node.name}.{asked.clause}"
-    answer = solve(asked.formulas, effort=bounds.effort, seed=bounds.seed, shown=False)
+    answer = solve(asked.formulas, effort=bounds.effort, seed=bounds.seed, values="unused")
     because = None
     match answer.status:
         case "sat" if any(CELL in v.name for f in asked.formulas.values() for v in free_variables(f)):
-            begun = solve({**asked.formulas, **asked.first}, effort=bounds.effort, seed=bounds.seed, shown=False)
+            begun = solve({**asked.formulas, **asked.first}, effort=bounds.effort, seed=bounds.seed, values="unused")
             verdict, text = Verdict.PROVED, "at the first step of a run"
             if begun.status != "sat":
                 verdict, text = Verdict.UNKNOWN, "not at the first step of a run; whether at a later one is not asked"

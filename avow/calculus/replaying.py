@@ -20,7 +20,7 @@ from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Value
 from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term
-from avow.solving.questions import replay
+from avow.solving.replay import replay
 from avow.system.formulas import initial_condition
 from avow.system.temporal import Operator, Property, State, states_of
 from avow.tuning.bounds import COMPLETIONS

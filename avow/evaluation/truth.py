@@ -22,7 +22,7 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
     sorts = _free_sorts(term)
     if not sorts.keys() <= valuation.keys():
         return None
-    from avow.solving.questions import replay  # Z3 takes a quarter of a second to load, and is seldom needed here
+    from avow.solving.replay import replay  # Z3 takes a quarter of a second to load, and is seldom needed here
 
     return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
 
@@ -30,7 +30,7 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
 def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
     """Whether the formula holds of the values, whatever those are that the valuation leaves out; None where that
     depends on them, or where Z3 cannot tell."""
-    from avow.solving.questions import opaque_sorts, replay
+    from avow.solving.replay import opaque_sorts, replay
 
     if opaque_sorts(term):  # how many elements they have is not known
         return None

@@ -23,6 +23,7 @@ from avow.language.contract import ClauseKind, Contract, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
+from avow.sanity.examples import meets
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
 from avow.tuning.effort import CONSISTENT_EFFORT
@@ -56,20 +57,25 @@ def analyse(
     bounds: Bounds | None = None,
     wanted: Collection[str] | None = None,
 ) -> tuple[SanityResult, ...]:
-    """Settle a node's claims, in their order; with `wanted`, only the claims of these names. `scenario` fixes some
-    inputs, `ranges` says which few values others (and quantified variables) have, where no answer for all is found.
+    """Settle a node's claims, in their order; with `wanted`, only the claims of these names are told. What comes before
+    them is asked all the same: claims that stay open leave less effort for later ones, and no answer is to depend on
+    what is wanted. `scenario` fixes some inputs, `ranges` says which few values others (and quantified variables) have,
+    where no answer for all is found.
 
     `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
     """
+    from avow.solving.translation import translating_once
+
     analysis = _analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
     results = []
-    for claim in claims(node):
-        if wanted is not None and claim.name not in wanted:
-            continue
-        start = time.monotonic()
-        finding = analysis.settle(claim)
-        results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
-    return tuple(results)
+    asked = claims(node)
+    told = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
+    with translating_once():
+        for claim in asked[: max(told, default=-1) + 1]:
+            start = time.monotonic()
+            finding = analysis.settle(claim)
+            results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
+    return tuple(results[k] for k in told)
 
 
 def outcomes(
@@ -294,7 +300,10 @@ class _Analysis:
     def _not_vacuous(self, name: str) -> Finding:
         impossible = []
         undecided: Finding | None = None
+        broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only where it is demanded
         for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
+            if meets(broken, (*self.assumptions.values(), trigger)):
+                continue
             finding = self._possible(
                 {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
             )
@@ -320,10 +329,13 @@ class _Analysis:
         others = self.assumptions if kind is ClauseKind.ASSUMPTION else {**self.assumptions, **self.guarantees}
         others = {other: formula for other, formula in others.items() if other != name}
         formula = self.node.clause(name).formula
+        whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
+        broken = self._example(f"not-tautological-{name}")
+        if broken and meets({**self._example(whole), **broken}, (*others.values(), negation(formula))):
+            return Finding(Verdict.PROVED)
         finding = self._fails_somewhere(others, formula, "it is true by itself", "it follows from {}")
         if finding.verdict is not Verdict.REFUTED:
             return finding
-        whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
         return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"not-tautological-{name}"))
 
     def _needed(self, name: str) -> Finding:
@@ -391,7 +403,7 @@ class _Analysis:
             "different": Not(Compare("==", output, again[output])),
         }
         for given in self._attempts():
-            answer = solve(question, effort=self.limit, seed=self.seed, given=given, shown=False)
+            answer = solve(question, effort=self.limit, seed=self.seed, given=given, values="if any")
             if answer.status == "unsat" and not given:
                 if doubted(answer, question):
                     return Finding(Verdict.ERROR, CONTRADICTED)
@@ -417,10 +429,14 @@ class _Analysis:
         """Whether any input of the scenario meets these: without one, nothing has been checked."""
         from avow.solving.questions import solve
 
-        return solve(assumed, effort=self.limit, given=self.scenario, shown=False).status == "sat"
+        return solve(assumed, effort=self.limit, given=self.scenario, values="unused").status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
+
+    def _example(self, name: str) -> Given:
+        """Values that show another claim; none where there is no such claim, or none are known."""
+        return self._other(name).example if name in self.claims else {}
 
     def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> Finding:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
@@ -428,7 +444,7 @@ class _Analysis:
         from avow.solving.second import CONTRADICTED, doubted
 
         limit = min(limit or self.limit, self.limit)
-        answer = solve(formulas, effort=limit, seed=self.seed, shown=False)
+        answer = solve(formulas, effort=limit, seed=self.seed, values="unused")
         if answer.status == "unknown" and self.scenario:
             within = solve(formulas, effort=limit, seed=self.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.
@@ -437,7 +453,7 @@ class _Analysis:
             return Finding(Verdict.PROVED)
         match answer.status:
             case "sat":
-                return Finding(Verdict.PROVED, engine=answer.engine)
+                return Finding(Verdict.PROVED, engine=answer.engine, example=answer.values)
             case "unsat" if doubted(answer, formulas):
                 return Finding(Verdict.ERROR, CONTRADICTED)
             case "unsat":

@@ -23,7 +23,8 @@ from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import Formulas, Given, Group, Realizability, Search, groups, realizable
 from avow.solving.counterexample import show_values
 from avow.solving.limits import effort_left, spent, until
-from avow.solving.questions import Unsupported, replay, solve
+from avow.solving.questions import Unsupported, solve
+from avow.solving.replay import replay
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import CONFLICTS
 from avow.tuning.effort import CONFLICT_EFFORT, CONFLICT_SEARCH_EFFORT
@@ -130,7 +131,7 @@ class _Search:
 
     def _core_at(self, at: Given, chosen: frozenset[str]) -> frozenset[str] | None:
         formulas, outputs = self._part(chosen)
-        answer = solve(formulas, given=at, variables=outputs, effort=CONFLICT_EFFORT, seed=self.seed, shown=False)
+        answer = solve(formulas, given=at, variables=outputs, effort=CONFLICT_EFFORT, seed=self.seed, values="unused")
         if answer.status != "unsat":
             return None
         core = frozenset(answer.core)
@@ -185,7 +186,7 @@ def contradictions(
         if known <= chosen:
             return known
         kept = {label: formula for label, formula in formulas.items() if label in chosen}
-        answer = solve(kept, effort=min(CONFLICT_EFFORT, effort), seed=seed, shown=False)
+        answer = solve(kept, effort=min(CONFLICT_EFFORT, effort), seed=seed, values="unused")
         if answer.status == "unknown":
             raise UndecidedError
         return frozenset(answer.core) if answer.status == "unsat" else None

@@ -216,7 +216,7 @@ class OverRuns:
     def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
         """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""
         limit, seed = self.bounds.effort, self.bounds.seed
-        anywhere = solve(formulas, effort=limit, seed=seed, shown=False)
+        anywhere = solve(formulas, effort=limit, seed=seed, values="unused")
         if anywhere.status == "unsat":
             if doubted(anywhere, formulas):
                 return Finding(Verdict.ERROR, CONTRADICTED)
@@ -226,7 +226,7 @@ class OverRuns:
         for length in range(RUN_TO_AN_EXAMPLE):
             here = {label: self._at(f, length) for label, f in formulas.items()}
             together = {**self._run(length), **here}
-            answer = solve(together, effort=limit, seed=seed, shown=False)
+            answer = solve(together, effort=limit, seed=seed, values="unused")
             if answer.status == "sat":
                 return Finding(Verdict.PROVED)
             if answer.status != "unsat":
@@ -243,7 +243,7 @@ class OverRuns:
         if self.viability.reachable is None:
             return Finding(Verdict.UNKNOWN, open_still)
         within = {**formulas, "memory": self.viability.reachable}
-        ever = solve(within, effort=limit, seed=seed, shown=False)
+        ever = solve(within, effort=limit, seed=seed, values="unused")
         if ever.status == "unsat":
             if doubted(ever, within):
                 return Finding(Verdict.ERROR, CONTRADICTED)
@@ -266,7 +266,7 @@ class OverRuns:
     def _over(self, length: int) -> bool:
         """Whether no run of so many steps keeps the contract."""
         if length not in self._ends:
-            answer = solve(self._run(length), effort=self.bounds.effort, seed=self.bounds.seed, shown=False)
+            answer = solve(self._run(length), effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
             self._ends[length] = answer.status == "unsat"
         return self._ends[length]
 

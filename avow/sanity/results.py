@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from avow.base.diagnostics import Severity, Span
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict, bound
+from avow.formulas.values import Value
+from avow.language.terms import Variable
 from avow.sanity.claims import Claim, Property
 
 
@@ -33,6 +35,8 @@ class Finding:
     engine: str = "z3"
     bounded: bool = False
     cut_short: bool = False
+    example: Mapping[Variable, Value] = field(default_factory=dict)
+    """Values for which what was asked holds, where there are."""
 
 
 @dataclass(frozen=True, slots=True)

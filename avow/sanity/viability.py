@@ -122,7 +122,7 @@ class Contract:
     def closed(self, region: Term) -> bool:
         """Whether the solver shows that from each memory of a region every allowed input has an output that stays in
         it, and that the first memory is in it."""
-        begins = solve([negation(self.at_first(region))], effort=self.effort, seed=self.seed, shown=False)
+        begins = solve([negation(self.at_first(region))], effort=self.effort, seed=self.seed, values="unused")
         if region != TRUE and begins.status != "unsat":
             return False
         wanted = self.promised if region == TRUE else {**self.promised, "memory": self.after(region)}
@@ -137,7 +137,7 @@ class Contract:
                 negation(substitute(whole, dict(zip(self.outputs, choice, strict=True)))) for choice in product(*terms)
             ]
             none = [*known.values(), *fails]
-            if solve(none, effort=self.effort, seed=self.seed, shown=False).status != "unsat":
+            if solve(none, effort=self.effort, seed=self.seed, values="unused").status != "unsat":
                 return False
             self.asked_again([conjunction(none)])
             return True
@@ -208,7 +208,7 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
         found = _decided(about)
         if found.verdict is Verdict.PROVED or not apart:
             return found
-        match solve(apart, effort=effort, seed=seed, shown=False).status:
+        match solve(apart, effort=effort, seed=seed, values="unused").status:
             case "sat":
                 return found
             case "unsat":
@@ -340,10 +340,10 @@ class _Game:
             rounds, (inputs, answers) = self.lost[memory]
             given = [_same(v, value_term(inputs[v.qualified], v.sort)) for v in contract.inputs]
             place = [self.at(memory), *given]
-            allowed = solve([*place, *contract.assumed.values()], effort=contract.effort, shown=False)
+            allowed = solve([*place, *contract.assumed.values()], effort=contract.effort, values="unused")
             lower = self.region([m for m, (at, _) in self.lost.items() if at < rounds])
             out = [*place, *contract.promised.values(), negation(contract.after(lower))]
-            escapes = solve(out, effort=contract.effort, shown=False)
+            escapes = solve(out, effort=contract.effort, values="unused")
             if allowed.status != "sat" or escapes.status != "unsat":
                 return False
             none.append(conjunction(out))
@@ -392,7 +392,7 @@ def _defeated(contract: Contract, length: int) -> Viability | None:
         return None
     given = {v: value_term(answer.inputs[v], v.sort) for v in inputs if v in answer.inputs}  # else: whatever it is
     left = {label: substitute(f, given) for label, f in wanted.items()}
-    conflict = solve(left, effort=contract.effort, seed=contract.seed, shown=False)
+    conflict = solve(left, effort=contract.effort, seed=contract.seed, values="unused")
     if conflict.status != "unsat":
         return None
     contract.asked_again([conjunction(left.values())])
@@ -437,7 +437,7 @@ def _approached(contract: Contract) -> Viability:
             if entails([one], other, effort=contract.effort, seed=contract.seed).verdict is not Verdict.PROVED:
                 return unknown
         following = conjunction((region, found))
-        if solve([contract.at_first(following)], effort=contract.effort, shown=False).status == "unsat":
+        if solve([contract.at_first(following)], effort=contract.effort, values="unused").status == "unsat":
             told = f"the environment can bring it to where no output meets the guarantees, within {steps_of(number)}"
             return Viability(Verdict.REFUTED, told, Counterexample(explanation=told))
         if entails([region], following, effort=contract.effort, seed=contract.seed).verdict is Verdict.PROVED:

@@ -17,7 +17,8 @@ from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Cases, Fixed, Witness, applied, instantiate, meanings_of, witnesses
 from avow.solving.limits import allowed, effort_left, spend, spent, tried, until
-from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
+from avow.solving.questions import Translator, Unsupported, check, entails, search_tables, solve
+from avow.solving.replay import replay
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import WITNESS_REFUTATIONS

@@ -183,11 +183,11 @@ def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *as
 
 def configured(solver: Any, effort: float, seed: int | None) -> None:
     """Set a solver's limit and seed; None for one that has no seed."""
-    solver.set("rlimit", steps(effort))
+    options: dict[str, object] = {"rlimit": steps(effort)}
     if isinstance(solver, z3.Solver) and seed is not None:
-        solver.set("random_seed", seed)
         # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
-        solver.set("smt.arith.nl.grobner", False)
+        options |= {"random_seed": seed, "smt.arith.nl.grobner": False}
+    solver.set(**options)
 
 
 def charge(translator: Sorts, solver: Any = None) -> int:

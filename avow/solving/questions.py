@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field
 from itertools import chain
+from typing import Literal as OneOf
 from typing import assert_never
 
 from avow.base.records import dataclass
@@ -27,15 +28,14 @@ from avow.language.sorts import (
     FunctionSort,
     OpaqueSort,
     SequenceSort,
-    Sort,
-    components,
 )
 from avow.language.subterms import subterms
-from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
-from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
+from avow.language.terms import Apply, Quantified, Term, Variable
+from avow.solving.checking import Answer, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
+from avow.solving.replay import is_partial, replay
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
 from avow.tuning.effort import ANOTHER_SOLVER_EFFORT, FIRST_LOOK_EFFORT, QUESTION_EFFORT, QUESTION_SHARE, ROUNDS
@@ -49,8 +49,6 @@ __all__ = [
     "Unsupported",
     "check",
     "entails",
-    "opaque_sorts",
-    "replay",
     "search_tables",
     "solve",
     "z3_version",
@@ -87,6 +85,11 @@ class Entailment:
     seconds: float = 0.0
 
 
+Values = OneOf["shown", "if any", "unused"]
+"""Of a solution: shown to people, with small numbers; the same, but they may be missing (polynomials can be solved by
+numbers that have no exact decimal); or not looked at."""
+
+
 # -- terms -------------------------------------------------------------------------------------------------------------
 
 
@@ -97,13 +100,13 @@ def solve(
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
-    shown: bool = True,
+    values: Values = "shown",
 ) -> Solution:
     """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
 
     `variables` are further variables whose values are wanted; `given` fixes the values of some. Unsupported constructs,
-    time-outs and models that cannot be replayed are `unknown`, with the reason. If the values need not be `shown`, then
-    they may be missing: polynomials can be solved by numbers that have no exact decimal.
+    time-outs and models that cannot be replayed are `unknown`, with the reason. `values` says what is made of a
+    solution: see `Values`.
     """
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
@@ -112,15 +115,20 @@ def solve(
     with budget(effort * QUESTION_SHARE):
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
+        small = values != "unused"
         try:
-            solution = _within_bounds(labelled, free, given or {}, effort, seed) or _solve(
-                Translator(), labelled, free, given or {}, effort, seed
+            solution = _within_bounds(labelled, free, given or {}, effort, seed, small=small) or _solve(
+                Translator(), labelled, free, given or {}, effort, seed, small=small
             )
         except Unsupported as error:
             solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
         except z3.Z3Exception as error:
             solution = Solution("unknown", reason=f"Z3: {error}")
-        if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, effort, seed):
+        if (
+            solution.status == "unknown"
+            and values != "shown"
+            and _has_solution(labelled, free, given or {}, effort, seed)
+        ):
             solution = Solution("sat")
         patient = solution.status == "unknown" and not given and effort >= ANOTHER_SOLVER_EFFORT
         if patient and allowed(effort):
@@ -168,74 +176,6 @@ def entails(
             assert_never(solution.status)
 
 
-def replay(
-    formulas: Iterable[Term],
-    values: Mapping[Variable, Value],
-    *,
-    effort: int = 5_000,
-    beside: Translator | None = None,
-) -> bool | None:
-    """Do the formulas hold of these values, whatever partial operations yield outside their domains?
-
-    True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
-    sort has the elements that the values name, and up to three more if the formulas hold only then. A translator of the
-    same formulas, if there is one, lends its context.
-    """
-    if not allowed(effort):
-        return None
-    formulas = tuple(formulas)
-    unspecified = sorted({sort for f in formulas for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
-    try:
-        for more in range(4 if unspecified else 1):
-            found = _replay(Translator(beside), formulas, values, unspecified, more, effort)
-            if found or not unspecified:
-                return found
-    except (Unsupported, z3.Z3Exception):
-        pass
-    return None
-
-
-def _replay(
-    translator: Translator,
-    formulas: Sequence[Term],
-    values: Mapping[Variable, Value],
-    unspecified: Sequence[OpaqueSort],
-    more: int,
-    effort: int,
-) -> bool | None:
-    meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
-    for sort in unspecified:
-        translator.add_elements(sort, more)
-    facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
-    known = translator.opaque_facts()
-    whole = z3.And(facts) if facts else translator.true()
-    denied = [*known, z3.Not(whole)]
-    attempts: tuple[tuple[Engine, int], ...] = (
-        ("smt", min(500, effort)),
-        ("qsat", effort),
-        ("smt", effort),
-    )
-    for engine, limit in attempts:
-        status = check(translator, denied, effort=limit, engine=engine).status
-        if status == "unsat":
-            return True
-        if status == "sat":
-            break
-    if check(translator, [*known, whole], effort=effort).status == "unsat":
-        return False
-    return None
-
-
-def opaque_sorts(formula: Term) -> set[OpaqueSort]:
-    """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
-    sorts: dict[Sort, None] = {}
-    for part in subterms(formula):
-        sorts[part.sort] = None
-        if isinstance(part, Quantified):
-            sorts.update((variable.sort, None) for variable in part.variables)
-    return {sort for sort in components(*sorts) if isinstance(sort, OpaqueSort)}
-
-
 def _solve(
     translator: Translator,
     labelled: Mapping[str, Term],
@@ -243,7 +183,10 @@ def _solve(
     given: Mapping[Variable, Value],
     effort: int,
     seed: int,
+    *,
+    small: bool,
 ) -> Solution:
+    """`small`: with small numbers, where that is possible."""
     fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
     free = free - set(fixed)
     tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
@@ -259,6 +202,17 @@ def _solve(
         parts = [translator.term(formula, {**fixed, **meanings}) for formula in labelled.values()]
         return [*translator.opaque_facts(), *parts]
 
+    def replayed(answer: Answer, engine: str = "z3", *, simple: bool = False) -> Solution | None:
+        """The values of its model, if they can be read and replayed."""
+        for smaller in (True,) if small else (False, True):
+            one = with_small_numbers(translator, whole, numbers, answer, seed=seed) if smaller else answer
+            values = _read(one.model, free) if one.model is not None else None
+            if values is None or (simple and not all(map(_is_simple, values.values()))):
+                continue
+            if replay(labelled.values(), {**values, **given}, beside=translator):
+                return Solution("sat", values, engine=engine)
+        return None
+
     reason = ""
     for plain, tables in ROUNDS:
         limit = max(1, int(effort * plain))
@@ -267,31 +221,23 @@ def _solve(
         answer = check(translator, background, effort=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)
-        answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
-        if answer.model is not None:
-            values = _read(answer.model, free)
-            simple = values is not None and all(_is_simple(value) for value in values.values())
-            if values is not None and simple and replay(labelled.values(), {**values, **given}, beside=translator):
-                return Solution("sat", values)
+        if solution := replayed(answer, simple=True):
+            return solution
         reason = answer.reason
-        if not functions:
-            limit = max(1, int(effort * tables))
-            answer = check(translator, background, effort=limit, tracked=tracked, engine="qsat")
-            if answer.status == "unsat":
-                return Solution("unsat", core=answer.core, engine="z3, qsat")
-            answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
-            values = _read(answer.model, free) if answer.model is not None else None
-            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
-                return Solution("sat", values, engine="z3, qsat")
+        limit = max(1, int(effort * tables))
         if functions:
-            limit = max(1, int(effort * tables))
             found = search_tables(translator, build, ordinary, functions, effort=limit, seed=seed)
             if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
                 return Solution("sat", found, engine="z3, functions as tables")
+            if solution := replayed(answer):
+                return solution
+        else:
+            answer = check(translator, background, effort=limit, tracked=tracked, engine="qsat")
+            if answer.status == "unsat":
+                return Solution("unsat", core=answer.core, engine="z3, qsat")
+            if solution := replayed(answer, "z3, qsat"):
+                return solution
         if answer.model is not None:
-            values = _read(answer.model, free)
-            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
-                return Solution("sat", values)
             reason = "the solver's model could not be replayed"
     return Solution("unknown", reason=reason or NO_ANSWER)
 
@@ -302,6 +248,8 @@ def _within_bounds(
     given: Mapping[Variable, Value],
     effort: int,
     seed: int,
+    *,
+    small: bool,
 ) -> Solution | None:
     """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
     zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
@@ -313,7 +261,7 @@ def _within_bounds(
     formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
     variables = frozenset(flat.variables(free) if flat else free)
     translator = Translator()
-    found = _solve(translator, formulas, variables, given, effort // 3, seed)
+    found = _solve(translator, formulas, variables, given, effort // 3, seed, small=small)
     if found.status == "sat":
         values = flat.values(found.values) if flat else found.values
         if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
@@ -321,7 +269,7 @@ def _within_bounds(
     if flat is None:
         return None
     del formulas[_INSIDE]
-    anywhere = _solve(Translator(), formulas, variables, given, effort // 3, seed)
+    anywhere = _solve(Translator(), formulas, variables, given, effort // 3, seed, small=small)
     return anywhere if anywhere.status == "unsat" else None
 
 
@@ -350,14 +298,6 @@ def _has_solution(
         return check(translator, asked, effort=effort, seed=seed).status == "sat"
     except (Unsupported, z3.Z3Exception):
         return False
-
-
-def is_partial(formula: Term) -> bool:
-    """Whether sequences or divisions occur."""
-    return any(
-        isinstance(part.sort, SequenceSort) or (isinstance(part, Arithmetic) and part.operator == "/")
-        for part in subterms(formula)
-    )
 
 
 def _is_simple(value: Value) -> bool:

@@ -17,7 +17,8 @@ from avow.formulas.formula import free_variables, negation
 from avow.language.terms import Term
 from avow.solving.checking import Status, put
 from avow.solving.limits import allowed
-from avow.solving.questions import entails, is_partial
+from avow.solving.questions import entails
+from avow.solving.replay import is_partial
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
 

@@ -15,7 +15,8 @@ from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction
 from avow.language.sorts import OpaqueSort
 from avow.language.terms import TRUE, Compare, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.solving.questions import opaque_sorts, solve
+from avow.solving.questions import solve
+from avow.solving.replay import opaque_sorts
 from avow.solving.second import CONTRADICTED, doubted
 from avow.tuning.bounds import SIZES_COMBINED, SIZES_TRIED
 
@@ -34,10 +35,10 @@ def in_every_size(
     verdict, reason = Verdict.PROVED, ""
     for sizes in _sizes(len(sorts)):
         types = {f"size of {sort.name}": _has(sort, size) for sort, size in zip(sorts, sizes, strict=True)}
-        found = solve({**together, **types}, effort=effort, seed=seed, shown=False)
+        found = solve({**together, **types}, effort=effort, seed=seed, values="unused")
         if found.status == "sat":
             continue
-        allowed = solve({**assumptions, **types}, effort=effort, seed=seed, shown=False).status
+        allowed = solve({**assumptions, **types}, effort=effort, seed=seed, values="unused").status
         where = _told(sorts, sizes)
         if allowed == "sat" and found.status == "unsat":
             if doubted(found, {**together, **types}):

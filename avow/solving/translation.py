@@ -10,7 +10,10 @@ likewise).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, assert_never
 
@@ -20,13 +23,21 @@ from avow.formulas.traversal import Steps, run
 from avow.language.operators import OPERATORS, implementation
 from avow.language.sorts import (
     INTEGER,
+    BoolSort,
     DataSort,
+    EnumSort,
     FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
     RealSort,
     SequenceSort,
     Sort,
     StringSort,
+    TupleSort,
+    components,
 )
+from avow.language.subterms import subterms
 from avow.language.terms import (
     And,
     Apply,
@@ -61,7 +72,7 @@ from avow.language.terms import (
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Expr, Meaning, Sorts, Unsupported
 
-__all__ = ["Expr", "Meaning", "Translator", "Unsupported"]
+__all__ = ["Expr", "Meaning", "Translator", "Unsupported", "translating_once"]
 
 
 class Translator(Sorts):
@@ -71,6 +82,8 @@ class Translator(Sorts):
         super().__init__(beside)
         self._constants: dict[Variable, Expr] = {}
         self._functions: dict[Variable, Any] = {}
+        self._whole: dict[int, tuple[Term, Expr]] = {}
+        """By identity, as formulas are deep."""
 
     # -- variables -----------------------------------------------------------------------------------------------------
 
@@ -113,7 +126,20 @@ class Translator(Sorts):
     ) -> Expr:
         """The Z3 expression of a term. `meanings` replaces free variables, `bound` gives bound variables of an outer
         quantifier. Raises Unsupported."""
-        return run(self._term(without_points(term), dict(bound or {}), meanings or {}))
+        if bound or meanings:
+            return run(self._term(without_points(term), dict(bound or {}), meanings or {}))
+        if id(term) not in self._whole:
+            copied = self._copied(term)
+            self._whole[id(term)] = term, run(self._term(without_points(term), {}, {})) if copied is None else copied
+        return self._whole[id(term)][1]
+
+    def _copied(self, term: Term) -> Expr | None:
+        """A copy of what a formula is elsewhere, with the sorts of this context; None where there is none."""
+        known = _known.get()
+        made = known.of(term) if known else None
+        if made is None or any(self.sort(sort).name() != name for sort, name in made.sorts):
+            return None
+        return made.expr.translate(self.context)
 
     def _term(self, term: Term, bound: Mapping[Variable, Expr], meanings: Mapping[Variable, Meaning]) -> Steps[Expr]:
         match term:
@@ -369,3 +395,56 @@ def _place(sort: Sort, constructor: str) -> int:
 
 def _is_written_out(term: SequenceRange) -> bool:
     return isinstance(term.low, Literal) and isinstance(term.high, Literal)
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A formula's expression in a context that is asked nothing, and the sorts that it names, by their names there."""
+
+    term: Term
+    expr: Expr
+    sorts: tuple[tuple[Sort, str], ...]
+
+
+@dataclass(slots=True)
+class _Known:
+    """Formulas translated once for many questions, each of which has a context of its own and gets copies.
+
+    A copy is made of the formula's structure alone. So a question's answer, and the steps that it takes, do not depend
+    on what else was asked before: what solvers and simplifiers do in one context depends on all that was built in it.
+    """
+
+    made: dict[int, _Made] = field(default_factory=dict)
+    """By the formula's identity."""
+    plain: Translator = field(default_factory=Translator)
+    """For formulas of which nothing is simplified or numbered as they are translated; others have one of their own."""
+
+    def of(self, term: Term) -> _Made:
+        """Raises Unsupported."""
+        if id(term) not in self.made:
+            asked = without_points(term)
+            parts = list(subterms(asked))
+            bound = [v.sort for part in parts if isinstance(part, Quantified) for v in part.variables]
+            sorts = tuple(dict.fromkeys(components(*(part.sort for part in parts), *bound)))
+            plain = not bound and all(isinstance(sort, _PLAIN) for sort in sorts)
+            translator = self.plain if plain else Translator()
+            expr = run(translator._term(asked, {}, {}))
+            named = [sort for sort in sorts if isinstance(sort, _NAMED)]
+            self.made[id(term)] = _Made(term, expr, tuple((sort, translator.sort(sort).name()) for sort in named))
+        return self.made[id(term)]
+
+
+_PLAIN = BoolSort | IntegerSort | NaturalSort | RealSort | StringSort
+_NAMED = DataSort | EnumSort | OpaqueSort | TupleSort
+
+_known: ContextVar[_Known | None] = ContextVar("formulas translated once", default=None)
+
+
+@contextmanager
+def translating_once() -> Iterator[None]:
+    """Within the block, a formula that several questions ask about is translated for the first of them only."""
+    before = _known.set(_Known())
+    try:
+        yield
+    finally:
+        _known.reset(before)

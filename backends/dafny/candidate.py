@@ -73,7 +73,7 @@ def _value(text: str, variable: Variable) -> Value | None:
 
 def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
     """Whether no assumption about these inputs alone is known to be false of them."""
-    from avow.solving.questions import replay  # Z3 is slow to import
+    from avow.solving.replay import replay  # Z3 is slow to import
 
     spoken = [
         a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys() and not histories(a.formula)

@@ -26,7 +26,8 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.solving.questions import replay, solve
+from avow.solving.questions import solve
+from avow.solving.replay import replay
 
 from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State

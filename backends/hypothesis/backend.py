@@ -26,7 +26,7 @@ from avow.isolation import judge
 from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Node
-from avow.solving.questions import opaque_sorts
+from avow.solving.replay import opaque_sorts
 
 from . import callbacks, export, wire
 from .judging import failure_bound

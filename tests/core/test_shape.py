@@ -54,6 +54,7 @@ ELSEWHERE = {
     "avow/solving/limits._kennel": PROCESS,
     "avow/solving/limits._spent": PROCESS,
     "avow/solving/smtlib._cvc5": ONCE,
+    "avow/solving/translation._known": "the formulas of one node that are translated, for the time of its claims",
     "avow/solving/z3_module.z3": ONCE,
     "avow/system/schema.plan_schema": ONCE,
     "backends/ajpf/spin_tool.version": ONCE,

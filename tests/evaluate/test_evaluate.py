@@ -462,7 +462,7 @@ def _random_values(rng: random.Random) -> dict[str, Value]:
 
 @pytest.mark.parametrize("seed", some(range(4), 1, slow=1))
 def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
-    from avow.solving.questions import replay
+    from avow.solving.replay import replay
 
     rng = random.Random(seed)
     variables = {"in.p": P, "in.q": Q, "in.h": H, "in.k": K, "in.c": C}

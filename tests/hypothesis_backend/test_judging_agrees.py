@@ -23,7 +23,7 @@ from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import BOOL, REAL, DataSort, EnumSort, FunctionSort
 from avow.language.terms import Variable
-from avow.solving.questions import replay
+from avow.solving.replay import replay
 from avow.system.plan import System
 
 __all__ = ["make_system"]

@@ -16,7 +16,8 @@ from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.terms import Not, Term, Variable
 from avow.sanity.realizability import realizable
-from avow.solving.questions import entails, replay, solve
+from avow.solving.questions import entails, solve
+from avow.solving.replay import replay
 
 few = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 

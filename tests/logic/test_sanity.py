@@ -9,7 +9,8 @@ from avow.base.verdict import Verdict
 from avow.formulas.values import FunctionValue
 from avow.language.contract import Node
 from avow.sanity.analysis import Bounds, Property, SanityResult, analyse, claims, node_key, outcomes
-from avow.solving.questions import replay, solve
+from avow.solving.questions import solve
+from avow.solving.replay import replay
 
 from .contracts import case_study, contract, node
 

@@ -13,7 +13,8 @@ from avow.formulas.values import FunctionValue
 from avow.language.sorts import BOOL, STRING, OpaqueSort
 from avow.language.terms import Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.counterexample import show_values
-from avow.solving.questions import Entailment, entails, replay, solve
+from avow.solving.questions import Entailment, entails, solve
+from avow.solving.replay import replay
 
 from .contracts import contract, formula
 
