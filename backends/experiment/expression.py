@@ -13,16 +13,17 @@ import re
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
-
-from lark import Token
-from lark.exceptions import UnexpectedInput, UnexpectedToken
+from typing import TYPE_CHECKING, Any
 
 from avow.base.grammars import lark_of
 from avow.base.records import dataclass
 
 from .statistics import root
 from .tuning import EXPRESSION_DEPTH, EXPRESSION_LENGTH
+
+if TYPE_CHECKING:
+    from lark import Token
+    from lark.exceptions import UnexpectedInput
 
 ALLOWED = "a measure is a column, the difference of two columns, or abs, hypot or max of these"
 
@@ -63,6 +64,8 @@ class Expression:
 
 def parse(text: str) -> Expression:
     """Raises Malformed."""
+    from lark.exceptions import UnexpectedInput  # a run that measures nothing imports no grammar
+
     if len(text) > EXPRESSION_LENGTH:
         raise Malformed(f"longer than {EXPRESSION_LENGTH} characters", 0)
     try:
@@ -118,6 +121,8 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., Interval], int]] = {
 
 
 def _unexpected(text: str, error: UnexpectedInput) -> Malformed:
+    from lark.exceptions import UnexpectedToken
+
     at = len(text) if isinstance(error, UnexpectedToken) and error.token.type == "$END" else error.pos_in_stream or 0
     wanted = "a column" if isinstance(error, UnexpectedToken) and "NAME" in error.accepts else "',' or ')'"
     if at == len(text):
