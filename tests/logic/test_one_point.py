@@ -49,6 +49,8 @@ from avow.language.terms import (
     TupleTerm,
     Variable,
 )
+from avow.sanity.witness_candidates import Definition
+from avow.sanity.witnesses import applied
 from avow.solving.checking import check
 from avow.solving.questions import Translator, entails
 
@@ -236,3 +238,15 @@ def test_the_solver_finds_no_difference(seed: int) -> None:
     translator, whole = Translator(), _Drawn(seed).quantified(_INPUTS, 2)
     plain = run(translator._term(whole, {}, {}))
     assert check(translator, [plain != translator.term(whole)], effort=200_000).status != "sat"
+
+
+def test_what_a_witness_defines_is_seen_and_catches_nothing() -> None:
+    """Its constants have names that a quantifier of the formula may have, too."""
+    output = Variable(Role.OUTPUT, "f", FunctionSort((INTEGER,), BOOL))
+    chosen, at = (Variable(Role.BOUND, name, INTEGER) for name in ("x", "at"))
+    positive = Compare(">", chosen, Literal(0, INTEGER))
+    guarantee = Quantified(Quantifier.FORALL, (chosen,), Implies(Apply(output, (chosen,), BOOL), positive))
+    defined = applied(guarantee, {output: Definition((at,), Compare("==", at, chosen))})
+    assert free_variables(defined) == {chosen}
+    assert entails([without_points(defined)], positive).verdict is Verdict.PROVED
+    assert not isinstance(without_points(defined), Quantified)
