@@ -57,7 +57,8 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
 
     contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
-    translated = getattr(module, f"to_{notation}")(contract)
+    translate = getattr(module, "FORMATS", {}).get(notation) or getattr(module, f"to_{notation}")
+    translated = translate(contract)
     text = translated if isinstance(translated, str) else translated.text
     missing = [] if isinstance(translated, str) else translated.missing
     if missing and not text:
