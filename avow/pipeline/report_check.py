@@ -45,8 +45,6 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
         case = from_json(json.loads(text))
     except (OSError, ValueError, RecursionError) as error:
         return (f"report.json cannot be read: {error}",)
-    except Unreadable as error:
-        return (f"report.json is no case: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]
     found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger, root)

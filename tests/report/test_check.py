@@ -131,7 +131,7 @@ def test_a_report_without_a_ledger_or_without_json_does_not_agree(place: Path) -
     (place / "report/report.json").write_text("{")
     assert "cannot be read" in found(place)[0]
     (place / "report/report.json").write_text("{}")
-    assert "is no case" in found(place)[0]
+    assert "not a case of format" in found(place)[0]
 
 
 def test_changed_sources_are_told(place: Path) -> None:
