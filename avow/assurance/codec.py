@@ -13,7 +13,7 @@ from avow.base import codec
 from avow.base.codec import Unreadable, document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
-from avow.evidence.record import Evidence
+from avow.evidence.ledger import Line
 
 SCHEMA = "https://avow.invalid/schemas/case-4"
 """Names the format in ``report.json``; raised when it changes incompatibly."""
@@ -56,41 +56,14 @@ def baseline_from_json(data: object) -> Baseline:
 
 def case_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of ``report.json``."""
-    definitions: dict[str, Any] = {}
-    codec.schema(Case, definitions)
-    body = definitions.pop("Case")
-    body["properties"] = {"schema": {"const": SCHEMA}, **body["properties"]}
-    body["required"] = ["schema", *body["required"]]
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": SCHEMA,
-        "title": "Avow assurance case",
-        **body,
-        "$defs": dict(sorted(definitions.items())),
-    }
+    whole = codec.published(Case, SCHEMA, "Avow assurance case")
+    properties, required = {"schema": {"const": SCHEMA}, **whole["properties"]}, ["schema", *whole["required"]]
+    return {**whole, "properties": properties, "required": required}
 
 
 def evidence_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of one line of the ledger."""
-    definitions: dict[str, Any] = {}
-    codec.schema(Evidence, definitions)
-    mark = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "https://avow.invalid/schemas/evidence-1",
-        "title": "A line of Avow's evidence ledger",
-        "description": "hash: SHA-256 of the line's canonical JSON without it; prev: the hash of the line before.",
-        "type": "object",
-        "properties": {
-            "evidence": {"$ref": "#/$defs/Evidence"},
-            "hash": mark,
-            "n": {"type": "integer", "minimum": 0},
-            "prev": mark,
-        },
-        "required": ["evidence", "hash", "n", "prev"],
-        "additionalProperties": False,
-        "$defs": dict(sorted(definitions.items())),
-    }
+    return codec.published(Line, "https://avow.invalid/schemas/evidence-1", "A line of Avow's evidence ledger")
 
 
 def _write_schemas(folder: Path) -> None:

@@ -328,6 +328,15 @@ def schema(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     return dict(_PLAIN[kind])
 
 
+def published(kind: type, identifier: str, title: str) -> dict[str, Any]:
+    """The JSON schema of a document, whole: that of its dataclass, with what it is called."""
+    definitions: dict[str, Any] = {}
+    schema(kind, definitions)
+    body = definitions.pop(kind.__name__)
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": identifier, "title": title}
+    return {**head, **body, "$defs": dict(sorted(definitions.items()))}
+
+
 _PLAIN: dict[Any, dict[str, Any]] = {
     Any: {},
     object: {},

@@ -58,6 +58,14 @@ class Statement:
 
 
 @dataclass(frozen=True, slots=True)
+class Head:
+    """What ``<ledger>.head`` holds: the newest record's hash, and how many records there are."""
+
+    hash: str
+    records: int
+
+
+@dataclass(frozen=True, slots=True)
 class Index:
     """What can be read of the index, and in words what cannot. `marks` are the lines' hashes, for signatures."""
 

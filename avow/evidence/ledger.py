@@ -24,17 +24,16 @@ import os
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-from avow.base.codec import Unreadable, canonical
+from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
 from avow.base.files import read_regular, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
-from avow.evidence.encoding import decode, encode
+from avow.evidence.encoding import encode
 from avow.evidence.heads import GENESIS as GENESIS
-from avow.evidence.heads import Event, index_path, note
+from avow.evidence.heads import Event, Head, index_path, note
 from avow.evidence.record import CASE, Evidence
 
 
@@ -46,6 +45,17 @@ class Entry:
     previous: str
     hash: str
     evidence: Evidence
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of Avow's evidence ledger. hash: SHA-256 of the line's canonical JSON without it, in hexadecimal; n: lines
+    count from 0; prev: the hash of the line before."""
+
+    evidence: Evidence
+    hash: str
+    n: int
+    prev: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +181,7 @@ class Ledger:
                 self._refresh()
                 self._remember()
             if lines and not cut:  # a new head would make the cut unseen; a ledger deleted as a whole begins anew
-                write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
+                self._write_head(Head(previous, number))
             return tuple(result)
 
     def accept_end(self) -> None:
@@ -180,7 +190,7 @@ class Ledger:
             assert not self._held, "nothing is written while the ledger is to stand still"
             self._mend(file)
             self._refresh()
-            write(self._head_file, canonical({"hash": self._stated_head, "records": self._lines}) + "\n")
+            self._write_head(Head(self._stated_head, self._lines))
 
     # -- inside -------------------------------------------------------------------------------------------------
 
@@ -275,9 +285,10 @@ class Ledger:
         number = self._lines
         self._lines += 1
         try:
-            data = _parsed(line)
+            data = json.loads(line)
             entry = _entry(data)
-        except Unreadable as problem:
+            evidence = canonical(data["evidence"])
+        except (ValueError, RecursionError) as problem:
             self._damage.append(Damage(number + 1, f"cannot be read as a record: {problem}"))
             return
         follows = entry.previous == self._stated_head and entry.number == number
@@ -285,7 +296,6 @@ class Ledger:
         if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
-        evidence = canonical(data["evidence"])
         identity = evidence.encode()
         mark, spelled = _spell(evidence, entry.number, entry.previous)
         if mark != entry.hash:
@@ -313,19 +323,19 @@ class Ledger:
             return ()
         return (Damage(self._lines + 1, "is no record, nor the beginning of one"),)
 
+    def _write_head(self, head: Head) -> None:
+        write(self._head_file, canonical(to_json(head)) + "\n")
+
     def _cut_off(self) -> tuple[Damage, ...]:
         try:
-            stated = json.loads(read_regular(self._head_file))
-            mark, count = str(stated["hash"]), int(stated["records"])
+            stated = from_text(Head, read_regular(self._head_file))
         except FileNotFoundError:
             return ()
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, Unreadable):
             return (Damage(self._lines + 1, f"{self._head_file.name} cannot be read"),)
-        if count > self._lines:
-            return (Damage(self._lines + 1, f"{count - self._lines} record(s) were cut off the end"),)
-        if not any(entry.hash == mark and entry.number == count - 1 for entry in self._entries[-64:]) and not any(
-            entry.hash == mark for entry in self._entries
-        ):
+        if stated.records > self._lines:
+            return (Damage(self._lines + 1, f"{stated.records - self._lines} record(s) were cut off the end"),)
+        if not any(entry.hash == stated.hash for entry in reversed(self._entries)):  # nearly always one of the last
             return (Damage(self._lines, f"is not the newest record that {self._head_file.name} names"),)
         return ()
 
@@ -351,20 +361,7 @@ def _identity(info: os.stat_result) -> tuple[int, ...]:
     return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
 
 
-def _parsed(line: bytes) -> dict[str, Any]:
-    try:
-        data = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise Unreadable(f"not JSON ({error})") from error
-    if not isinstance(data, dict) or data.keys() != {"evidence", "hash", "n", "prev"}:
-        raise Unreadable("not a ledger line")
-    return data
-
-
-def _entry(data: dict[str, Any]) -> Entry:
-    number, previous, mark = data["n"], data["prev"], data["hash"]
-    if isinstance(number, bool) or not isinstance(number, int):
-        raise Unreadable("n is not a number")
-    if not isinstance(previous, str) or not isinstance(mark, str):
-        raise Unreadable("hash and prev are not texts")
-    return Entry(number, previous, mark, decode(data["evidence"]))
+def _entry(data: object) -> Entry:
+    """Raises Unreadable."""
+    line = from_json(Line, data)
+    return Entry(line.n, line.prev, line.hash, line.evidence)

@@ -7,11 +7,11 @@ index of ledgers is signed in the same way: so a ledger that is gone as a whole,
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from avow.base.codec import canonical, from_text, to_json
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular, write
 from avow.base.records import dataclass
@@ -56,6 +56,17 @@ class Signed:
     marks: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """What ``<ledger>.sig`` holds: the hash of the newest line covered, and how many are; key and signature
+    in hexadecimal."""
+
+    hash: str
+    public_key: str
+    records: int
+    signature: str
+
+
 def sign(path: Path, chain: Signed, private: Path) -> Path:
     """Sign the newest line, and with it all before; the signature is written to `path`. Raises Rejected: nothing to
     sign, no such key."""
@@ -65,7 +76,7 @@ def sign(path: Path, chain: Signed, private: Path) -> Path:
     head, count = chain.marks[-1], len(chain.marks)
     signature = key.sign(_message(chain.name, head, count))
     public = key.public_key().public_bytes_raw().hex()
-    write(path, json.dumps({"hash": head, "public_key": public, "records": count, "signature": signature.hex()}) + "\n")
+    write(path, canonical(to_json(Signature(head, public, count, signature.hex()))) + "\n")
     return path
 
 
@@ -79,12 +90,12 @@ def verify_signature(path: Path, chain: Signed, public: Path | None) -> tuple[st
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     try:
-        data = json.loads(read_regular(path))
-        head, count = str(data["hash"]), int(data["records"])
-        signature, own = bytes.fromhex(data["signature"]), bytes.fromhex(data["public_key"])
+        said = from_text(Signature, read_regular(path))
+        signature, own = bytes.fromhex(said.signature), bytes.fromhex(said.public_key)
         key = public_key(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         return f"{path.name} cannot be read as a signature: {error}", 0
+    head, count = said.hash, said.records
     try:
         key.verify(signature, _message(chain.name, head, count))
     except InvalidSignature:

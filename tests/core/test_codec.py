@@ -15,10 +15,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from avow.assurance import codec as cases
 from avow.backend_kit.timeline import timelines
 from avow.base.codec import LATER, Unreadable, called, canonical, from_json, from_text, schema, to_json
+from avow.calculus import certificate_json
 from avow.calculus.kept_answers import KeptAnswers
 from avow.evidence.heads import read_index
+from avow.evidence.ledger import Ledger
+from avow.evidence.signing import Signed, signature_path, verify_signature
 from avow.isolation.observed import Observed
 from avow.kernel.solvers import Said
 
@@ -159,7 +163,7 @@ def test_a_text_that_is_none_of_ours_is_unreadable(text: str | bytes) -> None:
 
 
 def test_what_was_stored_reads_back_and_is_written_the_same(tmp_path: Path) -> None:
-    """Written by the release before rows were the codec's."""
+    """Written by the releases before the codec took the form over: rows; the ledger's lines and head."""
     stored = json.loads(Path(__file__).with_name("stored.json").read_text())
     (timeline,) = timelines({"timeline": [stored["timeline"]]})
     assert to_json(timeline) == stored["timeline"]
@@ -173,3 +177,22 @@ def test_what_was_stored_reads_back_and_is_written_the_same(tmp_path: Path) -> N
     assert (found.damage, [s.event for s in found.statements]) == ((), ["began", "reached", "acknowledged"])
     assert found.statements[2].note == "A. Person: seen"
     assert found.marks == tuple(json.loads(line)["hash"] for line in stored["index"])
+    assert canonical(cases.to_json(cases.from_json(json.loads(stored["case"])))) == stored["case"]
+    certificate = certificate_json.from_json(json.loads(stored["certificate"]))
+    assert canonical(certificate_json.to_json(certificate)) == stored["certificate"]
+
+
+def test_a_stored_ledger_is_whole_and_would_be_written_the_same(tmp_path: Path) -> None:
+    stored = json.loads(Path(__file__).with_name("stored.json").read_text())
+    path = tmp_path / "rover.jsonl"
+    path.write_text("".join(f"{line}\n" for line in stored["ledger"]))
+    (head := path.with_name("rover.jsonl.head")).write_text(stored["head"])
+    signature_path(path).write_text(stored["signature"])
+    ledger = Ledger(path)
+    assert ledger.damage == ()
+    signed = Signed("rover", tuple(entry.hash for entry in ledger.records()))
+    assert verify_signature(signature_path(path), signed, None) == (None, 3)
+    again = Ledger(tmp_path / "again" / "rover.jsonl")
+    again.append_all([entry.evidence for entry in ledger.records()])
+    assert again.path.read_bytes() == path.read_bytes()
+    assert again.path.with_name(head.name).read_text() == stored["head"]

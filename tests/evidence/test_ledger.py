@@ -102,12 +102,22 @@ def test_a_torn_last_line_is_put_aside_and_the_chain_goes_on(tmp_path: Path) -> 
     [
         (lambda lines: [lines[0], lines[1].replace(b"proved", b"tested"), *lines[2:]], 2, "changed after"),
         (lambda lines: [lines[0], b"garbage\n", *lines[2:]], 2, "cannot be read"),
+        (
+            lambda lines: [lines[0], lines[1].replace(b'"seconds":0.25', b'"seconds":NaN'), *lines[2:]],
+            2,
+            "cannot be read",
+        ),
+        (
+            lambda lines: [lines[0], lines[1].replace(b'"bound":{', b'"bound":{"p":1e999'), *lines[2:]],
+            2,
+            "cannot be read",
+        ),
         (lambda lines: [lines[0], *lines[2:]], 2, "does not follow"),
         (lambda lines: [lines[1], lines[0], *lines[2:]], 1, "does not follow"),
         (lambda lines: [lines[0], lines[0], *lines[1:]], 2, "does not follow"),
         (lambda lines: lines[:-1], 4, "cut off"),
     ],
-    ids=["edited", "garbled", "removed", "swapped", "inserted", "cut off"],
+    ids=["edited", "garbled", "no number", "beyond numbers", "removed", "swapped", "inserted", "cut off"],
 )
 def test_damage_is_named_and_edited_records_are_not_believed(tmp_path: Path, change, line: int, word: str) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "x.jsonl"
@@ -116,6 +126,15 @@ def test_damage_is_named_and_edited_records_are_not_believed(tmp_path: Path, cha
     ledger = Ledger(path)
     assert any(d.line == line and word in d.reason for d in ledger.damage), ledger.damage
     assert all(e.evidence in [x.evidence for x in entries] for e in ledger.records())
+
+
+@pytest.mark.parametrize(
+    "head", ["", "[" * 100_000, "{}", '{"hash": "", "records": "3"}', '{"hash": null, "records": 1}']
+)
+def test_a_head_that_is_none_is_damage(tmp_path: Path, head: str) -> None:
+    Ledger(tmp_path / "x.jsonl").append_all(some(1))
+    (tmp_path / "x.jsonl.head").write_text(head)
+    assert [d.reason for d in Ledger(tmp_path / "x.jsonl").damage] == ["x.jsonl.head cannot be read"]
 
 
 def test_a_ledger_rechained_after_an_edit_is_given_away_by_its_head(tmp_path: Path) -> None:

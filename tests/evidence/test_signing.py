@@ -64,8 +64,10 @@ def test_another_key_or_a_changed_count_is_refused(ledger: Ledger, tmp_path: Pat
     path = signature_path(ledger.path)
     path.write_text(json.dumps({**json.loads(path.read_text()), "records": 1}))
     assert verify_signature(ledger, None)
-    path.write_text("{}")
-    assert "cannot be read" in (verify_signature(ledger, None) or "")
+    whole = json.loads(path.read_text())
+    for bad in ({}, [], {**whole, "records": "2"}, {**whole, "signature": "é"}, {**whole, "more": 1}):
+        path.write_text(json.dumps(bad))
+        assert "cannot be read" in (verify_signature(ledger, None) or "")
 
 
 def test_bad_keys_and_empty_ledgers_are_refused(ledger: Ledger, tmp_path: Path) -> None:
