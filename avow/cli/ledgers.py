@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -49,11 +50,9 @@ def audit_system(
 ) -> tuple[tuple[Discrepancy, ...], int]:
     """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
     ledger = Ledger(place.ledger(name))
-    try:
+    with readable(ledger.path):
         found = discrepancies(place, ledger, _surveyed(place, name), anchors, strict=True)
         count = len(ledger.records())
-    except OSError as error:
-        raise Rejected(Diagnostic("LEDGER001", f"{place.ledger(name)} cannot be read: {error.strerror}")) from None
     return (*found, *_signature(place.ledger(name), _head_of(ledger), public_key)), count
 
 
@@ -76,8 +75,15 @@ def audit_index(place: Workspace, public_key: str | None = None) -> tuple[Discre
 
 def _index(place: Workspace) -> Index:
     path = index_path(place.ledgers)
-    try:
+    with readable(path):
         return read_index(path)
+
+
+@contextlib.contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raises Rejected (``LEDGER001``) for the OSError of a ledger, or their index, that is there and cannot be read."""
+    try:
+        yield
     except OSError as error:
         raise Rejected(Diagnostic("LEDGER001", f"{path} cannot be read: {error.strerror}")) from None
 

@@ -54,7 +54,7 @@ def _check(folder: Path, as_json: bool) -> int:
     place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())
     case = read_case(folder)
     path = place.ledger(case.system) if place else None
-    ledger = Ledger(path) if path is not None and path.is_file() else None
+    ledger = Ledger(path) if path is not None and path.exists() else None
     found = check(folder, ledger, place.root if place else None)
     old = stale(case, place.root) if place else ()
     if as_json:

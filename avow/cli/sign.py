@@ -49,7 +49,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     if not who.strip():
         raise Rejected(Diagnostic("SIGN005", "--as: a name is wanted"))
     ledger = place.ledger(case.system)
-    wrong = check(folder, Ledger(ledger) if ledger.is_file() else None, place.root)
+    wrong = check(folder, Ledger(ledger) if ledger.exists() else None, place.root)
     wrong += tuple(f"{path} has changed since the evidence was made" for path in stale(case, place.root))
     if wrong:
         more = f" (and {len(wrong) - 1} more; see `avow report --check {folder}`)" if len(wrong) > 1 else ""

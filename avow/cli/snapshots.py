@@ -14,7 +14,7 @@ from avow.assurance.model import RunInfo
 from avow.base import git
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.workspace import Workspace
-from avow.evidence.ledger import Ledger
+from avow.evidence.ledger import Entry, Ledger
 
 
 def pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
@@ -35,7 +35,7 @@ def snapshots(name: str | None) -> dict[str, Snapshot]:
     """System → its snapshot, from a report, a ledger, a revision, or (None) the workspace as it is. Raises Rejected."""
     path = Path(name) if name is not None else None
     if path is not None and path.suffix == ".jsonl" and path.is_file():
-        return {path.stem: of_ledger(path.stem, Ledger(path).records())}
+        return {path.stem: of_ledger(path.stem, _records(path))}
     if path is not None and (path.is_file() or (path / "report.json").is_file()):
         case = read_case(path)
         return {case.system: of_case(case)}
@@ -47,6 +47,14 @@ def snapshots(name: str | None) -> dict[str, Snapshot]:
     with tempfile.TemporaryDirectory() as folder:
         _checkout(place, name, Path(folder))
         return _of_contracts(Workspace(Path(folder)), place)
+
+
+def _records(path: Path) -> tuple[Entry, ...]:
+    """Raises Rejected."""
+    from avow.cli.ledgers import readable
+
+    with readable(path):
+        return Ledger(path).records()
 
 
 def _checkout(place: Workspace, revision: str, folder: Path) -> None:
@@ -72,7 +80,7 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]
         case = build_case(
             system,
             surveyed.catalogue.obligations,
-            Ledger(place.ledger(system.name)).records(),
+            _records(place.ledger(system.name)),
             keys=surveyed.keys,
             today=date.today(),
             run=RunInfo("diff", "", 0.0, __version__),

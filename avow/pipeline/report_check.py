@@ -47,7 +47,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
         return (f"report.json cannot be read: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]
-    found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger, root)
+    found += [_NO_LEDGER] if ledger is None else _ledger(case, ledger, root)
     if root is not None:
         found += [*_sources(case, root), *_kernel(case, root)]
     elif case.kernel.established:
@@ -62,6 +62,19 @@ def stale(case: Case, root: Path) -> tuple[str, ...]:
     marks = {pair for record in counting for pair in record.inputs.items()}
     seen = {path for record in counting for path in changed(record, root)}
     return tuple(sorted(seen | {path for path, mark in marks if _digest(root / path) != mark}))
+
+
+def differences(case: Case, path: Path, root: Path) -> tuple[str, ...]:
+    """Every way in which a case that was read differs from the ledger at `path`, as `check` tells it. Raises OSError
+    where there is a ledger that cannot be read."""
+    if not path.exists():
+        return (_NO_LEDGER,)
+    ledger = Ledger(path)
+    ledger.records()
+    return tuple(_ledger(case, ledger, root))
+
+
+_NO_LEDGER = "there is no ledger to compare with"
 
 
 def _digest(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -139,3 +140,13 @@ def test_attestations_are_envelopes_where_a_key_signs(workspace: Path) -> None:
     changed = lines[0].replace('"payload": "e', '"payload": "f')
     assert isinstance(unseal(changed, [public]), str)
     assert avow(workspace, "verify")[0] == 0  # it is no signature of a case, and none is looked for in it
+
+
+@pytest.mark.slow
+def test_no_report_is_compared_with_a_ledger_that_cannot_be_read(workspace: Path) -> None:
+    assert avow(workspace, "diff", "reports/s")[0] == 0
+    ledger = workspace / "artifacts/ledger/s.jsonl"
+    ledger.unlink()
+    os.mkfifo(ledger)
+    code, text = avow(workspace, "diff", "reports/s")
+    assert (code, text.count("LEDGER001")) == (2, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -181,3 +182,30 @@ def test_doctor_prints_install_commands_whole(
         main(["doctor"])
     assert done.value.code == 0
     assert "pip install 'avow[signing]'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("how", ["fifo", "folder", "cut", "gone", "edited"])
+def test_what_a_report_says_is_shown_with_what_its_ledger_says(root: Path, how: str) -> None:
+    ledger = root / "artifacts/ledger/rover.jsonl"
+    lines = ledger.read_text().splitlines(keepends=True)
+    ledger.unlink()
+    match how:
+        case "fifo":
+            os.mkfifo(ledger)
+        case "folder":
+            ledger.mkdir()
+        case "cut":
+            ledger.write_text("".join(lines[:-1]))
+        case "edited":
+            ledger.write_text("".join([*lines[:-1], lines[-1].replace("later", "never")]))
+    if how in ("fifo", "folder"):
+        for words in (["radiationSensor"], ["radiationSensor.medium", "--json"]):
+            with pytest.raises(Rejected) as caught:
+                run(explain, *words)
+            assert [d.code for d in caught.value.diagnostics] == ["LEDGER001"]
+    else:
+        code, text = run(explain, "radiationSensor")
+        assert (code, text.count("rover: as of an earlier state")) == (1, 1)
+        code, text = run(explain, "radiationSensor.medium", "--json")
+        assert (code, list(json.loads(text)["differences"])) == (1, ["rover"])
+    assert run(report, "--check", "reports/rover")[0] == 1
