@@ -1,4 +1,4 @@
-"""Cases as JSON, there and back, and the JSON schemas of cases and evidence (`avow.base.codec`)."""
+"""Cases as JSON, there and back, and the JSON schemas that are published (`avow.base.codec`)."""
 
 from __future__ import annotations
 
@@ -66,11 +66,20 @@ def evidence_schema() -> dict[str, Any]:
     return codec.published(Line, "https://avow.invalid/schemas/evidence-1", "A line of Avow's evidence ledger")
 
 
-def _write_schemas(folder: Path) -> None:
-    """Write the published schemas (``python -m avow.assurance.codec docs/schemas``)."""
-    for name, schema in (("case", case_schema()), ("evidence", evidence_schema())):
-        write(folder / f"{name}.schema.json", document(schema) + "\n")
+def schemas() -> dict[str, dict[str, Any]]:
+    """The published schemas that follow from dataclasses, by the names of their files."""
+    from avow.calculus.document import ComposeDocument
+    from avow.sanity.document import SanityDocument
+
+    place = "https://avow.example/schemas/"
+    return {
+        "case": case_schema(),
+        "evidence": evidence_schema(),
+        "compose": codec.published(ComposeDocument, f"{place}compose.schema.json", "avow compose --json"),
+        "sanity": codec.published(SanityDocument, f"{place}sanity.schema.json", "avow sanity --json"),
+    }
 
 
-if __name__ == "__main__":
-    _write_schemas(Path(sys.argv[1]))
+if __name__ == "__main__":  # python -m avow.assurance.codec docs/schemas
+    for name, found in schemas().items():
+        write(Path(sys.argv[1]) / f"{name}.schema.json", document(found) + "\n")

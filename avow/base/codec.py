@@ -307,7 +307,7 @@ def schema(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
             definitions[kind.__name__] = {}
             fields, later = _fields(kind), _later(kind)
             definitions[kind.__name__] = {
-                "description": (kind.__doc__ or "").strip().split("\n\n")[0],
+                "description": " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split()),
                 "type": "object",
                 "properties": {key: schema(field.hint, definitions) for key, field in fields.items()},
                 "required": [key for key in fields if key not in later],

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from avow.base import codec
 from avow.base.codec import document
-from avow.base.verdict import in_words
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
 from avow.cli.progress import progress
 from avow.solving.limits import from_seconds
@@ -97,7 +95,9 @@ def command(
             settled.append(outcome)
     outcomes = tuple(settled)
     if as_json:
-        click.echo(document(to_json(composition, chosen, obligations, outcomes)))
+        from avow.calculus.document import told
+
+        click.echo(document(told(composition, chosen, obligations, outcomes)))
     else:
         _listing(composition, chosen, obligations, outcomes)
     fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
@@ -108,54 +108,6 @@ class _Limits:
     def __init__(self, seconds: float, seed: int) -> None:
         self.seconds = seconds
         self.seed = seed
-
-
-def to_json(
-    composition: Composition, goals: list[Goal], obligations: list[Obligation], outcomes: tuple[Outcome, ...]
-) -> dict[str, Any]:
-    """As docs/schemas/compose.schema.json describes it."""
-    from avow.calculus.notation import write_goal
-
-    written = [write_goal(goal, composition.known(goal)) for goal in goals]
-    graph = composition.frame.graph
-    return {
-        "system": composition.frame.system.name,
-        "graph": {
-            "nodes": graph.nodes,
-            "edges": [
-                {"from": str(e.source), "to": str(e.target), "delayed": e.delayed, "declared": e.declared}
-                for e in graph.edges
-            ],
-            "environment": [str(endpoint) for endpoint in graph.environment],
-            "dangling": [str(endpoint) for endpoint in graph.dangling],
-            "findings": [{"code": f.code, "severity": f.severity, "message": f.message} for f in graph.findings],
-        },
-        "subsystems": [
-            {
-                "name": subsystem.name,
-                "nodes": subsystem.members,
-                "contract": composition.goal(subsystem.name).contract,
-            }
-            for subsystem in composition.frame.system.plan.subsystems
-        ],
-        "derivations": [{key: told for key, told in codec.to_json(one).items() if key != "html"} for one in written],
-        "obligations": [
-            {
-                "id": obligation.local_id,
-                "claim": obligation.claim,
-                "formula": obligation.formula,
-                "digest": obligation.digest,
-                "verdict": outcome.verdict,
-                "summary": outcome.summary,
-                "vacuous": outcome.vacuous,
-                "hypotheses": in_words(outcome.rests_on, outcome.hypotheses),
-                "counterexample": dict(outcome.counterexample.values) if outcome.counterexample else None,
-                "run": [dict(step) for step in outcome.counterexample.trace] if outcome.counterexample else [],
-                "details": outcome.details,
-            }
-            for obligation, outcome in zip(obligations, outcomes, strict=True)
-        ],
-    }
 
 
 _COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refuted": "red"}

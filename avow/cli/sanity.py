@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -40,6 +40,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     from avow.calculus.interpretation import interpretation, ranges
     from avow.calculus.variables import frame
     from avow.sanity.analysis import Bounds, analyse
+    from avow.sanity.document import SanityDocument, told
     from avow.system.load import load_path
 
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
@@ -60,43 +61,10 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]
     if as_json:
-        click.echo(document({"results": [to_json(result) for result in results]}))
+        click.echo(document(SanityDocument(tuple(map(told, results)))))
     else:
         _listing(results, everything)
     return 1 if any(result.fails or result.verdict is Verdict.ERROR for result in results) else 0
-
-
-def to_json(result: SanityResult) -> dict[str, Any]:
-    """One result as docs/schemas/sanity.schema.json describes it."""
-    return {
-        "node": result.node,
-        "property": result.about,
-        "subject": result.subject,
-        "name": result.name,
-        "claim": result.claim,
-        "verdict": result.verdict,
-        "severity": result.severity,
-        "clauses": result.clauses,
-        "counterexample": _counterexample(result.counterexample),
-        "explanation": result.explanation,
-        "conflicts": [
-            {"clauses": clauses, "counterexample": _counterexample(shown)} for clauses, shown in result.conflicts
-        ],
-        "cut_short": result.cut_short,
-        "because": result.because,
-        "engine": result.engine,
-        "bounded": result.bounded,
-        "seconds": round(result.seconds, 3),
-        "place": {"file": result.span.file, "line": result.span.line, "column": result.span.column}
-        if result.span
-        else None,
-    }
-
-
-def _counterexample(shown: Counterexample | None) -> dict[str, Any] | None:
-    if shown is None:
-        return None
-    return {"values": dict(shown.values), "explanation": shown.explanation, "text": shown.text()}
 
 
 _COLOURS = {

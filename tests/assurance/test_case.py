@@ -25,7 +25,7 @@ from assurance.sample import (
 )
 from avow.assurance.answers import How
 from avow.assurance.case import conclude_again
-from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
+from avow.assurance.codec import case_schema, from_json, schemas, to_json
 from avow.assurance.model import Case, Currency, Derivation, SideCondition
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
@@ -424,7 +424,7 @@ def test_other_json_is_no_case(bad: object) -> None:
         from_json(bad)
 
 
-@pytest.mark.parametrize(("name", "schema"), [("case", case_schema()), ("evidence", evidence_schema())])
+@pytest.mark.parametrize(("name", "schema"), schemas().items())
 def test_published_schemas_are_up_to_date(name: str, schema: dict[str, Any]) -> None:
     published = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
     assert published == schema, "write it again: python -m avow.assurance.codec docs/schemas"

@@ -108,8 +108,8 @@ def test_every_property_has_its_words_in_the_schema(root: Path) -> None:
     from avow.sanity.claims import Property
 
     schema = json.loads((root / "docs/schemas/sanity.schema.json").read_text())
-    described = schema["$defs"]["result"]["properties"]["property"]
-    assert set(described["enum"]) == {str(p) for p in Property}
+    described = schema["$defs"]["Result"]
+    assert set(described["properties"]["property"]["enum"]) == {str(p) for p in Property}
     assert all(f"{p}:" in described["description"] for p in Property)
     page = (root / "docs/sanity.md").read_text()
     assert all(re.search(rf"`{p}[-`]", page) for p in Property)
