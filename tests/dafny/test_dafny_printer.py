@@ -27,7 +27,7 @@ from avow.solving.questions import entails
 MakeJob = Callable[..., Job]
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
 GOLDEN = Path(__file__).parent / "golden"
-REFRESH = "AVOW_REFRESH_GOLDEN"
+REFRESH = "AVOW_REFRESH"
 
 
 def everything(node: Node) -> Generated:

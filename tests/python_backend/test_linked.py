@@ -196,5 +196,5 @@ def test_the_report_says_how_the_link_stands(tmp_path: Path) -> None:
     written(tmp_path / "s")
     (claim,) = (o for o in catalogue(load_system(tmp_path / "s")).obligations if o.name == "agrees-with-model")
     views: Any = [SimpleNamespace(obligation=claim, standing=Status.REFUTED)]
-    assert linked("limiter", views) == "program agrees: refuted"
-    assert linked("other", views) == ""
+    assert linked(views) == "program agrees: refuted"
+    assert linked(()) == ""
