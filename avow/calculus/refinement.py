@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, assert_never, cast
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
@@ -27,7 +27,24 @@ from avow.kernel.certificate import Certificate
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
-from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
+from avow.language.sorts import (
+    INTEGER,
+    NATURAL,
+    BoolSort,
+    Constructor,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
 from avow.language.terms import Compare, Literal, Quantified, Term, Variable
 from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER
@@ -326,6 +343,10 @@ def _match(one: Sort, other: Sort, mapping: dict[Sort, Sort]) -> None:
                 _match(a, b, mapping)
         case SequenceSort(), SequenceSort():
             _match(one.item, other.item, mapping)
+        case DataSort(), DataSort():
+            for made in one.constructors:
+                for a, b in zip(made.parameters, other.constructor(made.name).parameters, strict=True):
+                    _match(a, b, mapping)
     mapping[one] = other
 
 
@@ -339,5 +360,12 @@ def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
             return TupleSort(tuple(_mapped(item, mapping) for item in sort.items), sort.labels)
         case SequenceSort():
             return SequenceSort(_mapped(sort.item, mapping))
-        case _:  # a sort without parts
+        case SetSort():
+            return SetSort(_mapped(sort.item, mapping))
+        case DataSort(name=name, constructors=constructors):
+            made = (Constructor(c.name, tuple(_mapped(p, mapping) for p in c.parameters)) for c in constructors)
+            return DataSort(name, tuple(made))
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | EnumSort() | OpaqueSort():
             return sort
+        case _:
+            assert_never(sort)

@@ -22,7 +22,10 @@ from avow.language.sorts import (
     FunctionSort,
     IntegerSort,
     NaturalSort,
+    OpaqueSort,
     RealSort,
+    SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -372,7 +375,24 @@ def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
             return lambda value: value.__class__ is int and value >= 0
         case IntegerSort():
             return lambda value: value.__class__ is int
-        case RealSort() | StringSort():
-            return None
-        case _:  # values of the others are found within their range
-            return None
+        case TupleSort(items=items):
+            return _members(items, domains)
+        case DataSort(constructors=constructors):
+            made = {c.name: test for c in constructors if (test := _members(c.parameters, domains)) is not None}
+            return (lambda value: made.get(value.constructor, _all_belong)(value.arguments)) if made else None
+        case SequenceSort(item=item):
+            each = member_of(item, domains)
+            return None if each is None else lambda value: all(map(each, value.items))
+        case BoolSort() | RealSort() | StringSort() | EnumSort() | OpaqueSort() | FunctionSort() | SetSort():
+            return None  # what is found for such a variable is of its sort
+        case _:
+            assert_never(sort)
+
+
+def _members(sorts: Sequence[Sort], domains: Domains) -> Callable[[Any], bool] | None:
+    tests = [(k, test) for k, sort in enumerate(sorts) if (test := member_of(sort, domains)) is not None]
+    return (lambda values: all(test(values[k]) for k, test in tests)) if tests else None
+
+
+def _all_belong(_: Any) -> bool:
+    return True

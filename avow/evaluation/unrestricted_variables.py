@@ -109,7 +109,7 @@ def _representatives(sort: Sort, named: set[Any], ordered: bool, copies: int) ->
         case IntegerSort():
             top, bottom = max([0, *named]), min([0, *named])
             return [*sorted(named), *(s for k in range(1, copies + 1) for s in (top + k, bottom - k))]
-        case _:  # REAL: the only other carrier
+        case RealSort():
             points = sorted(map(Fraction, named)) or [Fraction(0)]
             found = [*points, *(points[-1] + k for k in range(1, copies + 1))]
             if ordered:
@@ -117,6 +117,8 @@ def _representatives(sort: Sort, named: set[Any], ordered: bool, copies: int) ->
                 for low, high in pairwise(points):
                     found += [low + (high - low) * k / (copies + 1) for k in range(1, copies + 1)]
             return found
+        case _:
+            raise AssertionError(f"{sort} is no carrier")
 
 
 @dataclass(slots=True)

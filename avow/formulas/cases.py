@@ -18,6 +18,7 @@ from avow.language.terms import (
     TRUE,
     And,
     Conditional,
+    History,
     Iff,
     Implies,
     Not,
@@ -71,8 +72,8 @@ def _choice(term: Term) -> tuple[Term, Term, Term] | None:
             return term.condition, term.then, term.otherwise
         case Operation() if (made_of := definition(term)) is not None:
             return _choice(made_of) if isinstance(made_of, Conditional) else (made_of, TRUE, FALSE)
-        case Quantified():
-            return None  # a formula within a term: what it chooses depends on its variables
+        case Quantified() | History():
+            return None  # what is chosen within depends on its variables, or on the step
         case _:  # no choice itself: the first one within it
             parts = term.children
             for place, part in enumerate(parts):

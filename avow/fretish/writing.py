@@ -9,7 +9,8 @@ from avow.base.diagnostics import Diagnostic
 from avow.formulas.formula import free_variables
 from avow.formulas.values import show
 from avow.language.contract import Clause, Contract, Node
-from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
+from avow.language.printer import show_sort
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     RESPONSES,
     TRUE,
@@ -189,8 +190,10 @@ def _previous(term: History) -> str:
             return "preBool"
         case IntegerSort() | NaturalSort():
             return "preInt"
-        case _:  # what is compared as a number there
+        case RealSort() | EnumSort():  # an element is compared as a number there
             return "preReal"
+        case sort:
+            raise _Beyond(f"`previous` of a value of {show_sort(sort)}")
 
 
 def _number(value: Fraction) -> str:

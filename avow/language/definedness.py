@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import combinations
+from typing import assert_never
 
 from avow.language.bounds import constant
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
@@ -20,25 +21,34 @@ from avow.language.terms import (
     RESPONSES,
     TRUE,
     And,
+    Apply,
+    Argument,
     Arithmetic,
+    Builtin,
     Compare,
     Conditional,
+    Construct,
+    EnumValue,
     History,
     Iff,
     Implies,
     In,
     Index,
+    Item,
     Length,
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Past,
     Quantified,
     Quantifier,
     SequenceRange,
     SequenceTerm,
+    SetTerm,
     Term,
+    TupleTerm,
     Variable,
     Widen,
 )
@@ -103,7 +113,32 @@ def _needed(claim: Term) -> Term:
 
 
 def _is_partial(term: Term) -> bool:
-    return any(isinstance(p, Index) or (isinstance(p, Arithmetic) and p.operator == "/") for p in subterms(term))
+    return any(map(may_lack_value, subterms(term)))
+
+
+def may_lack_value(term: Term) -> bool:
+    """Whether it may have no value although its parts have one."""
+    match term:
+        case Arithmetic(operator=sign):
+            return sign == "/"
+        case Index():
+            return True
+        case (
+            Variable() | Literal() | Compare() | And() | Or() | Not() | Implies() | Apply() | EnumValue() | Quantified()
+            | Widen() | History() | In() | Item() | Construct() | TupleTerm() | SequenceTerm() | SequenceRange()
+            | SetTerm() | Length() | Negative() | Iff() | Conditional()
+        ):  # fmt: skip
+            return False
+        case Operation(operator=operator):
+            match operator:
+                case Builtin.XOR | Builtin.ABS | Builtin.MIN | Builtin.MAX | Builtin.MOD | Builtin.DIV:
+                    return False  # of `mod` and `div` the divisor is a positive number that is written down
+                case _:
+                    assert_never(operator)
+        case Argument():
+            raise AssertionError("it is put for a variable only where a formula's conditions are written out already")
+        case _:
+            assert_never(term)
 
 
 def defined(term: Term, sequences: Collection[Variable] | None = None, facts: Facts = ()) -> Term:
@@ -128,7 +163,7 @@ def defined(term: Term, sequences: Collection[Variable] | None = None, facts: Fa
             needed = [(guard, defined(part, sequences, (*facts, *_parts(guard)))) for guard, part in branches]
             safe = (Implies(guard, inner, term.span) for guard, inner in needed if inner != TRUE)
             found = _all((defined(condition, sequences, facts), *safe))
-        case _:  # an atom: all of it matters
+        case _:  # no connective: all of it matters
             found = _all(_risks(term, sequences, facts))
     return _all(part for part in _parts(found) if part not in facts)
 
@@ -164,6 +199,8 @@ def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> 
         case History(operator=Past.PREVIOUS | Past.CHANGED) if atom.arguments[0].sort != BOOL:
             yield from _risks_before(atom, sequences, facts)
             return
+        case _:  # has a value where its parts have one
+            assert sequences is not None or not may_lack_value(atom), f"no condition of a {type(atom).__name__}"
     for part in atom.children:
         if isinstance(atom, History) and part.sort == BOOL:
             continue  # its own conditions stand in it

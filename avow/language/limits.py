@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from avow.language.sorts import DataSort, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.sorts import Sort, parts
 from avow.language.terms import Term
 
 _Part = TypeVar("_Part")
@@ -40,17 +40,4 @@ def term_extent(term: Term) -> tuple[int, int]:
 
 def sort_extent(sort: Sort) -> tuple[int, int]:
     """A sort's parts (an enumeration's elements do not count) and depth."""
-    return extent(sort, _parts)
-
-
-def _parts(sort: Sort) -> tuple[Sort, ...]:
-    match sort:
-        case DataSort(constructors=constructors):
-            return tuple(p for c in constructors for p in c.parameters)
-        case FunctionSort(parameters=parameters, result=result):
-            return (*parameters, result)
-        case TupleSort(items=items):
-            return items
-        case SequenceSort(item=item) | SetSort(item=item):
-            return (item,)
-    return ()
+    return extent(sort, parts)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import field
+from typing import assert_never
 
 from avow.base.records import dataclass
 
@@ -134,12 +135,21 @@ def components(*sorts: Sort) -> Iterator[Sort]:
             continue
         seen.add(sort)
         yield sort
-        match sort:
-            case DataSort(constructors=constructors):
-                stack.extend(p for c in constructors for p in c.parameters)
-            case FunctionSort(parameters=parameters, result=result):
-                stack.extend((*parameters, result))
-            case TupleSort(items=items):
-                stack.extend(items)
-            case SequenceSort(item=item) | SetSort(item=item):
-                stack.append(item)
+        stack.extend(parts(sort))
+
+
+def parts(sort: Sort) -> tuple[Sort, ...]:
+    """The sorts that a sort is directly made of."""
+    match sort:
+        case DataSort(constructors=constructors):
+            return tuple(p for c in constructors for p in c.parameters)
+        case FunctionSort(parameters=parameters, result=result):
+            return (*parameters, result)
+        case TupleSort(items=items):
+            return items
+        case SequenceSort(item=item) | SetSort(item=item):
+            return (item,)
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | EnumSort() | OpaqueSort():
+            return ()
+        case _:
+            assert_never(sort)

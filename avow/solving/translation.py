@@ -370,8 +370,10 @@ class Translator(Sorts):
                 return z3.BoolVal(value, self.context)
             case _ if isinstance(value, Fraction) and value.denominator != 1:
                 return self.real(value)
-            case _:  # a whole number
+            case IntegerSort() | NaturalSort():
                 return z3.IntVal(int(value), self.context)
+            case sort:
+                raise Unsupported(f"{value!r} as a value of a {type(sort).__name__}", literal.span)
 
     def _real(self, expr: Expr) -> Expr:
         return z3.simplify(z3.ToReal(expr)) if z3.is_int_value(expr) else z3.ToReal(expr) if z3.is_int(expr) else expr

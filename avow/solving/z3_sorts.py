@@ -186,8 +186,24 @@ class Sorts:
                 datatype = self.sort(sort)
                 parts = (self.clamped(datatype.accessor(0, k)(expr), item) for k, item in enumerate(items))
                 return datatype.constructor(0)(*parts)
-            case _:  # every value of its Z3 sort is one of it
-                return expr
+            case DataSort(constructors=constructors) if self.member(sort, expr) is not None:
+                datatype, value = self.sort(sort), expr
+                for c, constructor in enumerate(constructors):
+                    fields = enumerate(constructor.parameters)
+                    made = (self.clamped(datatype.accessor(c, k)(expr), parameter) for k, parameter in fields)
+                    value = z3.If(datatype.recognizer(c)(expr), datatype.constructor(c)(*made), value)
+                return value
+            case SequenceSort() if (inside := self.member(sort, expr)) is not None:
+                return z3.If(inside, expr, z3.Empty(self.sort(sort)))
+            case FunctionSort() | SetSort():
+                raise Unsupported("a function or set as part of another value")
+            case (
+                BoolSort() | RealSort() | IntegerSort() | StringSort() | EnumSort() | OpaqueSort()
+                | TupleSort() | DataSort() | SequenceSort()
+            ):  # fmt: skip
+                return expr  # every value of its Z3 sort is one of it
+            case _:
+                assert_never(sort)
 
     def function_member(self, sort: FunctionSort, function: Callable[..., Expr]) -> Expr | None:
         arguments = [self.fresh("k", parameter) for parameter in sort.parameters]

@@ -431,8 +431,10 @@ def _simple(sort: Sort) -> Any:
             return 0.0
         case SequenceSort():
             return []
-        case _:  # a whole number
+        case IntegerSort() | NaturalSort():
             return 0
+        case _:
+            raise TypeError(f"no value of {sort} is drawn")
 
 
 def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:

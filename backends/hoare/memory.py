@@ -13,13 +13,12 @@ from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, stepping
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.evaluation.compiler import member_of
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import longest_limits, remembers
-from avow.formulas.values import Data, SequenceValue, Value
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
-from avow.language.sorts import DataSort, NaturalSort, SequenceSort, Sort, TupleSort
 
 from .checker import Checked
 from .names import Names, vocabulary
@@ -64,26 +63,11 @@ def _held(memory: Memory, job: Job) -> Held:
         value = None if free_variables(initial) else evaluate(initial, {})
     except NotEvaluable:
         value = None
-    if value is None or not _fits(value, sort):
+    fits = member_of(sort, {})
+    if value is None or (fits is not None and not fits(value)):
         message = f"what `{memory.name.name}` is first has to be a constant of {show_sort(sort)}"
         raise rejected("HOARE300", message, memory.span)
     return Held(memory.name.name, sort, initial)
-
-
-def _fits(value: Value, sort: Sort) -> bool:
-    """Whether no natural number in it is negative: all else its type has seen to."""
-    match sort, value:
-        case NaturalSort(), int(number):
-            return number >= 0
-        case TupleSort(items=items), tuple():
-            return all(map(_fits, value, items))
-        case SequenceSort(item=item), SequenceValue(items=values):
-            return all(_fits(each, item) for each in values)
-        case DataSort(constructors=constructors), Data(constructor=name, arguments=arguments):
-            made = next(c for c in constructors if c.name == name)
-            return all(map(_fits, arguments, made.parameters))
-        case _:  # it has no natural number
-            return True
 
 
 def kept(invariant: Invariant, name: str, steps: Stepping, node: Node, checked: Checked) -> tuple[Triple, ...]:

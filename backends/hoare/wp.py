@@ -15,6 +15,7 @@ from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import transform
+from avow.language.definedness import may_lack_value
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.subterms import subterms
 from avow.language.terms import (
@@ -277,8 +278,8 @@ def defined(term: Term) -> Term:
             parts.extend(r for i in items for r in in_range(i, sort))
         case TupleTerm(items=items, sort=TupleSort(items=sorts)):
             parts.extend(r for i, s in zip(items, sorts, strict=True) for r in in_range(i, s))
-        case _:  # total, once its parts are defined
-            pass
+        case _:  # has a value where its parts have one
+            assert not may_lack_value(term), f"no condition of a {type(term).__name__}"
     return conjunction(parts)
 
 

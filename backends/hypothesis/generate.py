@@ -201,8 +201,10 @@ class Generator:
                 return Fraction(source.signed(2000), source.of((1, 2, 4, 10)))
             case NaturalSort():
                 return source.below(2001)
-            case _:  # INTEGER
+            case IntegerSort():
                 return source.signed(2000)
+            case _:
+                raise Impossible(f"a number of {sort}")
 
     def _data(self, source: Source, sort: DataSort, near: dict[Any, Any], depth: int) -> Value:
         made = sort.constructors

@@ -142,6 +142,18 @@ def test_types_are_compared_by_what_they_are() -> None:
     assert refines(other, one).verdict is Verdict.PROVED
 
 
+def test_types_within_types_are_compared_by_what_they_are() -> None:
+    text = node("n", "v : %s", "d : %s", "G: forall(w in %s | w == in.v -> out.d == go(w))")
+    context = "context { %s : {slow, quick}; %s : {go(%s), halt}; }\n"
+    one = only(text % ("Speed", "Order", "Speed"), context % ("Speed", "Order", "Speed"))
+    other = only(text % ("Pace", "Step", "Pace"), context % ("Pace", "Step", "Pace"))
+    assert refines(one, other).verdict is Verdict.PROVED
+    of_orders = node("n", "d : Order", "e : BOOL", "G: out.e == exists(v in Speed | in.d == go(v))")
+    one = only(of_orders, context % ("Speed", "Order", "Speed"))
+    other = only(of_orders.replace("Speed", "Pace"), context % ("Pace", "Order", "Pace"))
+    assert refines(one, other).verdict is Verdict.PROVED
+
+
 def test_the_derived_contract_is_a_contract(tmp_path: Path) -> None:
     composition = compose(case_study(tmp_path, "remote_inspection", REPAIRED))
     for goal in composition.goals:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import random
+from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
 from helpers import some
 
-from avow.evaluation.compiler import finite_values
+from avow.base.verdict import Verdict
+from avow.evaluation.compiler import finite_values, member_of
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.evaluation.truth import judge
 from avow.formulas.values import Data, Element, FunctionValue, SequenceValue, Value
@@ -52,9 +54,11 @@ from avow.language.terms import (
     SequenceTerm,
     SetTerm,
     Term,
+    TupleTerm,
     Variable,
     Widen,
 )
+from avow.solving.questions import entails
 
 COMMAND = DataSort("Command", (Constructor("move", (REAL, REAL)), Constructor("inspect", (NATURAL,))))
 COLOUR = EnumSort("Colour", ("red", "orange", "green"))
@@ -204,6 +208,31 @@ def test_naturals_are_not_negative() -> None:
     assert evaluate(exists((N,), eq(plus(N, nat(1)), nat(0))), {}) is False
     i = bound("i", INTEGER)
     assert evaluate(exists((i,), eq(plus(i, Literal(1, INTEGER)), Literal(0, INTEGER))), {}) is True
+
+
+@pytest.mark.parametrize(
+    ("sort", "made"),
+    [
+        (TupleSort((NATURAL, BOOL)), lambda i: TupleTerm((i, Literal(True, BOOL)), TupleSort((INTEGER, BOOL)))),
+        (SequenceSort(NATURAL), lambda i: SequenceTerm((i,), SequenceSort(INTEGER))),
+    ],
+)
+def test_naturals_are_not_negative_within_other_values(sort: Sort, made: Callable[[Term], Term]) -> None:
+    """``p == (in.i, TRUE)`` fixes a p of naturals to what may be no such value: the solver says the same."""
+    i = given("i", INTEGER)
+    formula = exists((bound("p", sort),), eq(bound("p", sort), made(i)))
+    for value in (-1, 2):
+        assert evaluate(formula, {"in.i": value}) is (value >= 0)
+        here = eq(i, Literal(value, INTEGER))
+        assert entails({}, Implies(here, formula)).verdict is (Verdict.PROVED if value >= 0 else Verdict.REFUTED)
+
+
+def test_a_value_of_an_algebraic_type_belongs_to_it_with_all_its_parts() -> None:
+    test = member_of(COMMAND, {})
+    assert test is not None
+    assert [test(Data("inspect", (k,))) for k in (-1, 1)] == [False, True]
+    assert test(Data("move", (Fraction(-1), Fraction(-1))))
+    assert member_of(TupleSort((REAL, COLOUR)), {}) is None
 
 
 def test_patterns_are_solved_for_their_variables() -> None:

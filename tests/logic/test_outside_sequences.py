@@ -8,7 +8,10 @@ from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.values import SequenceValue
 from avow.language.definedness import defined
+from avow.language.sorts import BOOL, NATURAL, Constructor, DataSort, SequenceSort, TupleSort
 from avow.sanity.analysis import Bounds, analyse
+from avow.solving.questions import Translator
+from avow.solving.z3_module import z3
 
 from .contracts import formula, node
 
@@ -54,3 +57,18 @@ def test_the_condition_says_when_nothing_outside_matters(text: str, short: bool,
             except NotEvaluable:
                 holds = False
             assert holds is expected
+
+
+def test_what_lies_outside_is_of_the_sort_of_the_elements() -> None:
+    """Also where the elements have parts: Z3's own element outside a sequence may be ``go(-1)`` for ``go(NATURAL)``."""
+    order = DataSort("Order", (Constructor("halt", ()), Constructor("go", (NATURAL, BOOL))))
+    context = Translator()
+    for sort in (NATURAL, TupleSort((NATURAL, BOOL)), order, SequenceSort(NATURAL)):
+        anything = context.fresh("x", sort)
+        member, inside = context.member(sort, anything), context.member(sort, context.clamped(anything, sort))
+        solver = z3.Solver(ctx=context.context)
+        solver.add(z3.Not(inside))
+        assert solver.check() == z3.unsat
+        solver = z3.Solver(ctx=context.context)
+        solver.add(member, z3.Not(context.clamped(anything, sort) == anything))
+        assert solver.check() == z3.unsat

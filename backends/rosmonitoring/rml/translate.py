@@ -19,7 +19,18 @@ from avow.backend_kit.one_step import refusal
 from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
 from avow.language.contract import Clause
-from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
+from avow.language.printer import show_sort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    Sort,
+    StringSort,
+)
 from avow.language.terms import Role
 from avow.ros.bags import ENVELOPE
 from avow.ros.calls import is_part
@@ -411,8 +422,10 @@ def _field_cases(path: FieldPath, sort: Sort, name: str, names: dict[str, str] |
         case NaturalSort():
             guard = compare(">=", Name(name), Number(Fraction(0)))
             return [_Case(((path, name),), (Name(name),), (name,), guard)]
-        case _:  # a number without bounds
+        case RealSort() | IntegerSort():
             return [_Case(((path, name),), (Name(name),), (name,))]
+        case _:
+            raise NotRml(f"a field holds a value of {show_sort(sort)}")
 
 
 def _words(member: str, names: dict[str, str] | object, known: set[str]) -> list[str]:
