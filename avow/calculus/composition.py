@@ -10,7 +10,7 @@ from avow.base.remembered import by_identity
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
-from avow.calculus.discharge import Answers, Bounds, Told, settle
+from avow.calculus.discharge import Answers, Bounds, Claim, Told, settle
 from avow.calculus.kept_answers import ask_once
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
@@ -43,6 +43,8 @@ class Composition:
     """Node or subsystem → the subsystem that it is directly in."""
     told: Told | None = field(default=None, compare=False)
     """Hears of each side condition of a goal as soon as it is settled."""
+    claims: Mapping[str, Mapping[SideCondition, Claim]] = field(default_factory=dict, compare=False)
+    """Goal → what is claimed of its side conditions, where only some of it is asked for."""
     _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
@@ -56,7 +58,7 @@ class Composition:
     def settled(self, goal: Goal, bounds: Bounds) -> Answers:
         """The goal's side conditions, settled once."""
         if goal.name not in self._answers:
-            self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds, self.told)
+            self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds, self.told, self.claims.get(goal.name))
         return self._answers[goal.name]
 
     def stands(self, goal: Goal, bounds: Bounds) -> Verdict:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from avow.base.files import sha256
 from avow.base.graphs import components, cycle_in
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
@@ -19,6 +20,7 @@ from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopFor
 from avow.calculus.entailment import implied
 from avow.calculus.induction import Deeper, steps
 from avow.calculus.invariants import INVARIANT, further
+from avow.calculus.kept_answers import keep_not_proved, not_proved_before
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
@@ -67,12 +69,36 @@ Told = Callable[[str, Settled], None]
 """What hears of a goal's side condition, by the goal's name: the answer may change yet where proofs go in a circle."""
 
 
-def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None, told: Told | None = None) -> Answers:
-    """Discharge every side condition of a derivation, and judge its loops."""
-    solver = _Solver(frame, frozenset(goal.nodes), bounds or Bounds(), frozenset(goal.root.assumed))
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A side condition's obligation: its digest, and whether it is asked for."""
+
+    digest: str
+    wanted: bool
+
+
+def settle(
+    frame: Frame,
+    goal: Goal,
+    bounds: Bounds | None = None,
+    told: Told | None = None,
+    claims: Mapping[SideCondition, Claim] | None = None,
+) -> Answers:
+    """Discharge every side condition of a derivation, and judge its loops. Of `claims` that are not asked for it is
+    enough to know that they were not proved before (`avow.calculus.kept_answers`)."""
+    bounds = bounds or Bounds()
+    solver = _Solver(frame, frozenset(goal.nodes), bounds, frozenset(goal.root.assumed))
     settled: dict[SideCondition, Settled] = {}
     for condition in goal.conditions:
-        settled[condition] = solver.condition(condition)
+        claim = claims.get(condition) if claims is not None else None
+        mark = sha256(f"{goal.name} {claim.digest} {bounds.effort} {bounds.seed}") if claim is not None else ""
+        before = not_proved_before(mark) if claim is not None and not claim.wanted else None
+        if before is not None:
+            settled[condition] = Settled(condition, before.verdict, (), before.used, before.used_before)
+            continue
+        answer = settled[condition] = solver.condition(condition)
+        if answer.verdict is not Verdict.PROVED and not answer.circle:
+            keep_not_proved(mark, answer.verdict, answer.used, answer.used_before)
         if told is not None:
             told(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
@@ -170,7 +196,8 @@ class _Solver:
     ) -> Settled:
         """Only the widest question is worth the whole time: what a narrower one cannot settle, that may."""
         effort = self.bounds.effort if patient else min(self.bounds.effort, NARROW_EFFORT)
-        return _settled(condition, tuple(self.ask(p, *q, effort) for p, q in zip(phases, questions, strict=True)))
+        pairs = zip(phases, questions, strict=True)
+        return _settled(condition, tuple(self.ask(p, *q, effort, whether=not patient) for p, q in pairs))
 
     def phases(self, condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
         """One question, or one about the first step and one about every later."""
@@ -189,7 +216,7 @@ class _Solver:
             hypotheses = closest(parts, goal)
             if len(hypotheses) == sum(len(part.terms) for part in parts):
                 return None  # these are all: the first attempt asks just that
-            case = self.ask(phase, hypotheses, goal, min(self.bounds.effort, NARROW_EFFORT))
+            case = self.ask(phase, hypotheses, goal, min(self.bounds.effort, NARROW_EFFORT), whether=True)
             if case.verdict is not Verdict.PROVED:
                 return None
             cases.append(case)
@@ -319,8 +346,9 @@ class _Solver:
         hypotheses, goal = self.question(condition, phase, same, before, wide)
         return self.ask(phase, hypotheses | dict(more or {}), goal, patience)
 
-    def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int) -> Case:
-        answer = implied(hypotheses, goal, effort=patience, seed=self.bounds.seed)
+    def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int, *, whether: bool = False) -> Case:
+        """`whether`: what does not prove it is looked at no further."""
+        answer = implied(hypotheses, goal, effort=patience, seed=self.bounds.seed, whether=whether)
         return Case(
             phase,
             answer.verdict,

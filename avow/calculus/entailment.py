@@ -19,10 +19,13 @@ from avow.tuning.bounds import WITNESSES_TRIED
 from avow.tuning.effort import QUICK_EFFORT
 
 
-def implied(hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0) -> Entailment:
+def implied(
+    hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0, whether: bool = False
+) -> Entailment:
     """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length. What was
-    proved before is not asked again, within `avow.calculus.kept_answers.keeping`."""
-    mark, answer = entailed_before(hypotheses, goal, effort, seed)
+    proved before is not asked again, within `avow.calculus.kept_answers.keeping`; nor what was refuted, where only
+    `whether` it is proved matters."""
+    mark, answer = entailed_before(hypotheses, goal, effort, seed, whether)
     if answer is None:
         answer = _implied(hypotheses, goal, effort, seed)
         keep_entailed(mark, answer)

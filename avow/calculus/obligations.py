@@ -19,7 +19,7 @@ from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, compose, composed
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
-from avow.calculus.discharge import Bounds
+from avow.calculus.discharge import Bounds, Claim
 from avow.calculus.existence import circles, joined, loops, start_name
 from avow.calculus.hypotheses import Resting
 from avow.calculus.requirements import requirement_question
@@ -89,6 +89,7 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], lim
     made = tuple(_tasks(composition))
     resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
+    composition.claims = _claimed(made, frozenset(obligation.id for obligation in obligations))
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
@@ -99,6 +100,15 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], lim
         goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
         outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
         yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
+
+
+def _claimed(made: Sequence[Task], wanted: frozenset[str]) -> dict[str, dict[SideCondition, Claim]]:
+    found: dict[str, dict[SideCondition, Claim]] = {}
+    for task in made:
+        if isinstance(task.ask, questions.SideQuestion):
+            claim = Claim(task.obligation.digest, task.obligation.id in wanted)
+            found.setdefault(task.ask.goal, {})[task.ask.condition] = claim
+    return found
 
 
 def reestablished(certificates: Certificates, obligation: str) -> Reestablished | None:

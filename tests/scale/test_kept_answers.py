@@ -10,7 +10,7 @@ from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.calculus import entailment
-from avow.calculus.composition import compose
+from avow.calculus.composition import Composition, compose
 from avow.calculus.kept_answers import KeptAnswers, keeping
 from avow.calculus.obligations import all_obligations, reestablished, settle_all
 from avow.evidence.ledger import ledger_of
@@ -26,15 +26,19 @@ from avow.system.load import load_path, load_system
 from .made import chain, fan
 
 
-def settle(folder: Path, text: str, answers: KeptAnswers) -> dict[str, Verdict]:
-    """Obligation → verdict."""
-    path = folder / "system.rcl"
-    path.write_text(text)
-    composition = compose(load_path(path))
-    obligations = all_obligations(composition)
+def settle(folder: Path, text: str, answers: KeptAnswers, known: frozenset[str] = frozenset()) -> dict[str, Verdict]:
+    """Obligation → verdict, of those whose digests are not `known`."""
+    composition = made(folder, text)
+    obligations = [o for o in all_obligations(composition) if o.digest not in known]
     with keeping(answers):
         outcomes = settle_all(composition, obligations, Limits(seconds=20))
     return {o.obligation.rpartition("/")[2]: o.verdict for o in outcomes}
+
+
+def made(folder: Path, text: str) -> Composition:
+    path = folder / "system.rcl"
+    path.write_text(text)
+    return compose(load_path(path))
 
 
 def again(answers: KeptAnswers) -> KeptAnswers:
@@ -76,6 +80,28 @@ def test_what_does_not_hold_is_asked_again_and_never_kept(tmp_path: Path) -> Non
     later = again(first)
     assert settle(tmp_path, wrong, later) == before
     assert later.asked > 0
+
+
+# n3 assumes more than n0 to n2 give; n6 assumes what only n3, three nodes before it, carries
+OPEN = chain(9).replace("in.x2 >= 0", "in.x2 >= 1").replace("in.x5 >= 0", "in.x5 >= 1")
+
+
+def test_what_is_not_asked_for_is_not_asked_again_because_it_does_not_hold(tmp_path: Path) -> None:
+    first = KeptAnswers()
+    before = settle(tmp_path, OPEN, first)
+    assert before["whole.n3.a0"] is Verdict.REFUTED
+    known = frozenset(o.digest for o in all_obligations(made(tmp_path, OPEN)))
+    edited = OPEN.replace("out.x7 >= in.x6", "out.x7 >= in.x6 + 1")
+    later = again(first)
+    now = settle(tmp_path, edited, later, known)
+    assert sorted(now) == ["whole.n7.a0", "whole.n8.a0"]
+    assert later.asked == 1  # the engine's, of n8; the kernel has nothing to establish behind what is refuted
+    assert now.items() <= settle(tmp_path, edited, KeptAnswers()).items()
+    # the one that did not hold stands now, and whoever rests on it
+    mended, later = OPEN.replace("out.x0 >= 0", "out.x0 >= 1"), again(later)
+    whole = settle(tmp_path, mended, later, known)
+    assert whole == settle(tmp_path, mended, KeptAnswers())
+    assert set(whole.values()) == {Verdict.PROVED}
 
 
 def test_what_cannot_be_read_is_nothing() -> None:
