@@ -1,7 +1,8 @@
 """Runs the subject, and nothing else, in a process of its own: what it prints, patches or breaks stays here.
 
-A script without imports from Avow. Each line of JSON that comes in holds the inputs of some
-cases; a line with an answer for each goes out.
+A script without imports from Avow, so without its codec: each module here is one that the subject can change, and
+is read at every start. Each line of JSON that comes in holds the inputs of some cases; a line with an answer for each
+goes out (`subject.Message`, read there, strictly).
 Values of the contract are given to the subject as plain Python: an element of an enumeration is a string, a REAL is a
 `Fraction`, ``move(1, 2)`` is ``("move", 1, 2)``, a sequence is a tuple, a function or relation is a `Table`.
 """

@@ -13,13 +13,16 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from avow.base import process
+from avow.base.codec import Unreadable, from_json
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 from avow.tuning.running import CHANNEL_PATIENCE
 from avow.tuning.sizes import CHANNEL_KEPT
+
+T = TypeVar("T")
 
 
 class Channel:
@@ -50,9 +53,16 @@ class Channel:
 
 
 def ask(
-    script: str, arguments: Sequence[str], *, cwd: Path, seconds: float, megabytes: int, env: Mapping[str, str]
-) -> tuple[Completed, dict[str, Any] | None]:
-    """Run ``python script FD arguments…``; the judge writes its answer with `say`. Raises ToolMissing."""
+    kind: type[T],
+    script: str,
+    arguments: Sequence[str],
+    *,
+    cwd: Path,
+    seconds: float,
+    megabytes: int,
+    env: Mapping[str, str],
+) -> tuple[Completed, T | None]:
+    """Run ``python script FD arguments…``; the judge writes its answer, a `kind`, with `say`. Raises ToolMissing."""
     channel = Channel()
     try:
         done = process.run(
@@ -70,7 +80,10 @@ def ask(
     answer = _answer(said) if done.code == 0 and said is not None else None
     if answer is not None and answer.pop(_ENDED, False):
         process.ended_with(-signal.SIGKILL)
-    return done, answer
+    try:
+        return done, None if answer is None else from_json(kind, answer)
+    except Unreadable:
+        return done, None
 
 
 _ENDED = "ended by others"

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from avow.isolation.subject import SubjectProcess
+from avow.isolation.subject import Message, SubjectProcess
 
 CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGTRAP))
 """How a program ends whose own code went wrong."""
@@ -41,5 +41,5 @@ class Program(SubjectProcess):
         self._turn = secrets.token_hex(8)
         return "|".join((self._turn, *(str(case["command"]) for case in cases))).encode() + b"\n"
 
-    def _in_turn(self, message: Mapping[str, Any]) -> bool:
-        return message.get("turn") == self._turn
+    def _in_turn(self, message: Message) -> bool:
+        return message.turn == self._turn

@@ -11,10 +11,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from avow.base import process
+from avow.base.codec import LATER, Unreadable, from_text
+from avow.base.records import dataclass
 from avow.base.verdict import Isolation
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed, interpreter, recorded, variables
@@ -27,6 +30,24 @@ _SCRATCH = "/tmp/avow-scratch"
 class SubjectFailed(Exception):  # noqa: N818 - it names what happened
     """The subject raised, ended, hung, did what no subject may do, or returned what is no value of the output's
     type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A line from a subject's process, which may be of the subject's making: one that does not read as this is its
+    fault. (`host` and a compiled program write it without the codec: what they import, the subject can change.)"""
+
+    seen: tuple[tuple[str, str], ...] = field(default=(), metadata=LATER)
+    """(event, path) of what it has looked at since the message before."""
+    faults: tuple[str, ...] = field(default=(), metadata=LATER)
+    ready: bool = field(default=False, metadata=LATER)
+    error: str = field(default="", metadata=LATER)
+    """Why it is not ready."""
+    replies: tuple[Any, ...] | None = field(default=None, metadata=LATER)
+    """One a case: ``{"value": …}`` or ``{"error": "…"}``."""
+    turn: str = field(default="", metadata=LATER)
+    """Of a compiled program: the question that it answers."""
+    end: bool = field(default=False, metadata=LATER)
 
 
 class SubjectProcess:
@@ -121,16 +142,15 @@ class SubjectProcess:
         except OSError as error:
             raise self._end("the subject's process has ended") from error
         message = self._message()
-        replies = message.get("replies")
-        if not isinstance(replies, list) or len(replies) != len(cases) or not self._in_turn(message):
+        if message.replies is None or len(message.replies) != len(cases) or not self._in_turn(message):
             raise self._end("the subject's answer is no data")
-        return replies
+        return list(message.replies)
 
     def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
         """The cases as the process reads them: one line."""
         return json.dumps(list(cases)).encode() + b"\n"
 
-    def _in_turn(self, message: Mapping[str, Any]) -> bool:
+    def _in_turn(self, message: Message) -> bool:
         """Whether a message is the answer to what was asked last."""
         return True
 
@@ -213,26 +233,22 @@ class SubjectProcess:
         ready = self._message()
         if self._trace is not None:
             self._trace.hide()
-        if not ready.get("ready"):
-            why = ready.get("error", "no reason given")
-            raise self._end(f"the subject cannot be loaded: {why}")
+        if not ready.ready:
+            raise self._end(f"the subject cannot be loaded: {ready.error or 'no reason given'}")
 
-    def _message(self) -> dict[str, Any]:
+    def _message(self) -> Message:
         """What its process says next, of which is kept what the subject looked at. Raises SubjectFailed."""
-        message = self._line()
-        if not isinstance(message, dict):
-            raise self._end("the subject's answer is no data")
         try:
-            self._events.update(((str(event), str(path)), None) for event, path in message.get("seen", ()))
-            faults = [str(fault) for fault in message.get("faults", ())]
-        except (TypeError, ValueError):
+            message = from_text(Message, self._line())
+        except Unreadable:
             raise self._end("the subject's answer is no data") from None
-        if faults:
-            self.fault = f"the subject {faults[0]}"
+        self._events.update((looked, None) for looked in message.seen)
+        if message.faults:
+            self.fault = f"the subject {message.faults[0]}"
             raise self._end(self.fault)
         return message
 
-    def _line(self) -> Any:
+    def _line(self) -> bytes:
         end = time.monotonic() + self.patience
         while b"\n" not in self._buffer:
             left = end - time.monotonic()
@@ -249,7 +265,4 @@ class SubjectProcess:
             if len(self._buffer) > 16_000_000:
                 raise self._end("the subject's answer has no end")
         line, _, self._buffer = self._buffer.partition(b"\n")
-        try:
-            return json.loads(line)
-        except (ValueError, RecursionError):
-            raise self._end("the subject's answer is no data") from None
+        return line

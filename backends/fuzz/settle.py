@@ -152,6 +152,7 @@ class Work:
         place = self.folder / "question.json"
         place.write_text(json.dumps({**question, "seconds": self._left()}), encoding="utf-8")
         done, answer = judge.ask(
+            dict[str, Any],
             str(Path(__file__).with_name("runner.py").resolve()),
             [str(place)],
             cwd=self.folder,

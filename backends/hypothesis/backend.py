@@ -108,6 +108,7 @@ def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[
     seconds = max(1.0, limits.seconds * 0.8)
     try:
         return judge.ask(
+            dict[str, Any],
             export.test_name(job),
             [str(seconds), str(limits.seed)],
             cwd=place,

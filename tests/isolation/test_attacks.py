@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -272,7 +273,7 @@ def test_a_judge_tells_that_its_subject_was_ended(
         "import sys\nfrom avow.base import process\nfrom avow.isolation import judge\n"
         f"process.ended_with({code})\njudge.say(int(sys.argv[1]), {{'a': 1}})\n"
     )
-    _, said = judge.ask(str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
+    _, said = judge.ask(dict[str, int], str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
     assert said == {"a": 1}
     assert process.ended_by_others() is killed
 
@@ -303,3 +304,52 @@ def _youngest(pid: int) -> int:
     while children := Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
         pid = int(children[-1])
     return pid
+
+
+READY = '{"ready": true}'
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        ["7"],
+        ["[" * 100_000],
+        ['{"ready": 1}'],
+        ['{"ready": true, "more": 1}'],
+        ['{"ready": true, "seen": [["read"]]}'],
+        ['{"ready": true, "faults": "none"}'],
+        [READY, '{"replies": {"value": 1}}'],
+        [READY, '{"replies": []}'],
+        [READY, '{"replies": [{"value": 1}], "turn": 3}'],
+        [READY, '{"replies": [{"value": 1}, {"value": 1}]}'],
+        [READY, '{"replies": [7]}'],
+        [READY, "\udcff"],
+    ],
+    ids=range(12),
+)
+def test_what_is_no_message_is_the_fault_of_the_subject(tmp_path: Path, said: list[str]) -> None:
+    class Odd(SubjectProcess):
+        def _command(self, there: int, back: int, mark: str) -> tuple[list[str], tuple[Path, ...]]:
+            script = (
+                "import os, sys\nfor text in open(sys.argv[1], 'rb'):\n os.write(int(sys.argv[3]), text)\n"
+                " os.read(int(sys.argv[2]), 9)\n"
+            )
+            lines = self.path.with_suffix(".lines")
+            lines.write_text("".join(f"{line}\n" for line in said), errors="surrogateescape")
+            command = [sys.executable, "-c", script, str(lines), str(there), str(back)]
+            return command, (Path(sys.prefix), Path(sys.base_prefix))
+
+    subject = Odd(tmp_path / "s.py", "step", 60.0)
+    try:
+        with pytest.raises(SubjectFailed, match="is no data"):
+            subject.ask({})
+    finally:
+        subject.close()
+
+
+def test_a_judge_whose_answer_is_another_has_given_none(tmp_path: Path) -> None:
+    (tmp_path / "j.py").write_text(
+        "import sys\nfrom avow.isolation import judge\njudge.say(int(sys.argv[1]), {'a': '1'})\n"
+    )
+    done, said = judge.ask(dict[str, int], str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
+    assert (done.code, said) == (0, None)

@@ -10,11 +10,11 @@ import os
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from avow.base.codec import from_json, to_json
+from avow.base.codec import canonical, from_text, to_json
 from avow.base.verdict import Isolation
 from avow.drive.steps import coded
 from avow.isolation import judge
@@ -49,6 +49,18 @@ class Subject:
 
 
 @dataclass(frozen=True, slots=True)
+class Question:
+    """What the process is asked, in a file."""
+
+    root: str
+    file: str
+    spec: str
+    cases: tuple[str, ...]
+    seconds: float
+    batch: int
+
+
+@dataclass(frozen=True, slots=True)
 class Told:
     """What came back: a reply a case (None: none), or `fault`, for which nothing of it counts."""
 
@@ -76,16 +88,10 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
 
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         place = Path(scratch) / "cases.json"
-        question = {
-            "root": str(subject.root),
-            "file": str(subject.file),
-            "spec": subject.spec,
-            "cases": list(cases),
-            "seconds": seconds,
-            "batch": SUBJECT_BATCH,
-        }
-        place.write_text(json.dumps(question), encoding="utf-8")
+        question = Question(*(str(subject.root), str(subject.file), subject.spec, tuple(cases), seconds, SUBJECT_BATCH))
+        place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
+            Told,
             str(Path(__file__).resolve()),
             [str(place)],
             cwd=Path(scratch),
@@ -98,9 +104,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         last = done.stderr.strip().splitlines()[-1:]
         fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
         return Told((), fault, (), Isolation.NONE, done.timed_out)
-    replies = tuple(json.loads(r) if isinstance(r, str) else r for r in answer["replies"])
-    observed, isolation = from_json(tuple[Observed, ...], answer["observed"]), Isolation(answer["isolation"])
-    return Told(replies, str(answer["fault"]), observed, isolation, bool(answer["silent"]))
+    return replace(answer, replies=tuple(json.loads(r) if isinstance(r, str) else r for r in answer.replies))
 
 
 def main() -> None:
@@ -111,19 +115,14 @@ def main() -> None:
     channel = int(sys.argv[1])
     os.set_inheritable(channel, False)
     adopt_orphans()
-    question = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
-    process = SubjectProcess(
-        Path(question["file"]),
-        question["spec"],
-        max(1.0, min(SUBJECT_PATIENCE, question["seconds"] / 3)),
-        Path(question["root"]),
-    )
+    question = from_text(Question, Path(sys.argv[2]).read_bytes())
+    patience = max(1.0, min(SUBJECT_PATIENCE, question.seconds / 3))
+    process = SubjectProcess(Path(question.file), question.spec, patience, Path(question.root))
     replies: list[Any] = []
     fault = ""
     try:
-        cases, batch = question["cases"], question["batch"]
-        for at in range(0, len(cases), batch):
-            found = process.ask_all([{"case": case} for case in cases[at : at + batch]])
+        for at in range(0, len(question.cases), question.batch):
+            found = process.ask_all([{"case": case} for case in question.cases[at : at + question.batch]])
             failed = [str(r) for r in found if isinstance(r, SubjectFailed)]
             if failed:
                 fault = failed[0]
@@ -131,17 +130,8 @@ def main() -> None:
             replies += found
     finally:
         fault = process.close() or fault
-    observed = to_json(process.observed())
-    judge.say(
-        channel,
-        {
-            "replies": replies,
-            "fault": fault,
-            "silent": bool(process.silent),
-            "observed": observed,
-            "isolation": process.isolation.value,
-        },
-    )
+    told = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.silent))
+    judge.say(channel, to_json(told))
 
 
 if __name__ == "__main__":
