@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
 
 import pytest
+from drawn.formulas import BOOL, PLAIN, Formulas
 from oracle.values import holds
 
 from avow.base.verdict import Verdict
@@ -21,21 +23,17 @@ from .make import make, node, settled
 Values = dict[str, object]
 SYSTEMS = 96
 BLOCKS = 4
-
-
-def formula(chance: random.Random, names: list[str], depth: int = 2) -> str:
-    if not names:
-        return chance.choice(["TRUE", "TRUE", "FALSE"])
-    if depth == 0 or chance.random() < 0.3:
-        name = chance.choice(names)
-        return name if chance.random() < 0.6 else f"(not {name})"
-    operator = chance.choice(["and", "or", "or", "->", "<=>"])
-    return f"({formula(chance, names, depth - 1)} {operator} {formula(chance, names, depth - 1)})"
+CONNECTED = replace(PLAIN, atoms=0.3, connectives=("and", "or", "or", "->", "<=>"))
 
 
 def random_system(seed: int) -> tuple[str, str]:
     """Two to four nodes with truth values, wired at random, with and without delays and first values."""
     chance = random.Random(seed)
+    formulas = Formulas(chance, CONNECTED)
+
+    def formula(names: list[str], depth: int = 2) -> str:
+        return formulas.formula(depth, dict.fromkeys(names, BOOL))
+
     count = chance.randint(2, 4)
     wires = [f"w{k}" for k in range(count)]
     text, connections = "", []
@@ -49,8 +47,8 @@ def random_system(seed: int) -> tuple[str, str]:
                 f"{{from: n{k}.{wires[k]}, to: n{k}.m, delayed: true, initial: {chance.choice(['TRUE', 'FALSE'])}}}"
             )
         reads = [f"in.{name}" for name in inputs]
-        clauses = [f"A a{j}: {formula(chance, reads, 1)}" for j in range(chance.randint(0, 2)) if reads]
-        clauses += [f"G g{j}: {formula(chance, [*reads, f'out.{wires[k]}'])}" for j in range(chance.randint(1, 2))]
+        clauses = [f"A a{j}: {formula(reads, 1)}" for j in range(chance.randint(0, 2)) if reads]
+        clauses += [f"G g{j}: {formula([*reads, f'out.{wires[k]}'])}" for j in range(chance.randint(1, 2))]
         text += node(f"n{k}", ", ".join(f"{name} : BOOL" for name in inputs), f"{wires[k]} : BOOL", *clauses)
         first = chance.choice(["TRUE", "FALSE", None])
         for name in inputs:

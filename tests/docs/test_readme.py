@@ -27,6 +27,21 @@ def test_links_of_all_pages_lead_to_files() -> None:
     assert broken == []
 
 
+def test_files_that_pages_name_are_there() -> None:
+    """By their whole path, and in CONTRIBUTING too; what is written by a run or in a workspace has other places."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    named = [
+        (page, path)
+        for page in pages
+        for path in re.findall(r"(?<![\w/.<-])(?:avow|tests|backends|docs|benchmarks)/[\w./-]*\w", page.read_text())
+        if "NAME" not in path
+    ]
+    assert len(named) > 100
+    assert [
+        (page.name, path) for page, path in named if not (ROOT / path).exists() and not (page.parent / path).exists()
+    ] == []
+
+
 def test_every_page_is_in_the_readmes_map() -> None:
     readme = (ROOT / "README.md").read_text()
     pages = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs/backends").glob("*.md"), ROOT / "docs/examples/README.md"]

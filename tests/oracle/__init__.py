@@ -2,10 +2,20 @@
 
 - `values`: typed terms at one step, and over runs of steps (clauses with memory, responses);
 - `seconds`: the same over timed words, where limits are in seconds;
-- `sanity`: what the sanity verdicts about a small contract have to be;
-- `systems`: all runs of a system of nodes, and the game of a node against its inputs.
+- `stepping`: clauses with memory a step at a time, so that all runs of a system can be walked through;
+- `runs`: all runs of one node, and the game that it plays against its inputs;
+- `sanity`: what the sanity verdicts about a small contract have to be.
 
-It reads terms and contracts, and uses none of Avow's evaluation, compilation to cells or solving. Beside it stand those
-whose subject is no typed term: `differential.oracle` (what was written, before Avow's parser saw it, and programs that
-run), the interpreter of RML in `rosmonitoring.test_agreement` and FRET's intervals in `fretish.test_meaning`.
+It reads terms and contracts, and uses none of Avow's evaluation, compilation to cells or solving.
+
+Apart from it and from `drawn`, on purpose, stand
+
+- whole systems, drawn and walked through in one file, since the walk knows just the wiring that is drawn there; their
+  clauses are read here: `calculus.test_random_systems` (delays, subsystems), `calculus.test_random_runs` (functions and
+  sequences within a scenario's domains, so with formulas of its own), `temporal.test_systems` and `test_timed_systems`
+  (two nodes whose clauses have memory), `adversarial.drawn` (all that a system may have, and edits of it);
+- oracles whose subject is no typed term: `differential.oracle` (what was written, before Avow's parser saw it, and
+  programs that run), the interpreter of RML in `rosmonitoring.test_agreement`, FRET's intervals in
+  `fretish.test_meaning`;
+- generators of terms that no text of a contract would be: those of `evaluate.test_evaluate` and `logic.test_one_point`.
 """
