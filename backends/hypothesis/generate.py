@@ -309,9 +309,9 @@ def table(rows: Sequence[tuple[Value, ...]], sort: FunctionSort) -> FunctionValu
 
 
 def _odd_one_out(edges: Iterable[Value], length: int) -> Iterator[Value]:
-    """A long sequence whose last element alone is on the other side of every threshold."""
+    """A long sequence whose last or first element alone is on the other side of every threshold."""
     numbers = sorted(value for value in edges if isinstance(value, int | Fraction))
     if numbers:
-        low, high = numbers[0], numbers[-1]
-        yield SequenceValue((*(low,) * (length - 1), high))
-        yield SequenceValue((*(high,) * (length - 1), low))
+        for most, odd in ((numbers[0], numbers[-1]), (numbers[-1], numbers[0])):
+            yield SequenceValue((*(most,) * (length - 1), odd))
+            yield SequenceValue((odd, *(most,) * (length - 1)))

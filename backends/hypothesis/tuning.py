@@ -41,8 +41,8 @@ CONSTANTS_COMBINED = 6
 LONG_SEQUENCE = 50
 """A sequence is also tried with so many elements, whatever is written."""
 
-LONGEST_SEQUENCE = 400
-"""Numbers up to which they are taken for lengths."""
+LONGEST_SEQUENCE = 4096
+"""Numbers up to which they are taken for lengths: a laser's scan has a thousand and more."""
 
 LENGTHS = 60
 """Lengths that are tried, the shortest first."""
@@ -50,8 +50,8 @@ LENGTHS = 60
 CONSTANTS_READ = 300
 """So many constants of a program are looked at."""
 
-LARGEST_CONSTANT = 10**12
-"""Larger constants are no thresholds of a robot: masks, digests, dates in nanoseconds."""
+LARGEST_CONSTANT = 2**64
+"""Larger constants are no thresholds of a robot: no machine word holds them."""
 
 STEPS = 20
 """Steps of one run of a class: what counts to ten, or waits for a second at ten hertz, comes to its end."""

@@ -47,6 +47,10 @@ node n {{
             ("y", "", "row != 4711"),
             ("y", "", "not (len(loads) == 43)"),
             ("y", "", "len(todo) < 40"),  # a long one
+            ("y <=> (forall(i in indices(loads) | loads(i) > 0))", "", "all(x > 0 for x in loads[:1081])"),
+            ("y <=> (forall(i in indices(loads) | loads(i) > 0))", "", "all(x > 0 for x in loads[-1081:])"),
+            ("y", "", "row != 3 * 2**30 + 1"),  # which stands in the program as it is compiled
+            ("y", "", "before != 2**53 + 1"),
         ],
         5,
     ),
