@@ -72,6 +72,7 @@ def render_latex(case: Case) -> str:
         rf"\title{{{latex(case.title)}: assurance case}}\date{{{latex(case.today)}}}",
         rf"\author{{Avow {latex(case.run.avow_version)}}}",
         r"\begin{document}\maketitle",
+        rf"\textbf{{{latex(case.answers.told)}}}. {latex(case.answers.beside)}.",
         rf"{latex(verdict_line(case))} Grade {case.grade}. Policy {latex(case.policy.name)}.",
         rf"Ledger \texttt{{{case.ledger_head[:16]}}}.",
         r"\section{Requirements}",

@@ -354,7 +354,7 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert examined.answers.verdict == "Examined, not relied upon", "one of four sentences"
     assert text.count("WARNED: 1 finding known") == 1
     made = dict(formats(examined))
-    for name in ("index.html", "report.md", "comment.md", "gsn.yaml"):
+    for name in ("index.html", "report.md", "comment.md", "gsn.yaml", "report.tex"):
         assert "WARNED: 1 finding known" in str(made[name]), name
     assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
     assert examined.answers.tone is Tone.AMBER
