@@ -115,6 +115,18 @@ class Composition:
         answers = self._answers.get(goal.name)
         return answers.settled if answers is not None else {}
 
+    def fallen(self, goal: Goal, behind: str = "") -> tuple[str, ...]:
+        """The side conditions of a goal that have been settled and do not stand: of a node and of those from which
+        values flow to it, or of all."""
+        graph, nodes = self.frame_of(goal).graph, {behind: None} if behind else dict.fromkeys(goal.nodes)
+        for node in (waiting := list(nodes)):
+            waiting += (more := [p for p in graph.providers(node) if p not in nodes])
+            nodes |= dict.fromkeys(more)
+        known = self.known(goal).items()
+        return tuple(
+            f"{goal.name}.{c.about}" for c, s in known if s.verdict is not Verdict.PROVED and c.consumer in nodes
+        )
+
     def machine(self, seed: int = 0, of: str = "") -> Machine:
         """The composed contracts as a transition system, made once; beside them what is remembered `of` a requirement.
         Raises CannotRun."""

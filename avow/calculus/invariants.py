@@ -7,7 +7,8 @@ establishes by its own questions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Rejected
@@ -16,11 +17,12 @@ from avow.calculus.entailment import implied
 from avow.calculus.induction import BEFORE, Deeper, Steps, deeper
 from avow.calculus.variables import Frame
 from avow.formulas.formula import free_variables, negation, rename
+from avow.formulas.temporal.cell import CELL, Cell
 from avow.kernel.statements import Claimed, Wiring
 from avow.language.contract import Contract
 from avow.language.load import parse_formula
 from avow.language.printer import show_term
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import Past, Role, Term, Variable
 from avow.solving.invariants import Found, invariant
 from avow.solving.limits import effort_left, until
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_RUN, LONGEST_UNROLLING
@@ -41,10 +43,38 @@ def label(written: Written) -> str:
 
 
 def show(written: Written) -> str:
-    formula, *names = written
-    for k in range(len(names) - 1, -1, -1):
-        formula = formula.replace(f"v{k}", names[k].partition(".")[2])
-    return formula
+    return _named(written, [name.partition(".")[2] for name in written[1:]])
+
+
+def in_words(frame: Frame, written: Written) -> str:
+    """An invariant for people: what is remembered is told by the record that it is kept for."""
+    cells = {called: (node, cell) for of in ("", *frame.observed) for node, called, cell in frame.own_cells(of)}
+    names = [name.partition(".")[2] for name in written[1:]]
+    return _named(written, [_remembered(frame, *cells[name]) if name in cells else name for name in names])
+
+
+def _named(written: Written, names: Sequence[str]) -> str:
+    return re.sub(
+        r"\bv(\d+)\b", lambda found: names[int(found[1])] if int(found[1]) < len(names) else found[0], written[0]
+    )
+
+
+def _remembered(frame: Frame, node: str, cell: Cell) -> str:
+    """What a step leaves in a cell."""
+    record = cell.record
+    if record is None:
+        return cell.name.replace(CELL, "")
+    if record.limit is not None:
+        return f"(age in {show_term(frame.placed(node, record), 'rcl')})"
+    kept = record.arguments[0] if record.operator in _OF_NOW else record
+    shown = show_term(frame.placed(node, kept), "rcl")
+    return shown if isinstance(kept, Variable) or record.operator in _CALLED else f"({shown})"
+
+
+_OF_NOW = (Past.PREVIOUS, Past.ROSE, Past.FELL, Past.CHANGED)
+"""Records for which the argument's value is kept."""
+
+_CALLED = (Past.ONCE, Past.HISTORICALLY)
 
 
 def further(frame: Frame, asked: Steps, effort: int, seed: int, claim_name: str) -> Deeper:

@@ -14,7 +14,7 @@ from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideConditi
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
 from avow.calculus.existence import start_name
-from avow.calculus.invariants import INVARIANT, show
+from avow.calculus.invariants import INVARIANT, in_words
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.formulas.formula import negation
@@ -83,19 +83,24 @@ class SideQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         goal = composition.goal(self.goal)
         settled = composition.settled(goal, bounds).settled[self.condition]
+        frame = composition.frame_of(goal)
         if settled.verdict is not Verdict.PROVED:
-            frame = composition.frame_of(goal)
-            return as_far_as_shown(frame, _side_answer(settled, would_hold(frame, goal, settled)))
-        answer = _side_answer(settled)
+            return as_far_as_shown(frame, _side_answer(frame, settled, would_hold(frame, goal, settled)))
+        answer = _side_answer(frame, settled)
         found = composition.certificates.condition(goal, str(self.condition.about), bounds)
-        return certified(answer, found, late=composition.certificates.late)
+        fallen = composition.fallen(goal, self.condition.consumer) if found is None else ()
+        return certified(answer, found, late=composition.certificates.late, fallen=fallen)
 
 
-def certified(answer: Answer, found: Established | None, *, late: bool) -> Answer:
+def certified(answer: Answer, found: Established | None, *, late: bool, fallen: Sequence[str] = ()) -> Answer:
     """A proof of the engine, as far as the kernel establishes it. Where it does not, and the clock ended a question to
-    Z3 (`late`), no answer is given: it would be another on a quicker machine."""
+    Z3 (`late`), no answer is given: it would be another on a quicker machine. `fallen`: side conditions that do not
+    stand, which may be why."""
     if found is None:
         told = f"the engine finds that it {answer.summary}; the kernel could not establish it"
+        if fallen:
+            more = f" and {len(fallen) - 3} more" if len(fallen) > 3 else ""
+            told += f": what rests on these may not be used, they do not stand: {', '.join(fallen[:3])}{more}"
         if late:
             told += ": the clock ended a question to Z3 before its own steps did, ask again"
         return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=told, vacuous=False)
@@ -122,7 +127,7 @@ def _not_kept_to(frame: Frame) -> str:
     return f"what has no formula of one step is left out, and may exclude it: {', '.join(frame.left_out)}"
 
 
-def _side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
+def _side_answer(frame: Frame, settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
     """A settled side condition in words; `repairs`: what would make its refuted cases hold."""
     condition = settled.condition
     details: dict[str, object] = {
@@ -141,7 +146,7 @@ def _side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, .
             for c in settled.cases
         ],
     }
-    if by := [show(case.invariant) for case in settled.cases if case.invariant]:
+    if by := [in_words(frame, case.invariant) for case in settled.cases if case.invariant]:
         details["invariants"] = by
     bad = next((case for case in settled.cases if case.verdict is not Verdict.PROVED), None)
     if settled.circle:
@@ -153,7 +158,7 @@ def _side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, .
     if bad is None:
         return Answer(
             Verdict.PROVED,
-            _why(settled),
+            _why(frame, settled),
             details=details,
             vacuous=settled.vacuous,
         )
@@ -177,11 +182,11 @@ def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
     return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
 
 
-def _why(settled: Settled) -> str:
+def _why(frame: Frame, settled: Settled) -> str:
     if settled.vacuous:
         return f"holds only because these contradict one another: {', '.join(settled.needed)}"
     needed = ", ".join(label for label in settled.needed if not label.startswith(INVARIANT))
-    found = [show(case.invariant) for case in settled.cases if case.invariant]
+    found = [in_words(frame, case.invariant) for case in settled.cases if case.invariant]
     needed += f"; by an invariant that was found: {' and '.join(found)}" if found else ""
     if settled.trivial and not settled.needed:
         return "holds by the types alone: no guarantee carries it"

@@ -20,7 +20,7 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import steps
-from avow.calculus.invariants import INVARIANT, Written, further, show
+from avow.calculus.invariants import INVARIANT, Written, further, in_words
 from avow.calculus.model_checking import judge_property, refuting_run
 from avow.calculus.questions import Answer, as_far_as_shown, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
@@ -198,19 +198,21 @@ class FormulaQuestion:
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
         details: dict[str, object] = {"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {})
-        if by:
-            details["invariants"] = [*map(show, by)]
-            summary += f"; by an invariant that was found: {' and '.join(map(show, by))}"
+        cases = [Case(phase, one.verdict, one.needed) for one in answers]
+        hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
+        found = composition.certificates.requirement(self.name, hint, bounds, by)
+        fallen = composition.fallen(composition.whole) if found is None else ()
+        shown = [in_words(composition.frame, one) for one in by]
+        if shown and not fallen:  # else it was found with what may not be used
+            details["invariants"] = shown
+            summary += f"; by an invariant that was found: {' and '.join(shown)}"
         answer = Answer(
             Verdict.PROVED,
             summary,
             details=details,
             vacuous=any(answer.vacuous for answer in answers),
         )
-        cases = [Case(phase, one.verdict, one.needed) for one in answers]
-        hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
-        found = composition.certificates.requirement(self.name, hint, bounds, by)
-        return certified(answer, found, late=composition.certificates.late)
+        return certified(answer, found, late=composition.certificates.late, fallen=fallen)
 
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:
         details: dict[str, object] = {"genuine": True}

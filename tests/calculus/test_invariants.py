@@ -112,6 +112,26 @@ def test_a_run_is_looked_for_where_there_is_one(tmp_path: Path) -> None:
     assert len(found.counterexample.trace) == 30
 
 
+def test_what_is_remembered_is_told_by_its_record(tmp_path: Path) -> None:
+    a = node("a", "e : BOOL", "x : BOOL", "G keep: once(in.e) -> out.x")
+    found = required(tmp_path, (a, ""), "historically(not a.e) or a.x")
+    assert found.summary.endswith("by an invariant that was found: once(in.e) <=> not historically(not in.e)")
+
+
+def test_a_proof_that_rests_on_what_does_not_stand_says_so(tmp_path: Path) -> None:
+    text, plan = adding("0")
+    use = node("use", "x : INTEGER", "z : INTEGER", "A pos: in.x > 0", "G up: out.z >= in.x")
+    apart = node("apart", "y : INTEGER", "", "A big: in.y > 9")
+    last = node("last", "z : INTEGER", "", "A pos: in.z > 0")
+    system = make(tmp_path, text + use + apart + last, plan + "requirements: {R: {text: t, formula: 'use.z > 0'}}\n")
+    found = outcomes(system)
+    of_all, of_one = found["R"], found["whole.last.pos"]
+    assert {of_all.verdict, of_one.verdict} == {Verdict.UNKNOWN}
+    assert of_all.summary.endswith("they do not stand: whole.use.pos, whole.apart.big")
+    assert of_one.summary.endswith("they do not stand: whole.use.pos"), "what does not reach it changes no answer"
+    assert "invariant" not in of_all.summary
+
+
 def test_an_assumption_is_shown_by_an_invariant(tmp_path: Path) -> None:
     text, plan = adding("0")
     use = node("use", "x : INTEGER", "", "A pos: in.x >= 0")
