@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -22,7 +22,7 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
     the claims under it; code 2 where there is nothing to establish.
     """
-    from avow.base.codec import Unreadable
+    from avow.base.codec import from_text
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder
     from avow.calculus.certificate_json import from_json
@@ -42,11 +42,11 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     known = statements(wired)
     names = {(s.node, s.digest): s.name for s in known.every}
     try:
-        kept = json.loads(certificates.read_text())
+        kept = from_text(dict[str, Any], certificates.read_bytes())
         if "kernel" in kept:
             kept = kept["kernel"]["certificates"]
         found = {scope: from_json(data) for scope, data in kept.items()}
-    except (ValueError, AttributeError, KeyError, TypeError, Unreadable) as error:
+    except (ValueError, AttributeError, KeyError, TypeError) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
     if not any(entry.how in claims for certificate in found.values() for entry in certificate.entries):
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: no claim is shown in it"))

@@ -12,9 +12,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
+from typing import Any
 
 from avow.assurance.certification import KernelRun
-from avow.base.codec import Unreadable
+from avow.base.codec import Unreadable, from_text
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
@@ -153,7 +154,6 @@ def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablis
 def _read(text: str) -> dict[str, Certificate]:
     """What cannot be read is no certificate."""
     try:
-        data = json.loads(text)
-        return {str(scope): from_json(found) for scope, found in data.items()}
-    except (ValueError, AttributeError, Unreadable):
+        return {scope: from_json(found) for scope, found in from_text(dict[str, Any], text).items()}
+    except Unreadable:
         return {}

@@ -20,6 +20,15 @@ from avow.system.load import load_system
 from kernel.test_kernel import LOOP, PLAN, made
 
 
+@pytest.mark.parametrize("text", ["", "7", "[" * 100_000, '{"kernel": 7}', '{"a": 7}', "\x00"], ids=range(6))
+def test_what_is_no_file_of_certificates_is_refused(tmp_path: Path, text: str) -> None:
+    make(tmp_path, "node n { inputs( a : BOOL ) outputs( b : BOOL ) topics() guarantee( out.b ) }")
+    (tmp_path / "certificates.json").write_text(text)
+    with pytest.raises(Rejected) as told:
+        invoke(command, str(tmp_path), str(tmp_path / "certificates.json"))
+    assert [d.code for d in told.value.diagnostics] == ["CLI005"]
+
+
 def test_recheck(tmp_path: Path) -> None:
     _, certificate = made(tmp_path / "system")
     kept = tmp_path / "certificates.json"
