@@ -58,10 +58,17 @@ def unsealed(path: Path) -> bytes | None:
 
 
 def cache_folder() -> Path:
-    """Where this user's caches lie: never in the folder that Avow is started in, which may be somebody else's."""
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    base = named if named.is_absolute() else Path.home() / ".cache"
-    return (base if base.is_absolute() else Path(pwd.getpwuid(os.getuid()).pw_dir) / ".cache") / "avow"
+    """Where this user's caches lie: never in the folder that Avow is started in, which may be somebody else's. A user
+    without a home (of a container that does not know the number) keeps nothing: there is no such folder."""
+    named, home = Path(os.environ.get("XDG_CACHE_HOME", "")), Path(os.environ.get("HOME", ""))
+    if named.is_absolute():
+        return named / "avow"
+    if not home.is_absolute():
+        try:
+            home = Path(pwd.getpwuid(os.getuid()).pw_dir)
+        except KeyError:
+            home = Path(os.devnull)
+    return home / ".cache" / "avow"
 
 
 def _seal(path: Path, data: bytes) -> bytes:
@@ -105,7 +112,7 @@ def _key(folder: str) -> bytes:
 def _kept_key(path: Path) -> bytes | None:
     """None where there is none, or less than one: an empty file would be a key that everybody knows."""
     try:
-        key = bytes.fromhex(path.read_text())
+        key = bytes.fromhex(read_regular(path).decode())
     except (OSError, ValueError):
         return None
     return key if len(key) == _KEY_BYTES else None

@@ -1,5 +1,5 @@
 """Outside tools, and finding them. Asking a program for its version may take a second, so the answer is kept for as
-long as the program's file is the same."""
+long as all that the program is made of is the same."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from avow.base import process
 from avow.base.files import digest_file, sha256
 from avow.base.notes import cache_folder, read_note, write_note
+from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.tuning.running import VERSION_SECONDS
 
@@ -94,11 +95,7 @@ def package_digest(name: str) -> str:
 
 
 def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:
-    try:
-        stat = Path(path).stat()
-    except OSError:
-        return "unknown"
-    key = json.dumps([str(Path(path).resolve()), stat.st_mtime_ns, stat.st_size, arguments, pattern])
+    key = json.dumps([str(Path(path).resolve()), program_digest((path,)), arguments, pattern])
     known = _read()
     if key in known:
         return known[key]

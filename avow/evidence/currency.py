@@ -69,16 +69,16 @@ def refutations(ledger: Ledger, entry: Entry) -> tuple[Entry, ...]:
     return ledger.refutations(record.obligation, record.obligation_digest, record.backend)
 
 
-def outside_of(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
-    """What subjects looked at beyond the workspace, each once: a change there is none that its folders tell of."""
+def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
+    """All that subjects looked at, each once, with its whole path; relative ones are under `root`, the workspace."""
     found: dict[tuple[str, Seen], Observed] = {}
     for entry in entries:
         try:
             seen = from_json(tuple[Observed, ...], entry.evidence.details.get(OBSERVED, []))
         except ValueError:
             continue
-        found |= {(o.path, o.kind): o for o in seen if Path(o.path).is_absolute() and o.kind is not Seen.OUTSIDE}
-    return tuple(found.values())
+        found |= {(o.path, o.kind): o for o in seen if o.kind is not Seen.OUTSIDE}
+    return tuple(Observed(o.kind, os.path.join(root, o.path), o.digest) for o in found.values())  # noqa: PTH118
 
 
 def _apart(record: Evidence) -> bool:

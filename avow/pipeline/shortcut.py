@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -31,6 +31,8 @@ from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
+_OURS = (".doit.json", ".lock", ".settled.json")
+"""Among the artifacts: doit's own memory and our locks, which change with every run."""
 _PACKAGES = ("z3", "cvc5", "hypothesis")
 """Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
 
@@ -96,12 +98,12 @@ def _stamp(workspace: Workspace) -> Path:
 
 
 def _observed(workspace: Workspace) -> tuple[Observed, ...]:
-    """What subjects were seen to look at beyond the workspace."""
-    from avow.evidence.currency import outside_of
+    """What subjects were seen to look at, beyond the workspace or anywhere in it."""
+    from avow.evidence.currency import looked_at
     from avow.evidence.ledger import ledger_of
 
     entries = [e for path in sorted(workspace.ledgers.glob("*.jsonl")) for e in ledger_of(path).records()]
-    return outside_of(entries, workspace.root)
+    return looked_at(entries, workspace.root)
 
 
 def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) -> str:
@@ -110,7 +112,7 @@ def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) 
     for o in observed:
         mark = marks(o) or look(o.kind, o.path)
         digest.update(f"{o.kind} {o.path} {mark}\n".encode("utf-8", "surrogateescape"))
-    _add_files(digest, workspace.artifacts, workspace.reports)
+    _add_files(digest, _OURS, workspace.artifacts, workspace.reports)
     return digest.hexdigest()
 
 
@@ -123,7 +125,8 @@ def _sources(workspace: Workspace) -> str:
     key = signing_key()
     digest.update(_mark(str(key)).encode() if key is not None else b"")
     signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
-    _add_files(digest, workspace.contracts, *signed, *_CODE)
+    _add_files(digest, (), workspace.contracts, *signed)  # whatever it is called, a plan may name it
+    _add_files(digest, ("__pycache__",), *_CODE)
     digest.update(json.dumps([package_digest(name) for name in _PACKAGES]).encode())
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
         digest.update(f"{name} {_searched(name, workspace)}\n".encode("utf-8", "surrogateescape"))
@@ -143,20 +146,19 @@ def _searched(name: str, workspace: Workspace) -> str:
         return json.dumps([[e.name, "" if e.is_dir() else _mark(e.path)] for e in there])
 
 
-def _add_files(digest: hashlib._Hash, *folders: Path) -> None:
+def _add_files(digest: hashlib._Hash, without: Collection[str], *folders: Path) -> None:
     for folder in folders:
-        for line in _files(folder):
+        for line in _files(folder, without):
             digest.update(line.encode("utf-8", "surrogateescape"))
 
 
-def _files(folder: Path) -> Iterator[str]:
+def _files(folder: Path, without: Collection[str]) -> Iterator[str]:
     stack = [str(folder)]
     while stack:
         current = stack.pop()
         with os.scandir(current) as entries:
             for entry in sorted(entries, key=lambda e: e.name):
-                # doit's own memory and our locks change with every run; caches are nobody's input
-                if entry.name in (".doit.json", ".lock", ".settled.json", "__pycache__"):
+                if entry.name in without:
                     continue
                 if entry.is_dir(follow_symlinks=False):
                     stack.append(entry.path)

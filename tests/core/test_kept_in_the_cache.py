@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
+import os
 import pickle
 from pathlib import Path
 
 import pytest
 
-from avow.base import tools
+from avow.base import programs, tools
 from avow.base.grammars import lark_of
 from avow.base.notes import cache_folder, read_note, write_note
 
@@ -23,11 +24,15 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "avow"
 
 
+def _grammar(folder: Path) -> Path:
+    (folder / "g.lark").write_text(ORDERED)
+    return folder / "g.lark"
+
+
 def tables(tmp_path: Path, cache: Path) -> Path:
     """Of the grammar, which is read once and again."""
-    (tmp_path / "g.lark").write_text(ORDERED)
     for _ in range(2):
-        parser = lark_of.__wrapped__(tmp_path / "g.lark", "g", ("start",))
+        parser = lark_of.__wrapped__(_grammar(tmp_path), "g", ("start",))
         assert str(parser.parse("a<=b").children[0]) == "<="
     (made,) = cache.glob("g-*.lark")
     return made
@@ -98,6 +103,64 @@ def test_an_edited_version_of_a_tool_is_asked_again(
     assert "2.3.0" in kept.read_text()
     kept.write_text(kept.read_text().replace("2.3.0", "4.9.0"))
     assert version() == "2.3.0"
+
+
+@pytest.mark.parametrize("edited", ["madetool", "engine"])
+def test_a_version_is_asked_again_when_any_part_of_the_program_is_another(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, edited: str
+) -> None:
+    """Also under the same length and time."""
+    (tmp_path / "made").mkdir()
+    engine = tmp_path / "made" / "engine"
+    for path, text in (
+        (engine, "echo 2.3.0"),
+        (engine.with_name("madetool"), f'#!/bin/sh\n. {engine} && echo "a" >&2\n'),
+    ):
+        path.write_text(text)
+        path.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / "made"), prepend=":")
+
+    def version() -> str | None:
+        for known in (tools.find_tool, programs.program_files):
+            known.cache_clear()
+        return tools.find_tool("madetool", install="", pattern=r"\d[\d.]+|b").version
+
+    assert version() == version() == "2.3.0"
+    path = tmp_path / "made" / edited
+    before = path.stat()
+    path.write_text(path.read_text().replace("2.3.0", "2.4.0").replace(". /", ": /").replace('"a"', '"b"'))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_size == before.st_size
+    assert version() == {"engine": "2.4.0", "madetool": "b"}[edited]
+
+
+@pytest.mark.parametrize("special", ["pipe", "device", "folder"])
+def test_what_is_no_file_is_no_key_and_nobody_waits_for_it(tmp_path: Path, cache: Path, special: str) -> None:
+    cache.mkdir(parents=True)
+    match special:
+        case "pipe":
+            os.mkfifo(cache / "notes.key")
+        case "device":
+            (cache / "notes.key").symlink_to("/dev/zero")
+        case _:  # a folder
+            (cache / "notes.key").mkdir()
+    write_note(tmp_path / "note.json", {"a": 1})
+    assert read_note(tmp_path / "note.json") == {"a": 1}
+
+
+def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def unknown(number: int) -> object:
+        raise KeyError(f"getpwuid(): uid not found: {number}")
+
+    monkeypatch.setattr("pwd.getpwuid", unknown)
+    tables = lark_of.__wrapped__(_grammar(tmp_path), "g", ("start",))
+    assert str(tables.parse("a<=b").children[0]) == "<="
+    assert not cache_folder().exists()
+    write_note(tmp_path / "note.json", {"a": 1})
+    assert read_note(tmp_path / "note.json") == {"a": 1}
 
 
 @pytest.mark.parametrize("bad", ["", "00", "no key"])

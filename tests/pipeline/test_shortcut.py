@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from assurance.sample import evidence, guarantee
 
+from avow.base.codec import to_json
+from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.ledger import Ledger
+from avow.evidence.record import OBSERVED
+from avow.isolation.observed import Observed, Seen, look
 from avow.pipeline.results import Result
 from avow.pipeline.shortcut import Shortcut
 from avow.pipeline.tasks import wanted as read_wanted
@@ -59,6 +66,34 @@ def test_new_and_deleted_files_are_seen(settled: Workspace) -> None:
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
     extra.unlink()
     (settled.root / "reports" / "index.html").unlink()
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
+
+
+@pytest.mark.parametrize("name", ["models/__pycache__/node.py", "data/.lock", ".doit.json", ".settled.json"])
+def test_an_edit_of_a_systems_file_is_seen_whatever_it_is_called(settled: Workspace, name: str) -> None:
+    path = settled.contracts / "crane" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("text")
+    run(settled)
+    assert Shortcut(settled).nothing_to_do(("verify",)) == (RESULT,)
+    path.write_text("tExt")
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
+
+
+@pytest.mark.parametrize("name", ["src/gain.txt", "contracts/../gain.txt", "../gain.txt"])
+@pytest.mark.parametrize("absolute", [True, False])
+def test_an_edit_of_what_a_subject_read_is_seen_wherever_it_lies(settled: Workspace, name: str, absolute: bool) -> None:
+    path = settled.root / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("1")
+    told = Observed(Seen.READ, str(path) if absolute else name, look(Seen.READ, str(path)))
+    record = evidence(guarantee("crane", "lifts"), Verdict.TESTED, "hypothesis")
+    ledger = settled.ledger("crane")
+    ledger.write_text("")
+    Ledger(ledger).append(replace(record, details={OBSERVED: to_json((told,))}))
+    run(settled)
+    assert Shortcut(settled).nothing_to_do(("verify",)) == (RESULT,)
+    path.write_text("2")
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
