@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.pipeline.engine_code import code_mark
 from avow.pipeline.executors import Asked, Came, answered
 from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Tools
@@ -101,11 +102,20 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+_BEGAN = "avow began"
+"""On a worker: of which code it is. Its forks have that in memory, and would answer for what lies there now."""
+
+
 def perform(data: bytes, key: str, seconds: float) -> bytes:
     """Runs on a worker: the work in a fork; the answer's bytes, or why there is none as JSON."""
     from distributed import get_worker
 
-    forks = get_worker().extensions.setdefault("avow forks", Forks())
+    extensions = get_worker().extensions
+    if extensions.get(_BEGAN) != code_mark():
+        return (
+            b"-" + json.dumps([f"Avow is another on {socket.gethostname()} since its worker began", False, ""]).encode()
+        )
+    forks = extensions.setdefault("avow forks", Forks())
     # one folder for all works of this process: a fork server is of one
     came = answered(forks, data, key, seconds, Path(tempfile.gettempdir()), _cancelled())
     if isinstance(came.data, bytes):
@@ -236,7 +246,7 @@ def serve(address: Address, slots: int, tools: Tools) -> None:
         message = "other machines are reached by Dask, which is not installed"
         raise Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'")) from error
 
-    security = address.security()
+    security, began = address.security(), code_mark()
     address.greet()
 
     async def work() -> None:
@@ -249,6 +259,7 @@ def serve(address: Address, slots: int, tools: Tools) -> None:
             dashboard=False,
             death_timeout=CLUSTER_CONNECT,
         )
+        worker.extensions[_BEGAN] = began
         async with worker:
             await worker.finished()
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
 import sys
 from pathlib import Path
 
 import avow
 from avow.backend_kit.protocol import Backend
-from avow.base.files import digest_file
+from avow.base.files import digest_file, sha256
 
 _ROOMS = (
     "tuning/effort.py",
@@ -42,6 +43,13 @@ def engine_digest() -> str:
 def backend_digest(tool: Backend) -> str:
     """Of the code behind a backend's answers: the core's, and its own package or module."""
     return _digest((*_of(_ROOMS_OF_BACKENDS), *_own(type(tool).__module__)))
+
+
+def code_mark() -> str:
+    """Of this package's files as they lie there now, by size and times: a process that lives long has imported what lay
+    there when it began."""
+    files = ((str(file), file.stat()) for file in sorted(_PACKAGE.rglob("*.py")))
+    return sha256(json.dumps([[name, info.st_ino, info.st_size, info.st_mtime_ns] for name, info in files]))
 
 
 @functools.cache

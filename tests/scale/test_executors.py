@@ -17,6 +17,7 @@ import threading
 import time
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -425,6 +426,23 @@ def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -
         assert not (tmp_path / "ran").exists()
     finally:
         cluster.close()
+
+
+def test_a_worker_whose_code_was_exchanged_refuses(place: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    from avow.pipeline import cluster, engine_code
+
+    package = place.root / "package"
+    (package / "base").mkdir(parents=True)
+    (package / "base/some.py").write_text("A = 1")
+    monkeypatch.setattr(engine_code, "_PACKAGE", package)
+    here = SimpleNamespace(extensions={cluster._BEGAN: engine_code.code_mark()})
+    monkeypatch.setattr(distributed, "get_worker", lambda: here)
+    monkeypatch.setattr(cluster, "_cancelled", lambda: None)
+    monkeypatch.setattr(cluster, "answered", lambda forks, data, key, *more: Came(key, b"it"))
+    assert cluster.perform(b"", "k", 1) == b"+it"
+    (package / "base/some.py").write_text("A = 10")
+    assert b"since its worker began" in cluster.perform(b"", "k", 1)
 
 
 @pytest.mark.parametrize(
