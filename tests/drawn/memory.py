@@ -9,7 +9,7 @@ from fractions import Fraction
 from oracle.seconds import Word
 from oracle.values import Step
 
-from avow.formulas.formula import substitute
+from avow.formulas.formula import free_variables, substitute
 from avow.language.load import parse_formula
 from avow.language.sorts import NATURAL as NATURAL_SORT
 from avow.language.terms import History, Implies, Literal, Term
@@ -55,9 +55,12 @@ def _parts(term: Term) -> tuple[Term, History]:
 
 
 def clause(rng: random.Random) -> Term:
-    """A clause with few states, which speaks of no number."""
-    found = Implies(*response(rng)) if rng.random() < 0.5 else formula(rng, rng.randrange(1, 3))
-    return substitute(found, {N: Literal(1, NATURAL_SORT)})
+    """A clause with few states, which speaks of a port, and of no number."""
+    while True:
+        found = Implies(*response(rng)) if rng.random() < 0.5 else formula(rng, rng.randrange(1, 3))
+        found = substitute(found, {N: Literal(1, NATURAL_SORT)})
+        if free_variables(found):
+            return found
 
 
 def run_of(rng: random.Random, length: int = 9) -> list[Step]:
