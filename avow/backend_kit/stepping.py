@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
-from avow.formulas.formula import free_variables, substitute
+from avow.formulas.formula import equation, free_variables, substitute
 from avow.formulas.temporal.cell import Cell, Unsaid
 from avow.formulas.temporal.cells import Records, written
 from avow.formulas.traversal import transform
@@ -189,7 +189,7 @@ def _families(steps: Stepping) -> Iterator[tuple[Term, ...]]:
     first = next((c for c in steps.cells if c.initial == TRUE and c.now == FALSE), None)
     if first is not None:
         yield from ((Implies(first.before, c.begins()),) for c in steps.cells if c.initial is not None and c != first)
-        yield from ((Implies(first.before, _same(h.before, h.initial)),) for h in steps.held)
+        yield from ((Implies(first.before, equation(h.before, h.initial)),) for h in steps.held)
     cells = [c for c in steps.cells if not c.parameters]
     numbers = [c for c in cells if c.sort in _NUMBERS]
     for cell in (c for c in numbers if c.sort == INTEGER):
@@ -199,9 +199,9 @@ def _families(steps: Stepping) -> Iterator[tuple[Term, ...]]:
         yield from ((Compare(sign, each.before, each.initial),) for sign in (">=", "<="))
         yield from (tuple(_counters(each.before, cell)) for cell in numbers)
     for k, a in enumerate(cells):
-        yield from ((_same(a.before, b.before),) for b in cells[:k] if a.sort == b.sort)
+        yield from ((equation(a.before, b.before),) for b in cells[:k] if a.sort == b.sort)
     for h in steps.held:
-        yield from ((_same(h.before, c.before),) for c in cells if c.sort == h.sort and c.sort not in _NUMBERS)
+        yield from ((equation(h.before, c.before),) for c in cells if c.sort == h.sort and c.sort not in _NUMBERS)
     for held in steps.held:
         for one in _conditions(held.before):
             yield from _agreeing(one, (other for c in cells for other in _conditions(c.before)))
@@ -256,7 +256,3 @@ def _least(term: Term, most: int) -> Term:
 
 def _number(value: int) -> Term:
     return Literal(value, INTEGER if value < 0 else NATURAL)
-
-
-def _same(one: Term, other: Term) -> Term:
-    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)

@@ -24,7 +24,6 @@ from avow.language.load import parse_formula
 from avow.language.printer import show_term
 from avow.language.terms import Past, Role, Term, Variable
 from avow.solving.invariants import Found, invariant
-from avow.solving.limits import effort_left, until
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_RUN, LONGEST_UNROLLING
 from avow.tuning.effort import DEEPER_EFFORT, INVARIANT_EFFORT
 
@@ -80,16 +79,15 @@ _CALLED = (Past.ONCE, Past.HISTORICALLY)
 def further(frame: Frame, asked: Steps, effort: int, seed: int, claim_name: str) -> Deeper:
     """What settles a claim that holds at the first step and that one step of induction does not keep: induction over a
     few steps, an invariant, or a run that breaks it; longer ones where Spacer says that there is one."""
-    end = until(min(effort, DEEPER_EFFORT))
-    found = deeper(asked, effort_left(end), seed, claim_name, range(2, DEEPEST_INDUCTION + 1))
+    each = min(effort, DEEPER_EFFORT)
+    found = deeper(asked, each, seed, claim_name, range(2, DEEPEST_INDUCTION + 1))
     if found.proved is not None or found.run is not None:
         return found
     guess = _guessed(asked, effort)
     if guess.invariant is not None and (by := _inductive(frame, asked, guess.invariant, effort, seed)) is not None:
         return by
     longest = LONGEST_RUN if guess.broken else LONGEST_UNROLLING
-    end = until(min(effort, DEEPER_EFFORT))
-    return deeper(asked, effort_left(end), seed, claim_name, range(DEEPEST_INDUCTION + 1, longest + 1))
+    return deeper(asked, each, seed, claim_name, range(DEEPEST_INDUCTION + 1, longest + 1))
 
 
 def _guessed(asked: Steps, effort: int) -> Found:

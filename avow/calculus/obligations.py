@@ -94,11 +94,10 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], lim
         task = tasks.get(obligation.id)
         if task is None:
             outcome = questions.vanished(obligation.id)
-            yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
-            continue
-        answer = task.ask(composition, bounds)
-        goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
-        outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
+        else:
+            answer = task.ask(composition, bounds)
+            goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
+            outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
         yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
 
 

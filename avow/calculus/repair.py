@@ -18,6 +18,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
+from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, rename, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.language.operators import OPPOSITE
@@ -151,11 +152,8 @@ def _eliminated(known: Mapping[str, Term], goal: Term, place: Place) -> tuple[Te
 def _rewritten(known: Mapping[str, Term], goal: Term, place: Place) -> Term | None:
     """The goal, with what equations among the hypotheses say its variables are: ``f(x)`` as ``f(k + 1)``."""
     equations: dict[Variable, Term] = {}
-    stack = list(known.values())
-    while stack:
-        match stack.pop():
-            case And(items=items):
-                stack += items
+    for part in reversed(conjuncts(conjunction(known.values()), True)):
+        match part:
             case Iff(left=Variable() as left, right=right) if left not in place.ports:
                 equations.setdefault(left, right)
             case Iff(left=left, right=Variable() as right) if right not in place.ports:

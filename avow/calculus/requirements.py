@@ -87,15 +87,14 @@ class FormulaQuestion:
         """One round. The `patient` one, after a quick one, asks only the widest question of each kind: what nothing
         settles costs a few times the limit, and no more."""
         frame = composition.frame
-        everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
+        everything = _every_guarantee(frame)
         goal = system_term(frame, self.formula)
-        remembered = frame.memory(of=self.name)
-        delayed = bool(remembered) or any(edge.delayed for edge in frame.graph.edges)
+        delayed = bool(frame.memory(of=self.name)) or any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
         for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
             if (everything and not clauses) or (patient and delayed):
                 continue
-            last = self.ask(contracts(frame, clauses) | frame.environment() | remembered, goal, bounds)
+            last = self.ask(self.known(frame, clauses), goal, bounds)
             if last.verdict is Verdict.PROVED:
                 return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
         if delayed:
@@ -110,8 +109,8 @@ class FormulaQuestion:
         if answer.verdict is not Verdict.REFUTED and "induction" not in answer.details:
             return answer
         nodes = frame.graph.nodes
-        everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
-        hypotheses = contracts(frame, everything) | frame.environment() | frame.memory(of=self.name)
+        everything = _every_guarantee(frame)
+        hypotheses = self.known(frame, everything)
         hypotheses |= dict(further or {})
         spoken = free_variables(goal)
         places = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
@@ -130,7 +129,7 @@ class FormulaQuestion:
         self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
     ) -> Answer:
         frame = composition.frame
-        now = contracts(frame, everything) | frame.environment() | frame.memory(of=self.name)
+        now = self.known(frame, everything)
         initial = frame.initials(frame.graph.nodes) | frame.blank(self.name)
         quick = replace(bounds, effort=min(QUICK_EFFORT, bounds.effort))
         first = self.ask(now | initial, goal, quick)
@@ -139,7 +138,7 @@ class FormulaQuestion:
         if first.verdict is not Verdict.PROVED:
             return self.repaired(frame, goal, self.not_proved(first, "at the first step"), initial, Phase.INITIAL.value)
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
-        before = contracts(frame, everything, 1) | frame.environment(1) | frame.memory(1, self.name)
+        before = self.known(frame, everything, 1)
         later = first
         # Mostly it keeps itself; and the contracts of a step less make it quick.
         for earlier in (itself | before,) if patient else (itself, itself | before):
@@ -174,6 +173,10 @@ class FormulaQuestion:
             shown,
             details={"genuine": False, "induction": "fails", "step": dict(values)},
         )
+
+    def known(self, frame: Frame, clauses: tuple[str, ...], earlier: int = 0) -> dict[str, Term]:
+        """What may be used of a step: these clauses, what is assumed of the environment, and what is remembered."""
+        return contracts(frame, clauses, earlier) | frame.environment(earlier) | frame.memory(earlier, self.name)
 
     def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
         return implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)
@@ -264,6 +267,10 @@ def formula_question(frame: Frame, name: str, support: tuple[str, ...]) -> Formu
     known = frame.observed.get(name, Observed(term))
     text = show_term(system_term(frame, term))
     return FormulaQuestion(name, known.formula, text, digest(term), support, known.unsaid)
+
+
+def _every_guarantee(frame: Frame) -> tuple[str, ...]:
+    return tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
 
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:

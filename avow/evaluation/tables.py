@@ -9,11 +9,10 @@ from typing import assert_never
 from avow.evaluation.compiler import Compiler, NotEvaluable, finite_values
 from avow.evaluation.evaluate import SEARCHES, compile_term, filler, guarded
 from avow.evaluation.quantifier_search import Search
-from avow.formulas.formula import conjunction, disjunction, negation
+from avow.formulas.formula import conjunction, disjunction, equation, negation, opposite
 from avow.formulas.renaming import rename_apart
 from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
-    BOOL,
     BoolSort,
     DataSort,
     EnumSort,
@@ -28,7 +27,7 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.language.terms import Apply, Compare, Conditional, Iff, Role, Term, Variable
+from avow.language.terms import Apply, Conditional, Role, Term, Variable
 from avow.tuning.bounds import TABLE_ROUNDS
 
 Table = Callable[[Mapping[str, Value], Value | None], FunctionValue]
@@ -73,7 +72,7 @@ def _differ(term: Term, kept: Term) -> Term:
     if isinstance(term, Conditional):
         met = conjunction((term.condition, _differ(term.then, kept)))
         return disjunction((met, conjunction((negation(term.condition), _differ(term.otherwise, kept)))))
-    return negation(Iff(term, kept)) if term.sort == BOOL else Compare("!=", term, kept)
+    return opposite(equation(term, kept))
 
 
 def unnamed(sort: Sort) -> Value:

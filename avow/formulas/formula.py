@@ -73,6 +73,7 @@ __all__ = [
     "conjunction",
     "digest",
     "disjunction",
+    "equation",
     "free_variables",
     "has_nonlinear",
     "meaning",
@@ -112,6 +113,11 @@ def negation(term: Term) -> Term:
 def opposite(term: Term) -> Term:
     """An equivalent of ``not term``, without a `not` in front if there is one."""
     return Compare(OPPOSITE[term.operator], term.left, term.right) if isinstance(term, Compare) else negation(term)
+
+
+def equation(one: Term, other: Term) -> Term:
+    """That two terms have one value: ``<=>`` of formulas."""
+    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
 
 
 def _join(terms: tuple[Term, ...], kind: type[And] | type[Or]) -> Term:

@@ -16,21 +16,19 @@ from itertools import product
 from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.evaluation.running import Keeper
-from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.formula import conjunction, disjunction, equation, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Remembering
 from avow.formulas.traversal import transform
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
-from avow.language.sorts import BOOL, Sort, TupleSort
+from avow.language.sorts import Sort, TupleSort
 from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,
     Apply,
-    Compare,
     Conditional,
-    Iff,
     Implies,
     Quantified,
     Quantifier,
@@ -172,7 +170,7 @@ def told_apart(remembering: Remembering) -> Remembering:
         (_, found), *others = parts[term.function]
         chosen: Term = found
         for place, cell in others:
-            there = conjunction(map(_same, term.arguments, place))
+            there = conjunction(map(equation, term.arguments, place))
             chosen = Conditional(there, cell, chosen, cell.sort)
         return chosen
 
@@ -235,10 +233,6 @@ def _decided(contract: Contract) -> Viability:
         return found
     defeats = (_defeated(contract, length) for length in range(2, INPUTS_AHEAD + 1))
     return next(filter(None, defeats), found)
-
-
-def _same(one: Term, other: Term) -> Term:
-    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
 
 
 @dataclass(slots=True)
@@ -326,7 +320,7 @@ class _Game:
 
     def at(self, memory: _Memory) -> Term:
         cells = self.contract.remembering.before
-        return conjunction(_same(v, value_term(x, v.sort)) for v, x in zip(cells, memory, strict=True))
+        return conjunction(equation(v, value_term(x, v.sort)) for v, x in zip(cells, memory, strict=True))
 
     def _confirmed(self) -> bool:
         """Whether the solver shows of each memory that the environment's moves lead to that no answer leads out."""
@@ -338,7 +332,7 @@ class _Game:
                 continue
             asked.add(memory)
             rounds, (inputs, answers) = self.lost[memory]
-            given = [_same(v, value_term(inputs[v.qualified], v.sort)) for v in contract.inputs]
+            given = [equation(v, value_term(inputs[v.qualified], v.sort)) for v in contract.inputs]
             place = [self.at(memory), *given]
             allowed = solve([*place, *contract.assumed.values()], effort=contract.effort, values="unused")
             lower = self.region([m for m, (at, _) in self.lost.items() if at < rounds])

@@ -13,7 +13,7 @@ from typing import assert_never
 
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
-from avow.formulas.formula import conjunction, negation
+from avow.formulas.formula import conjunction, equation, negation
 from avow.formulas.values import Element, Value
 from avow.language.sorts import INTEGER, REAL, EnumSort, Sort
 from avow.language.terms import TRUE, Arithmetic, Compare, EnumValue, Literal, Or, Term, Variable, Widen
@@ -23,7 +23,7 @@ from avow.solving.questions import entails, solve
 from .guesses import NUMERIC, filled, guesses, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .program import Assign, Block, If, Match, Program, Skip, Update, While, statements, variable
-from .triples import Triple, equation
+from .triples import Triple
 from .tuning import LASTING_EFFORT, UNENDED_RUNS
 from .witness import Breach, first_state
 from .wp import Conditions, TooLarge, defined, weakest

@@ -13,7 +13,7 @@ from dataclasses import replace
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
 from avow.formulas.disjunctions import conjuncts
-from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.formula import conjunction, equation, free_variables, negation, substitute
 from avow.formulas.one_point_rule import solved
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
@@ -91,12 +91,6 @@ class Triple:
         return conjunction((*(equation(v, g) for v, g in self.ghosts), self.pre))
 
 
-def equation(one: Term, other: Term) -> Term:
-    if one.sort.__class__.__name__ == "BoolSort":
-        return Iff(one, other)
-    return Compare("==", one, other)
-
-
 def triples(obligation: str, clause: Clause, node: Node, checked: Checked) -> tuple[Triple, ...]:
     """The triples whose validity is that of the obligation of this id. Raises Rejected (code ``HOARE400``) where the
     formula speaks of an output that the program has nothing for."""
@@ -158,16 +152,8 @@ def _split(formula: Term) -> Iterator[_Part]:
 
 def _sides(antecedent: Term) -> tuple[list[Term], list[Term]]:
     """The conjuncts that speak of inputs only, and the others."""
-    early: list[Term] = []
-    late: list[Term] = []
-    stack = [antecedent]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, And):
-            stack.extend(reversed(part.items))
-        else:
-            (early if _is_input(part) else late).append(part)
-    return early, late
+    parts = conjuncts(antecedent, True)
+    return [p for p in parts if _is_input(p)], [p for p in parts if not _is_input(p)]
 
 
 def _is_input(term: Term) -> bool:
@@ -231,8 +217,7 @@ def _pointwise(compared: Compare) -> Term:
     assert isinstance(sort, FunctionSort)
     points = tuple(variable(f"at~{k}", s) for k, s in enumerate(sort.parameters))
     left, right = (Apply(side, points, sort.result) for side in (compared.left, compared.right))
-    same: Term = Iff(left, right) if sort.result.__class__.__name__ == "BoolSort" else Compare("==", left, right)
-    everywhere = Quantified(Quantifier.FORALL, points, same)
+    everywhere = Quantified(Quantifier.FORALL, points, equation(left, right))
     return everywhere if compared.operator == "==" else Not(everywhere)
 
 

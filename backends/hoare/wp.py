@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
-from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.formula import conjunction, disjunction, equation, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import transform
 from avow.language.definedness import may_lack_value
@@ -220,7 +220,7 @@ def _looked_up(part: Term, after: Variable, update: Update) -> Term:
     inner = next((a for a in _applications(part, after) if not any(_applications(x, after) for x in a.arguments)), None)
     if inner is None:
         return part
-    same = conjunction(equal(a, b) for a, b in zip(inner.arguments, update.arguments, strict=True))
+    same = conjunction(equation(a, b) for a, b in zip(inner.arguments, update.arguments, strict=True))
     before = Apply(update.target, inner.arguments, inner.sort)
     if inner == part:
         return disjunction((conjunction((same, update.value)), conjunction((negation(same), before))))
@@ -234,11 +234,6 @@ def _applications(term: Term, function: Variable) -> list[Apply]:
 
 def _replaced(term: Term, old: Term, new: Term) -> Term:
     return transform(term, lambda part: new if part == old else part)
-
-
-def equal(left: Term, right: Term) -> Term:
-    """Equality of terms of one sort, up to widening."""
-    return Iff(left, right) if left.sort == BOOL else Compare("==", left, right)
 
 
 # -- what a program can compute ----------------------------------------------------------------------------------------

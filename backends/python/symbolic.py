@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.formulas.formula import conjunction, disjunction, negation
+from avow.formulas.formula import conjunction, disjunction, equation, negation
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, FunctionSort, Sort
 from avow.language.terms import (
     FALSE,
@@ -155,7 +155,7 @@ class Run:
         ):
             return term
         name = self.fresh(hint, INTEGER if term.sort == NATURAL else term.sort)
-        self.facts.append(same(name, term))
+        self.facts.append(equation(name, term))
         return name
 
     def check(self, state: State, goal: Term, what: str, line: int, candidate: Candidate | None = None) -> None:
@@ -469,10 +469,6 @@ class Run:
         self.facts.append(rounded(result, exact, products=products, beside=variables, at=self.thresholds))
         self.facts += gaps(result, self.gaps)
         return result
-
-
-def same(one: Term, other: Term) -> Term:
-    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
 
 
 def zero(term: Term) -> Literal:

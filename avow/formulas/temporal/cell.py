@@ -9,9 +9,8 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
-from avow.formulas.formula import free_variables
+from avow.formulas.formula import equation, free_variables
 from avow.language.sorts import (
-    BOOL,
     NATURAL,
     REAL,
     BoolSort,
@@ -32,11 +31,9 @@ from avow.language.terms import (
     FALSE,
     TRUE,
     Apply,
-    Compare,
     Construct,
     EnumValue,
     History,
-    Iff,
     Literal,
     Quantified,
     Quantifier,
@@ -92,11 +89,11 @@ class Cell:
         """That a variable (the cell's own) is as the cell is before the first step."""
         if self.initial is None:
             return TRUE
-        return self._everywhere(equal(at(cell or self.before, self.parameters), self.initial))
+        return self._everywhere(equation(at(cell or self.before, self.parameters), self.initial))
 
     def leaves(self, after: Variable) -> Term:
         """That a variable is what this step leaves."""
-        return self._everywhere(equal(at(after, self.parameters), self.now))
+        return self._everywhere(equation(at(after, self.parameters), self.now))
 
     def _everywhere(self, formula: Term) -> Term:
         return Quantified(Quantifier.FORALL, self.parameters, formula) if self.parameters else formula
@@ -130,10 +127,6 @@ def some_value(sort: Sort) -> Term | None:
             return None
         case _:
             assert_never(sort)
-
-
-def equal(left: Term, right: Term) -> Term:
-    return Iff(left, right) if left.sort == BOOL else Compare("==", left, right)
 
 
 def at(variable: Variable, parameters: tuple[Variable, ...]) -> Term:

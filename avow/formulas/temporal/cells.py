@@ -12,8 +12,8 @@ from dataclasses import field, replace
 from typing import assert_never
 
 from avow.base.records import dataclass
-from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
-from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, equal, some_value
+from avow.formulas.formula import conjunction, digest, disjunction, equation, free_variables, negation
+from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, some_value
 from avow.formulas.temporal.responses import in_the_past
 from avow.language.contract import Clause, Node
 from avow.language.definedness import defined
@@ -130,7 +130,7 @@ class Records:
                 return conjunction((negation(parts[0]), self._cell(term, parts[0], FALSE).read))
             case Past.CHANGED:
                 before = self._cell(term, _with_any_value(parts[0]), some_value(parts[0].sort)).read
-                return conjunction((negation(self._is_first()), negation(equal(parts[0], before))))
+                return conjunction((negation(self._is_first()), negation(equation(parts[0], before))))
             case Past.ONCE if amount is None:
                 return self._kept(term, BOOL, FALSE, lambda before: disjunction((parts[0], before)))
             case Past.HISTORICALLY if amount is None:
