@@ -56,7 +56,9 @@ class Shortcut:
             kept = read_note(_stamp(self.workspace)) or {}
             results = tuple(codec.from_json(Result, r) for r in kept["results"])
             observed = codec.from_json(tuple[Observed, ...], kept["observed"])
-            if self._begun is None or kept["identity"] != _identity(self.workspace, self._begun, observed):
+            if self._begun is None or kept["sources"] != self._begun:  # then the rest need not be looked at
+                return None
+            if kept["identity"] != _identity(self.workspace, self._begun, observed):
                 return None
         except (codec.Unreadable, OSError, ValueError, KeyError, TypeError):
             return None
@@ -75,6 +77,7 @@ class Shortcut:
             tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
             observed = (*_observed(self.workspace), *dict.fromkeys(tools))
             kept = {
+                "sources": sources,
                 "identity": _identity(self.workspace, sources, observed),
                 "observed": codec.to_json(observed),
                 "results": codec.to_json(tuple(results)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +84,9 @@ def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
 
 def _system(state: State, surveyed: Survey) -> Iterator[Task]:
     name, workspace, plan = surveyed.system.name, state.workspace, surveyed.system.plan
-    texts = map(workspace.relative, (plan.path, *plan.contract_files, *plan.included))
-    said, ledger = _Said(workspace, tuple(texts)), (workspace.ledger(name),)
+    shown = cache(workspace.relative)  # most tasks name the same few files
+    texts = map(shown, (plan.path, *plan.contract_files, *plan.included))
+    said, ledger = _Said(shown, tuple(texts)), (workspace.ledger(name),)
     check = f"check:{name}"
     done = []
     yield {
@@ -218,12 +219,13 @@ def _clean_nothing(title: str, dryrun: bool) -> None:
 class _Said:
     """For `doit info`: inputs and targets. What is up to date is decided by content, not by these."""
 
-    workspace: Workspace
+    shown: Callable[[Path], str]
+    """The path, relative to the workspace."""
     texts: Sequence[str]
     """Of contract and plan."""
 
     def __call__(self, inputs: Iterable[Path], targets: Iterable[Path]) -> dict[str, Any]:
-        more, made = ([self.workspace.relative(path) for path in paths] for paths in (inputs, targets))
+        more, made = ([self.shown(path) for path in paths] for paths in (inputs, targets))
         return {"meta": {"inputs": [*self.texts, *more], "targets": made}}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import OBSERVED
 from avow.isolation.observed import Observed, Seen, look
+from avow.pipeline import shortcut as shortcut_module
 from avow.pipeline.results import Result
 from avow.pipeline.shortcut import Shortcut
 from avow.pipeline.tasks import wanted as read_wanted
@@ -58,6 +60,26 @@ def test_an_edit_of_the_same_length_under_an_old_time_is_seen(settled: Workspace
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert path.stat().st_mtime_ns == before.st_mtime_ns
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
+
+
+def test_where_a_contract_was_edited_what_earlier_runs_wrote_is_not_looked_at(
+    settled: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[Path] = []
+    walk = shortcut_module._files
+
+    def files(folder: Path, without: Collection[str]) -> Iterator[str]:
+        looked.append(folder)
+        return walk(folder, without)
+
+    monkeypatch.setattr(shortcut_module, "_files", files)
+    assert Shortcut(settled).nothing_to_do(("verify",)) == (RESULT,)
+    assert settled.artifacts in looked
+    looked.clear()
+    (settled.contracts / "crane" / "plan.yaml").write_text("other")
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
+    assert settled.contracts in looked
+    assert settled.artifacts not in looked
 
 
 def test_new_and_deleted_files_are_seen(settled: Workspace) -> None:
