@@ -55,6 +55,11 @@ class Task:
     obligation: Obligation
     ask: questions.Question
 
+    @property
+    def because(self) -> str:
+        """The plan's reason, which is all that settles it: no part of what it says. Empty where a question does."""
+        return self.ask.because if isinstance(self.ask, questions.ArgumentQuestion) else ""
+
 
 def composition_obligations(system: System) -> tuple[Obligation, ...]:
     """Every composition obligation of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
@@ -69,7 +74,12 @@ def requirement_obligations(system: System) -> tuple[Obligation, ...]:
 
 def all_obligations(composition: Composition) -> tuple[Obligation, ...]:
     """Both, of derivations that are made already."""
-    return tuple(task.obligation for task in (*_tasks(composition), *_requirements(composition)))
+    return tuple(task.obligation for task in all_tasks(composition))
+
+
+def all_tasks(composition: Composition) -> tuple[Task, ...]:
+    """As `all_obligations`, with what settles each."""
+    return (*_tasks(composition), *_requirements(composition))
 
 
 def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
@@ -223,7 +233,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                     f"{goal.name}.{name}",
                     f"{goal.name}: {text.format(listed)}",
                     "",
-                    sha256(f"{key}\n{wiring}\n{reason}"),
+                    sha256(f"{key}\n{wiring}"),
                     (),
                     span,
                 ),
@@ -241,7 +251,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 f"environment.{assumed.port}",
                 f"the environment gives {assumed.port} as assumed",
                 show_term(assumed.formula),
-                sha256(f"environment\n{composition.meanings.environment([assumed.port])}\n{assumed.because}"),
+                sha256(f"environment\n{composition.meanings.environment([assumed.port])}"),
                 (),
                 entry.span,
             ),
@@ -262,7 +272,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 f"environment.{name}",
                 f"the environment meets what {name.node} assumes in {name.clause}",
                 show_clause(clause, node),
-                sha256(f"environment\n{digest(frame.clause(name.node, name.clause))}\n{because}"),
+                sha256(f"environment\n{digest(frame.clause(name.node, name.clause))}"),
                 (str(name),),
                 clause.span,
             ),

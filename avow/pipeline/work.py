@@ -146,13 +146,17 @@ def _no_values() -> str:
 
 def compose_work(composition: Composition) -> Work:
     """The calculus' side conditions, start-up and persistence, and the requirements that have a formula."""
-    from avow.calculus.obligations import all_obligations
+    from avow.calculus.obligations import all_tasks
     from avow.pipeline.slices import compose_slice
 
     system = composition.frame.system
-    obligations = all_obligations(composition)
+    tasks = all_tasks(composition)
+    obligations = tuple(task.obligation for task in tasks)
     parts = (engine_identity(), _scenario(system))
-    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
+    reasons = {task.obligation.id: task.because for task in tasks if task.because}
+    keys = _keys(obligations, COMPOSE, *parts, reasons=reasons)
+    work = _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
+    return replace(work, keys=keys)
 
 
 def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
@@ -376,10 +380,14 @@ def _work(
     return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, shown, files)
 
 
-def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[str, str]:
-    """Of ``[id, digest, method, *parts]`` as JSON: what all have in common is written once."""
-    common = json.dumps([method, *parts])[1:]
-    return {o.id: sha256(f"{json.dumps([o.id, o.digest])[:-1]}, {common}") for o in obligations}
+def _keys(
+    obligations: Iterable[Obligation], method: str, *parts: str, reasons: Mapping[str, str] | None = None
+) -> dict[str, str]:
+    """Of ``[id, digest, method, *parts]`` as JSON: what all have in common is written once. `reasons`: what else
+    settles some, by id."""
+    common, more = json.dumps([method, *parts])[1:], reasons or {}
+    own = {o.id: [o.id, o.digest, *([more[o.id]] if o.id in more else [])] for o in obligations}
+    return {name: sha256(f"{json.dumps(parts)[:-1]}, {common}") for name, parts in own.items()}
 
 
 def _files(paths: Iterable[Path]) -> str:

@@ -569,3 +569,22 @@ def test_what_the_calculus_sees_of_a_plan_is_in_its_key() -> None:
         else:
             seen |= {field.name} if getattr(cut, field.name) is value else set()
     assert seen == KEYED.keys(), "avow/pipeline/slices.py: leave it out there, or put it into a key and name it here"
+
+
+@pytest.mark.parametrize(
+    ("reason", "claims"),
+    [
+        ("water has no negative depth", ["environment.gauge.depth", "environment.gauge.wet"]),
+        ("the harbour repeats the level until it is another", ["chain.persistence"]),
+        ("the skipper answers each level once", ["chain.one-output"]),
+    ],
+)
+def test_a_reason_is_asked_for_again_and_is_no_part_of_its_claim(
+    reason: str, claims: list[str], tmp_path: Path
+) -> None:
+    """What rests on a claim with a reason goes on to rest on it: its digest is the same."""
+    folder = copied(FERRY, tmp_path)
+    before, digests = keys(folder), {o.id: o.digest for o in catalogue(load_system(folder)).obligations}
+    edit(folder / "plan.yaml", (reason, "somebody said so"))
+    assert changed(before, keys(folder)) == {(f"system/composition/{claim}", "compose") for claim in claims}
+    assert {o.id: o.digest for o in catalogue(load_system(folder)).obligations} == digests
