@@ -14,7 +14,7 @@ from runner_graph import runner_graph
 from small_agents import case, formula
 from small_societies import society
 
-from avow.backends.ajpf import spin
+from avow.backends.ajpf import spin, spin_tool
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
@@ -23,6 +23,7 @@ from avow.backends.ajpf.parser import parse_system, read_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
 from avow.backends.ajpf.structure import reduce
+from avow.isolation.outside import Outside
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -66,7 +67,7 @@ def test_spin_says_of_the_program_what_ajpf_says(tmp_path, folder, name):
     draws = read_environment(GOLDEN / folder / f"{name}.yaml")
     found: dict[str, bool] = {}
     for checker in checkers(programs, draws, properties_of((row["property"], row["formula"]) for row in rows)):
-        found |= spin.opinions(checker, checker.properties, tmp_path, 120.0)
+        found |= spin.opinions(checker, checker.properties, tmp_path, 120.0, Outside((spin_tool.tool(),)))
     for row in rows:
         agrees = found.pop(row["property"]) is (row["ajpf"] == "holds")
         assert agrees is not bool(row.get("remark")), row

@@ -16,8 +16,9 @@ from avow.backends.dafny import BACKEND
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.names import RESERVED, Names, identifier
 from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
-from avow.backends.dafny.runner import verify
+from avow.backends.dafny.runner import dafny, verify
 from avow.base.verdict import Verdict
+from avow.isolation.outside import Outside
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.load import check_text, load_contract
 from avow.language.sorts import BOOL, INTEGER, REAL, Constructor, DataSort, EnumSort, FunctionSort, OpaqueSort
@@ -147,7 +148,7 @@ def test_hostile_names_still_make_valid_dafny() -> None:
     made = everything(hostile_node())
     files = {made.types_file: made.types, made.contract_file: made.contract, made.spec_file: made.spec}
     assert all(re.fullmatch(r"[\w.]+", name, re.ASCII) for name in files)
-    run = verify(files, Limits(seconds=120))
+    run = verify(files, Limits(seconds=120), Outside((dafny(),)))
     assert run.code == 0, run.output
     assert run.members is not None
     assert all(m.outcome == "correct" for m in run.members)
@@ -177,7 +178,9 @@ def test_any_word_may_be_the_name_of_a_clause_a_port_a_type_or_an_element() -> N
         for at, port in enumerate(variables, start=1)
     )
     made = everything(Node("free", tuple(variables), (), (), (), claims))
-    run = verify({made.types_file: made.types, made.contract_file: made.contract}, Limits(seconds=120))
+    run = verify(
+        {made.types_file: made.types, made.contract_file: made.contract}, Limits(seconds=120), Outside((dafny(),))
+    )
     assert run.code == 0, run.output
     assert run.members is not None
     assert len(made.ensures) == len(words)
@@ -190,7 +193,7 @@ def test_all_that_is_generated_for_the_case_studies_is_well_formed() -> None:
         for node in load_contract([CONTRACTS / system / "system.rcl"]).nodes:
             made = everything(node)
             files = {made.types_file: made.types, made.contract_file: made.contract, made.spec_file: made.spec}
-            run = verify(files, Limits(seconds=120))
+            run = verify(files, Limits(seconds=120), Outside((dafny(),)))
             assert run.code == 0, (node.name, run.output)
             assert all(m.outcome == "correct" for m in run.members or ())
 
@@ -301,7 +304,7 @@ def test_dafny_and_z3_agree_on_meanings(tmp_path: Path) -> None:
         made.contract_file: made.contract,
         "check.dfy": "\n".join([*lemmas, "}", ""]),
     }
-    run = verify(files, Limits(seconds=180))
+    run = verify(files, Limits(seconds=180), Outside((dafny(),)))
     assert run.members is not None, run.output
     proved = {m.name.removeprefix("L_"): m.outcome == "correct" for m in run.members if m.kind == "Impl"}
     assert len(proved) == len(node.guarantees)

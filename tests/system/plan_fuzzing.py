@@ -173,7 +173,7 @@ def _contract(paths: tuple[Path, ...]):  # type: ignore[no-untyped-def]
     return _load(paths)
 
 
-def remembered(paths: Sequence[Path]):  # type: ignore[no-untyped-def]
+def remembered(paths: Sequence[Path], shelf: object = None):  # type: ignore[no-untyped-def]
     """In the place of `load_contract`: the contracts stay as they are, and reading them takes most of the time."""
     return _contract(tuple(paths))
 
