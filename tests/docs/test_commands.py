@@ -84,8 +84,8 @@ INSTEAD = {
     "avow compose PATH --latex | --json | --rcl": " && ".join(
         f"{COMPOSED} {flag}" for flag in ("--latex", "--json", "--rcl")
     ),
-    "avow explain HASH": "avow explain"
-    """ $(tail -1 artifacts/ledger/thermostat.jsonl | grep -o '"hash":"[0-9a-f]*' | cut -d'"' -f4)""",
+    "avow explain HASH": """kept=$(tail -1 artifacts/ledger/thermostat.jsonl | grep -o '"hash":"[0-9a-f]*')"""
+    " && avow explain ${kept#*:?}",
     "avow diff OLD NEW --html FILE": "avow diff reports/thermostat reports/thermostat --html changes.html",
     "avow diff OLD [NEW]": "avow diff reports/thermostat reports/thermostat",
     "avow monitor SYSTEM - --node agent": "avow monitor thermostat - --node thermostat <contracts/thermostat/traces/*",
