@@ -29,7 +29,7 @@ def said(result: SanityResult) -> object:
     return result.name, result.verdict, result.clauses, result.counterexample, result.explanation, result.because
 
 
-@pytest.mark.parametrize("seed", some(range(40), 0, 6))
+@pytest.mark.parametrize("seed", some(range(40), 0, 3))
 def test_claims_are_answered_alike_whichever_are_wanted(seed: int) -> None:
     node = generated(seed)
     bounds = Bounds(60)
