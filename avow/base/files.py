@@ -51,8 +51,12 @@ def is_intact(path: Path, sha: str) -> bool:
 
 def digest_once(path: Path) -> str:
     """As `digest_file`; a file that this process has read is not read again while it is the same."""
-    info = path.stat()
-    return _digest_as(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
+    return _digest_as(path, identity(path.stat()))
+
+
+def identity(info: os.stat_result) -> tuple[int, ...]:
+    """What tells, without reading, that a file is as it was a moment ago: times in nanoseconds, size in bytes."""
+    return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
 
 
 @functools.lru_cache(maxsize=100_000)

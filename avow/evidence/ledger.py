@@ -26,7 +26,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
-from avow.base.files import read_regular, sha256, write
+from avow.base.files import identity, read_regular, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
@@ -253,18 +253,18 @@ class Ledger:
         if self._held:
             return
         try:
-            if self._seen and _identity(self.path.stat()) == self._seen:
+            if self._seen and identity(self.path.stat()) == self._seen:
                 return
             with open(self.path, "rb", opener=open_file) as file:
                 info = os.fstat(file.fileno())
-                if info.st_size < self._offset or (self._seen and _identity(info)[:2] != self._seen[:2]):
+                if info.st_size < self._offset or (self._seen and identity(info)[:2] != self._seen[:2]):
                     self._forget()
                 file.seek(self._offset)
                 data = file.read()
         except FileNotFoundError:
             self._forget()
             return
-        self._seen = _identity(info)
+        self._seen = identity(info)
         known = self._remembered(data)
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
@@ -355,10 +355,6 @@ def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     tail = f'"n":{number},"prev":{canonical(previous)}}}'
     mark = sha256(f'{{"evidence":{evidence},{tail}')
     return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
-
-
-def _identity(info: os.stat_result) -> tuple[int, ...]:
-    return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
 
 
 def _entry(data: object) -> Entry:

@@ -18,7 +18,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_file, identity, sha256
 from avow.base.module_path import absolute_only
 from avow.tuning.sizes import FOLDED
 
@@ -96,18 +96,14 @@ def marks(observed: Observed) -> tuple[object, ...] | None:
     look again costs no more."""
     try:
         if observed.kind is Seen.READ:
-            return _mark(os.stat(observed.path))  # noqa: PTH116
+            return identity(os.stat(observed.path))  # noqa: PTH116
         if observed.kind is Seen.FOLDER:
             with os.scandir(observed.path) as entries:
                 found = [(entry.name, entry) for entry in entries if entry.name != "__pycache__"]
-                return tuple((name, *_mark(entry.stat())) for name, entry in sorted(found, key=lambda f: f[0]))
+                return tuple((name, *identity(entry.stat())) for name, entry in sorted(found, key=lambda f: f[0]))
     except (OSError, ValueError):
         return None
     return None
-
-
-def _mark(info: os.stat_result) -> tuple[int, ...]:
-    return (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns)
 
 
 def folded(observed: Iterable[Observed]) -> tuple[Observed, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import avow
 from avow.backend_kit.protocol import Backend
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_file, identity, sha256
 
 _ROOMS = (
     "tuning/effort.py",
@@ -46,10 +46,9 @@ def backend_digest(tool: Backend) -> str:
 
 
 def code_mark() -> str:
-    """Of this package's files as they lie there now, by size and times: a process that lives long has imported what lay
+    """Of this package's files as they lie there now, by their identity: a process that lives long has imported what lay
     there when it began."""
-    files = ((str(file), file.stat()) for file in sorted(_PACKAGE.rglob("*.py")))
-    return sha256(json.dumps([[name, info.st_ino, info.st_size, info.st_mtime_ns] for name, info in files]))
+    return sha256(json.dumps([[str(file), identity(file.stat())] for file in sorted(_PACKAGE.rglob("*.py"))]))
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from typing import Any
 
 from avow.backend_kit import one_step
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import is_intact, sha256, write
+from avow.base.files import identity, is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
@@ -51,8 +51,7 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
 def _marks(place: Path, files: Iterable[str]) -> tuple[str, bool]:
     """A digest of what the shortcut takes for a file's identity, and whether all of them are of an earlier moment: an
     edit at the moment of a change may leave the times as they are. Raises OSError."""
-    found = [os.stat(f"{place}/{name}") for name in files]  # noqa: PTH116 - asked of each artifact in every run
-    marks = [(s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in found]
+    marks = [identity(os.stat(f"{place}/{name}")) for name in files]  # noqa: PTH116 - of each artifact in every run
     newest = max((mark[-1] for mark in marks), default=0)
     return sha256(json.dumps(marks)), time.time_ns() - newest > SETTLED_NS
 

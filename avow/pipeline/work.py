@@ -154,9 +154,7 @@ def compose_work(composition: Composition) -> Work:
     obligations = tuple(task.obligation for task in tasks)
     parts = (engine_identity(), _scenario(system))
     reasons = {task.obligation.id: task.because for task in tasks if task.because}
-    keys = _keys(obligations, COMPOSE, *parts, reasons=reasons)
-    work = _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
-    return replace(work, keys=keys)
+    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system), reasons=reasons)
 
 
 def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
@@ -375,8 +373,9 @@ def _work(
     cut: Callable[[], Slice] | None = None,
     shown: Callable[[], Slice] | None = None,
     files: tuple[Path, ...] = (),
+    reasons: Mapping[str, str] | None = None,
 ) -> Work:
-    keys = _keys(obligations, method, *parts)
+    keys = _keys(obligations, method, *parts, reasons=reasons)
     return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, shown, files)
 
 
