@@ -44,7 +44,7 @@ def read_case(path: Path) -> Case:
         return from_json(json.loads(file.read_text(encoding="utf-8")))
     except OSError as error:
         raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
-    except (ValueError, RecursionError, Unreadable) as error:
+    except (ValueError, RecursionError) as error:
         message = f"{file} is no report of this version of Avow: {error}"
         raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
 

@@ -60,7 +60,7 @@ class Shortcut:
                 return None
             if kept["identity"] != _identity(self.workspace, self._begun, observed):
                 return None
-        except (codec.Unreadable, OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError):
             return None
         names = {r.system for r in results}
         asked = {name.partition(":")[2] for name in wanted}
