@@ -194,14 +194,16 @@ def _impossible(
 def _files(
     entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None, strict: bool
 ) -> Iterable[Discrepancy]:
-    left: dict[str, tuple[str, Entry]] = {}
+    left: dict[str, list[Entry]] = {}
     read: dict[str, tuple[str, Entry]] = {}
     newest: dict[tuple[str, str], str] = {}
+    repeated: dict[tuple[object, ...], int] = {}
     for entry in entries:  # oldest first: the newest record has the last word
         record = entry.evidence
         newest[record.obligation, record.method] = record.key
-        for path, mark in record.outputs.items():
-            left[path] = (mark, entry)
+        repeated[_words(record)] = entry.number
+        for path in record.outputs:
+            left.setdefault(path, []).append(entry)
         for path, mark in record.inputs.items():
             read[path] = (mark, entry)
     # What counts today was asked of today's files, though a later attempt read them in another state in between.
@@ -211,15 +213,26 @@ def _files(
     relied_upon = [newest] if keys is None else [keys, newest] if strict else [keys]
 
     def serious(entry: Entry) -> bool:
-        """Only what a status rests on today can be undermined: files of past attempts may be cleaned away."""
-        pair = (entry.evidence.obligation, entry.evidence.method)
-        return any(known.get(pair) == entry.evidence.key for known in relied_upon)
+        """Only what a status rests on today can be undermined: files of past attempts may be cleaned away, and of
+        those that say the same only the newest counts."""
+        record = entry.evidence
+        pair = (record.obligation, record.method)
+        return repeated[_words(record)] == entry.number and any(k.get(pair) == record.key for k in relied_upon)
 
-    for path, (mark, entry) in left.items():
-        yield from _compare(root, path, mark, entry, made=True, serious=serious(entry))
+    for path, owners in left.items():
+        entry = owners[-1]
+        mark = entry.evidence.outputs[path]
+        undermined = any(e.evidence.outputs[path] == mark and serious(e) for e in owners)
+        yield from _compare(root, path, mark, entry, made=True, serious=undermined)
     for path, (mark, entry) in read.items():
         if path not in left:
             yield from _compare(root, path, mark, entry, made=False, serious=False)
+
+
+def _words(record: Evidence) -> tuple[object, ...]:
+    """What a record says, to which question: as a case has it when it leaves out all but the newest that say it."""
+    scores = "mutation" in record.details
+    return record.obligation, record.method, record.key, effective(record), record.vacuous, scores
 
 
 def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:

@@ -98,6 +98,28 @@ def test_files_of_superseded_attempts_are_history(ledger: Ledger, tmp_path: Path
     assert faults(ledger, tmp_path, keys={}) == [(Fault.GONE, "b.log", False)]
 
 
+def test_of_several_that_say_the_same_the_newest_is_relied_upon(ledger: Ledger, tmp_path: Path) -> None:
+    """As in a case: what an earlier attempt left of the same question may go, unless it said something else, or
+    something that still counts left the same file."""
+    for name in ("second.log", "third.log"):
+        (tmp_path / name).write_text(name)
+    first = ledger.records()[0].evidence
+
+    def more(obligation: str, verdict: Verdict, *names: str) -> None:
+        ledger.append(evidence(obligation, verdict, outputs={name: digest_file(tmp_path / name) for name in names}))
+
+    more("node.a", first.verdict, "second.log")
+    (tmp_path / "a.log").unlink()
+    assert faults(ledger, tmp_path) == [(Fault.GONE, "a.log", False)]
+    more("node.a", Verdict.REFUTED, "third.log")
+    (tmp_path / "second.log").unlink()
+    assert (Fault.GONE, "second.log", True) in faults(ledger, tmp_path)
+    more("node.b", Verdict.REFUTED, "third.log")
+    more("node.a", Verdict.REFUTED)
+    (tmp_path / "third.log").unlink()
+    assert (Fault.GONE, "third.log", True) in faults(ledger, tmp_path)
+
+
 def test_what_was_tried_in_between_makes_nothing_stale(ledger: Ledger, tmp_path: Path) -> None:
     """A fault was planted and taken out again: the newest record is of another text, the one that counts is not."""
     program = tmp_path / "prog.imp"
