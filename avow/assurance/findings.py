@@ -2,7 +2,7 @@
 
 *Expected* (reproducing known-bad material) is strict both ways: a finding that is not listed fails, and so does a
 listed one that is not there, or whose last day (where it names one) has gone by. *Accepted* is a risk that a named
-person takes, for a reason, until a date; without one it lasts a year. A finding that has expired excuses nothing.
+person takes, for a reason, until a date. A finding that has expired excuses nothing.
 Wildcards stand for what they matched when they were written, as the plan records it; what they match besides is an
 open item. A finding with a mark (``found``) stands for what was found when it was written: a later, perhaps worse
 refutation of the same claim is another finding.
@@ -13,7 +13,7 @@ from __future__ import annotations
 import fnmatch
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import date, timedelta
+from datetime import date
 
 from avow.assurance.model import Handled
 from avow.base import codec
@@ -23,7 +23,6 @@ from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status, roll_up
 from avow.system.plan import Finding, is_wild
-from avow.tuning.shown import FINDING_DAYS
 
 FINDINGS = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.VACUOUS, Status.CIRCULAR})
 """Statuses that say that something is wrong (the others say that something is lacking)."""
@@ -42,12 +41,10 @@ def handle(
 
 
 def expiry(finding: Finding) -> date | None:
-    """The last day on which an accepted finding is accepted; None where its dates cannot be read."""
+    """The last day on which a finding is accepted; None where there is none that can be read."""
     try:
-        if finding.expires:
-            return date.fromisoformat(finding.expires)
-        return date.fromisoformat(finding.date or "") + timedelta(days=FINDING_DAYS)
-    except (ValueError, OverflowError):
+        return date.fromisoformat(finding.expires or "")
+    except ValueError:
         return None
 
 

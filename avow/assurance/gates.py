@@ -110,14 +110,10 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
     accepted = [f for f in findings if f.how == "accepted"]
     expired = [f for f in accepted if f.expired]
     if accepted:
-        reason = "; ".join(f"{f.pattern} ({f.verdict}) was accepted by {f.who} until {_until(f)}" for f in expired)
+        reason = "; ".join(f"{f.pattern} ({f.verdict}) was accepted by {f.who} until {f.expires}" for f in expired)
         title = "Accepted risks have not expired"
         names = tuple(name for f in expired for name in f.obligations)
         yield Gate("accepted", title, not expired, reason or _count(len(accepted), "accepted risk"), names)
-
-
-def _until(finding: Handled) -> str:
-    return finding.expires or f"a year after {finding.date or 'no date'}"
 
 
 def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:

@@ -72,8 +72,8 @@ def open_items(
             text = f"accepted, whatever refutes it: for this finding, and no worse one, write  found: {f.now}"
             items.append(OpenItem("unmarked", f.pattern, text, advice=True))
         if f.expired:
-            until = f.expires or f"a year after {f.date or 'no date'}"
-            items.append(OpenItem("expired", f.pattern, f"{f.how} by {f.who or 'nobody'} until {until}: {f.reason}"))
+            text = f"{f.how} by {f.who or 'nobody'} until {f.expires}: {f.reason}"
+            items.append(OpenItem("expired", f.pattern, text))
         elif f.how == "accepted" and not f.obligations and not f.now:
             items.append(
                 OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)

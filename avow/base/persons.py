@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from avow.base.plain import invisible
+
 _FOLDED = str.maketrans({"æ": "a", "œ": "o", "ø": "o", "đ": "d", "ð": "d", "þ": "t", "ł": "l", "ı": "i", "ħ": "h"})
 _TITLES = frozenset(
     [
@@ -49,9 +51,10 @@ _BESIDE = re.compile(r"\([^)]*\)|<[^>]*>|@\S+")
 
 def unreadable(name: str) -> str | None:
     """Why a name may look like another's: an invisible or control character, or letters of several scripts."""
+    if unseen := invisible(name, allowed=""):
+        return f"it holds the invisible character {unseen}"
     for char in name:
-        odd = unicodedata.category(char) in ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
-        if odd or "FILLER" in unicodedata.name(char, "") or "VARIATION SELECTOR" in unicodedata.name(char, ""):
+        if "FILLER" in unicodedata.name(char, "") or "VARIATION SELECTOR" in unicodedata.name(char, ""):
             return f"it holds the invisible character U+{ord(char):04X}"
     letters = [c for c in _plain(name) if c.isalpha()]
     scripts = {unicodedata.name(c, "?").split()[0] for c in letters}

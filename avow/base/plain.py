@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 _IDENTIFIER = re.compile(
     r"""[A-Za-z]\w*\.[A-Za-z_]\w*      # node.port
@@ -35,6 +36,22 @@ def words_of(name: str) -> str:
         )
         or name
     )
+
+
+def invisible(text: str, *, allowed: str = "\n\t\u200c\u200d") -> str:
+    """The first character that nobody sees, though it may change what is read (a control character, a mark of the
+    direction of writing, a space of no width), as ``U+202E``; empty: none. What joins or parts letters may
+    stand there."""
+    odd = (char for char in text if char not in allowed and unicodedata.category(char) in _UNSEEN)
+    return next((f"U+{ord(char):04X}" for char in odd), "")
+
+
+def is_blank(text: str) -> bool:
+    """Whether a text has neither a letter nor a digit that can be seen."""
+    return not any(char.isalnum() and "FILLER" not in unicodedata.name(char, "") for char in text)
+
+
+_UNSEEN = frozenset(("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"))
 
 
 def count(number: int, one: str, many: str = "") -> str:

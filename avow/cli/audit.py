@@ -44,6 +44,8 @@ def command(
     """
     from pathlib import Path
 
+    from avow.base.persons import unreadable
+    from avow.base.plain import invisible, is_blank
     from avow.base.workspace import workspace
     from avow.cli.ledgers import audit_index, audit_system, ledger_names, outside_heads, sign_all
     from avow.pipeline.integrity import reported_heads, settle_losses
@@ -56,7 +58,7 @@ def command(
         return 0
     place = workspace()
     if acknowledge is not None or who is not None:
-        if not (acknowledge or "").strip() or not (who or "").strip():
+        if is_blank(acknowledge or "") or invisible(acknowledge or "") or unreadable((who or "").strip()):
             raise click.UsageError(
                 'to acknowledge takes a reason and a name: --acknowledge "disk was lost" --as "A. Name"'
             )

@@ -30,6 +30,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from avow.assurance.signed import sign_case
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.files import write
+    from avow.base.persons import unreadable
     from avow.base.workspace import find_workspace, report_folder, workspace
     from avow.evidence.envelope import seal_lines
     from avow.evidence.ledger import Ledger
@@ -46,8 +47,8 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
         raise Rejected(Diagnostic("SIGN005", f"--until: {until!r} is no date of the calendar")) from None
     if last < today:
         raise Rejected(Diagnostic("SIGN005", f"--until: {until} is past"))
-    if not who.strip():
-        raise Rejected(Diagnostic("SIGN005", "--as: a name is wanted"))
+    if why := unreadable(" ".join(who.split())):
+        raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is nobody's name: {why}"))
     ledger = place.ledger(case.system)
     wrong = check(folder, Ledger(ledger) if ledger.exists() else None, place.root)
     wrong += tuple(f"{path} has changed since the evidence was made" for path in stale(case, place.root))

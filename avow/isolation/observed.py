@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from avow.base.files import digest_file, identity, sha256
 from avow.base.module_path import absolute_only
+from avow.isolation.tracing import remedy, traces
 from avow.tuning.sizes import FOLDED
 
 
@@ -42,6 +43,8 @@ class Seen(StrEnum):
     """Which folder it runs in; the digest is of its absolute path."""
     VARIABLE = "variable"
     """One of the environment that is not always the same (`variables`); the digest is of its value."""
+    TRACER = "tracer"
+    """Whether system calls are traced here (`tracing.traces`): what nothing could tell then, something may tell now."""
     OUTSIDE = "outside"
     """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
 
@@ -60,6 +63,8 @@ def look(kind: Seen, path: str) -> str:
         return sha256(variables().get(os.path.basename(path), ""))  # noqa: PTH119
     if kind is Seen.PLACE:
         return sha256(os.path.realpath(path))
+    if kind is Seen.TRACER:
+        return sha256(str(traces()))
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
         match kind:
@@ -168,7 +173,7 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
 
 
 def _kind(event: str, path: str) -> Seen | None:
-    if event in ("outside", "program"):
+    if event == "outside":
         return Seen.OUTSIDE
     if event in ("place", "variable"):
         return Seen(event)
@@ -205,6 +210,16 @@ def _of_python(path: str) -> bool:
     return inside and not any(
         path.startswith(folder + os.sep) for folder in (*_INSTALLED, *(f"{p}/dist-packages" for p in _PYTHON))
     )
+
+
+def untold(what: str) -> tuple[Observed, Observed]:
+    """Of what read files while nothing traced: that they are not known, and that this is so for want of a tracer."""
+    return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})"), tracer()
+
+
+def tracer() -> Observed:
+    """What is asked otherwise where nothing traces is asked again once something does."""
+    return Observed(Seen.TRACER, "strace", look(Seen.TRACER, "strace"))
 
 
 def interpreter() -> Observed:

@@ -1,7 +1,8 @@
 """Outside tools, run so that nothing undeclared enters their answers, or is told.
 
-A tool gets the variables that Avow gives it, an empty home, and the way to the system's programs and its own. Where
-`strace` runs here, what it opens, executes and looks for besides is recorded, as of a subject.
+A tool gets the variables that Avow gives it, an empty home, and the way to the system's programs and its own. What it
+opens, executes and looks for besides is recorded by `strace`, as of a subject. Where that does not run, what the tool
+reads is not known, and its answer is an undeclared input.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from avow.base import process
 from avow.base.process import Completed, ToolMissing
 from avow.base.programs import program_files, program_folders
 from avow.base.tools import Tool
-from avow.isolation.observed import Observed, folded, recorded
+from avow.isolation.observed import Observed, folded, recorded, untold
 from avow.isolation.tracing import Trace, traces
 
 _SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin", "/bin")
@@ -30,6 +31,8 @@ class Outside:
 
     tools: tuple[Tool, ...]
     _events: dict[tuple[str, str], None] = field(default_factory=dict)
+    _untraced: dict[str, None] = field(default_factory=dict)
+    """What ran while nothing traced."""
 
     def run(
         self,
@@ -50,7 +53,9 @@ class Outside:
             whole = [program, *command[1:]]
             started = whole if trace is None else trace.around([*_with_its_tracer(), *whole])
             done = process.run(started, cwd=cwd, seconds=seconds, megabytes=megabytes, env=given)
-            if trace is not None:
+            if trace is None:
+                self._untraced[os.path.basename(command[0])] = None  # noqa: PTH119
+            else:
                 told = trace.read_all(program, cwd)
                 if told is None and done.code is not None:
                     told = (("outside", f"what no trace tells of {command[0]}"),)
@@ -68,7 +73,8 @@ class Outside:
             real = os.path.realpath(path)
             return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
 
-        return folded(recorded((event, path) for event, path in list(self._events) if told(event, path)))
+        seen = recorded((event, path) for event, path in list(self._events) if told(event, path))
+        return folded((*seen, *(row for name in list(self._untraced) for row in untold(name))))
 
     def _path(self, program: str) -> str:
         places = (program, *(place for tool in self.tools for place in tool.places))

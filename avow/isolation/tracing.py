@@ -49,6 +49,10 @@ _MACHINE = tuple(
 """What libraries ask about the machine as they start; and the loader's index, since what it finds there is told."""
 
 
+INSTALL = "sudo apt install strace"
+"""The one command that brings it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Traced:
     """What a trace tells: (event, path) pairs as the audit hook's, and what no subject may do."""
@@ -68,6 +72,17 @@ def traces() -> bool:
     except (OSError, subprocess.TimeoutExpired):
         return False
     return done.returncode == 0 and not done.stderr
+
+
+def remedy() -> str:
+    """What a person can do where nothing was traced."""
+    if traces():
+        return "its trace has no end: run it again"
+    if sys.platform != "linux":
+        return "run it on Linux, with strace"
+    if shutil.which("strace") is None:
+        return INSTALL
+    return "strace is here, but may not trace: allow ptrace (of a container: --cap-add=SYS_PTRACE)"
 
 
 def _strace(place: str) -> list[str]:

@@ -162,9 +162,9 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
 def _declared(outcome: Outcome, report: Report) -> Outcome:
     """What was answered from something that cannot be recorded could come out otherwise tomorrow, unnoticed."""
     outside = [o.path for o in report.observed if o.kind is Seen.OUTSIDE]
-    if not outside or not outcome.verdict.supports:
+    if not outside or not outcome.verdict.supports or outcome.vacuous:  # what is vacuous supports nothing
         return outcome
-    summary = f"undeclared input: the subject used {', '.join(outside[:3])}, which cannot be recorded"
+    summary = f"undeclared input: it used {', '.join(outside[:3])}; that cannot be recorded"
     return replace(outcome, verdict=Verdict.UNKNOWN, summary=f"{summary} (else: {outcome.summary})")
 
 

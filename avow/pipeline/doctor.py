@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 import sys
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
 from avow.backend_kit.registry import backend, names
 from avow.base.records import dataclass
-from avow.base.tools import Tool
+from avow.base.tools import Tool, find_tool
+from avow.isolation.tracing import INSTALL, remedy, traces
 
 _PACKAGES = (
     ("logic", "z3-solver", "pip install z3-solver", False),
@@ -44,6 +46,9 @@ def findings() -> tuple[Finding, ...]:
     python = Tool("python", sys.version.split()[0], sys.executable, "", optional=False)
     found = [Finding("everything", python)]
     found += [Finding(use, _package(name, install, optional)) for use, name, install, optional in _PACKAGES]
+    strace = find_tool("strace", ("-V",), install=INSTALL)
+    found.append(Finding("what tools read", strace if traces() else replace(strace, version=None, install=remedy())))
+    found.append(Finding("sandbox", find_tool("bwrap", install="sudo apt install bubblewrap")))
     for name in names():
         found += [Finding(name, tool) for tool in backend(name).tools()]
     return tuple(found)

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, sha256
 from avow.base.remembered import Shelf
@@ -44,7 +43,7 @@ from avow.system.plan import (
 from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape, without_faults
 from avow.system.source_plan import files_of, read_source
-from avow.system.statements import read_statements
+from avow.system.statements import read_statements, wrong_words
 from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
 
@@ -353,10 +352,7 @@ class _PlanReader:
         if piece is None:
             return None
         texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items()}
-        wrong = wrong_day(texts["on"])
-        if wrong:
-            place = f"requirements.{name}.confirmed"
-            self.fault("PLAN105", f"{place}: {wrong}", piece.entries["on"].span)  # type: ignore[index]
+        self.faults += wrong_words(f"requirements.{name}.confirmed", piece, done=("on",))
         return Confirmation(**texts)
 
     def goals(self) -> Iterator[ComposeGoal]:
@@ -411,12 +407,8 @@ class _PlanReader:
 
     def findings(self, key: str) -> Iterator[Finding]:
         for piece in self.items(key):
-            texts = {name: part.text for name, part in (piece.entries or {}).items()}
-            for field in ("date", "expires"):
-                part = piece.at(field)
-                wrong = wrong_day(part.text, past=field == "date") if part is not None else ""
-                if part is not None and wrong:
-                    self.fault("PLAN105", f"{key}: {wrong}", part.span)
+            texts = {name: " ".join(part.text.split()) for name, part in (piece.entries or {}).items()}
+            self.faults += wrong_words(key, piece)
             matched = piece.at("matched")
             if matched is not None and not is_wild(texts["obligation"]):
                 message = (

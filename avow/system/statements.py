@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Severity
-from avow.base.plain import identifiers
+from avow.base.persons import unreadable
+from avow.base.plain import identifiers, is_blank
 from avow.system.plan import Plan, Statement, System
 from avow.system.strict_yaml import Piece
 from avow.tuning.sizes import STATEMENT_WORDS
@@ -46,6 +47,25 @@ def unconfirmed(system: System) -> Iterator[Diagnostic]:
                 Severity.WARNING,
                 hint=f'confirmed: {{who: …, on: …, sentence: "{requirement.digest}"}}',
             )
+
+
+def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> Iterator[Diagnostic]:
+    """What is wrong with the persons, reasons and days of an entry; `done` are the days on which something was."""
+    for key in ("who", "says", "because", "reason", *done, "until", "expires"):
+        part = piece.at(key)
+        if part is None:
+            continue
+        text = " ".join(part.text.split())
+        if key == "who":
+            wrong = f"{text!r} names no person: {why}" if (why := unreadable(text)) else ""
+        elif key in ("says", "because", "reason"):
+            wrong = f"{key} is blank" if is_blank(text) else ""
+        else:
+            wrong = wrong_day(text, past=key in done)
+        if not wrong and key in ("until", "expires") and (begun := piece.at(done[0])) is not None and text < begun.text:
+            wrong = f"{key} is before the {done[0]} of the entry"
+        if wrong:
+            yield Diagnostic("PLAN105", f"{place}: {wrong}", part.span)
 
 
 def _own(statement: Statement, plan: Plan) -> bool:
@@ -92,9 +112,6 @@ def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
         if names:
             message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
-    for key, past in (("date", True), ("until", False)):
-        day = piece.at(key)
-        if day is not None and (wrong := wrong_day(texts[key], past=past)):
-            faults.append(Diagnostic("PLAN105", f"{place}: {wrong}", day.span))
+    faults += wrong_words(place, piece)
     words = {key: texts.get(key, "") for key in ("says", "because", "who", "until", "date")}
     return Statement(place, span=piece.span, **words)

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.plain import invisible
 from avow.base.records import dataclass
 from avow.system.plan import Located
 from avow.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
@@ -195,6 +196,8 @@ class _Builder:
     def scalar(self, event: yaml.ScalarEvent) -> None:
         text = str(event.value)
         plain = event.style is None
+        if unseen := invisible(text):
+            self.problem(event, "PLAN101", f"the text holds the invisible character {unseen}")
         if self.wants_key():
             self.key(event, text)
             return

@@ -1,9 +1,6 @@
 """How much of a thing a person is shown. Nothing is lost: `report.json` has everything but old records, and the ledger
 has those, too."""
 
-FINDING_DAYS = 365
-"""How long an accepted finding without an expiry is accepted, from its date: a year, as reviews are mostly repeated."""
-
 TOOL_WORDS = 160
 """So much of a tool's own words stands in a suggestion, in characters: two lines."""
 

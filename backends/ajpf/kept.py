@@ -21,7 +21,7 @@ from avow.isolation.observed import Observed, look
 
 from .ajpf_tool import Answer, Said
 
-_FORM = 2
+_FORM = 3
 """Of what is asked and how answers are read: another number, and nothing that was kept counts."""
 
 

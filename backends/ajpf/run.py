@@ -15,8 +15,9 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
-from avow.isolation.observed import Observed
+from avow.isolation.observed import Observed, tracer
 from avow.isolation.outside import Outside
+from avow.isolation.tracing import remedy, traces
 
 from . import ajpf_tool, spin, spin_tool
 from .ajpf_tool import Installation, Said
@@ -221,6 +222,9 @@ class _Run:
         """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
         this program, and there is no verdict on anything."""
         name = f"AIL ({installation.version})"
+        if not traces():
+            self.bound["replay"] = f"not replayed by {name}: {self.untraced()}"
+            return
         result = self.results[refuted.key]
         try:
             difference, log, observed = replay(installation, self.setup, graph, lasso, folder)
@@ -240,6 +244,9 @@ class _Run:
     # Others
 
     def ask_spin(self, checkers: Sequence[Checker]) -> None:
+        if self.setup.engine == "auto" and spin_tool.version() is not None and not traces():
+            self.bound["spin"] = f"no second opinion: {self.untraced()}"
+            return
         name = f"Spin {spin_tool.version()}"
         answers: dict[str, bool] = {}
         seconds = min(self.left() * SPIN_SHARE, SPIN_SECONDS) if self.setup.engine == "auto" else self.left()
@@ -263,6 +270,12 @@ class _Run:
             self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
         self.engine += f" and {name}"
         self.bound["spin"] = "asked of the program, by a translation of its own"
+
+    def untraced(self) -> str:
+        """Why another tool is not asked beside our own engine: its answer would be an undeclared input, and ours is
+        none."""
+        self.observed[tracer()] = None
+        return f"what it reads cannot be recorded ({remedy()})"
 
     def second(self, key: str, name: str, said: Said) -> None:
         """Note another engine's answer; a contradiction is an error, never a vote."""

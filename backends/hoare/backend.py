@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import date
 from pathlib import Path
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.stepping import Stepping
+from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.persons import unreadable
+from avow.base.plain import is_blank
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
@@ -58,14 +60,20 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
 
 def _undated(job: Job) -> tuple[Diagnostic, ...]:
     accepted = Accepted.of(job)
-    try:
-        if accepted is not None:
-            date.fromisoformat(accepted.until)
-    except ValueError:
-        place = job.method.options.at("termination", "until")
-        message = f"termination.until is no day: {accepted.until!r}" if accepted else ""
-        return (Diagnostic("HOARE400", message, place, hint="write it as 2027-06-30"),)
-    return ()
+    if accepted is None:
+        return ()
+    why, day = unreadable(accepted.who), wrong_day(accepted.until, past=False)
+    wrong = {
+        "who": f"names no person: {why}" if why else "",
+        "because": "is blank" if is_blank(accepted.because) else "",
+        "until": f"is no day: {day} (write it as 2027-06-30)" if day else "",
+    }
+    places = job.method.options
+    return tuple(
+        Diagnostic("HOARE400", f"termination.{key} {message}", places.at("termination", key))
+        for key, message in wrong.items()
+        if message
+    )
 
 
 # -- export ------------------------------------------------------------------------------------------------------------

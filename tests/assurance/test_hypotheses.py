@@ -57,7 +57,7 @@ def test_a_supposition_wants_a_person() -> None:
     ends = Hypothesis(HypothesisKind.SUPPOSITION, "agent/supposition/termination", "1" * 64, "the loop ends")
     facts = resting(facts, at, ends)
     assert conclude(facts).obligation(at).standing is Status.UNSUPPORTED
-    taken = Finding("agent/supposition/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat())
+    taken = Finding("agent/supposition/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, verdict="missing")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED

@@ -12,7 +12,8 @@ import pytest
 from avow.base import programs
 from avow.base.process import ToolMissing
 from avow.base.tools import Tool
-from avow.isolation import outside
+from avow.isolation import observed as observed_module
+from avow.isolation import outside, tracing
 from avow.isolation.observed import Observed, Seen, folded, look
 from avow.isolation.outside import Outside
 from avow.isolation.tracing import traces
@@ -113,11 +114,21 @@ def test_nothing_of_our_environment_enters(there: Path, tmp_path: Path, monkeypa
     assert lasting(after) == lasting(before)
 
 
-def test_without_strace_it_runs_all_the_same(there: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outside, "traces", lambda: False)
+def test_without_strace_what_it_reads_is_not_known(
+    there: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its answer is an undeclared input, which names the remedy; and is asked again once something traces."""
+    for module in (outside, observed_module):
+        monkeypatch.setattr(module, "traces", lambda: False)
+    monkeypatch.setattr(tracing, "traces", lambda: False)
     said, observed = ran(there, tmp_path)
     assert "lenient" in said
-    assert observed == ()
+    assert [o.kind for o in observed] == [Seen.TRACER, Seen.OUTSIDE]
+    assert "tool" in observed[1].path
+    assert tracing.remedy() in observed[1].path
+    assert not changed(observed)
+    monkeypatch.setattr(observed_module, "traces", lambda: True)
+    assert changed(observed) == ["strace"]
 
 
 @pytest.mark.parametrize("command", ["no-such-tool", "./no-such-tool"])

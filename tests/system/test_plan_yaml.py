@@ -81,7 +81,12 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("", 1, 1, "empty"),
         (b"title: \xff\n", 1, 8, "UTF-8"),
         (b"title: a\x00b\n", 1, 9, "U+0000"),
-        ("accepted: [{obligation: a/b/c, verdict: unknown, reason: r, who: w, date: 2026-02-30}]", 1, 75, "calendar"),
+        (
+            "accepted: [{obligation: a/b, verdict: unknown, reason: r, who: w, expires: 2027-01-01, date: 2026-02-30}]",
+            1,
+            94,
+            "calendar",
+        ),
         ("scenario:\n  t: [{a: 1}, {b: 2}]\n", 2, 15, "odd here: a, b"),
         ("scenario:\n  t: [{a: 1}]\n  interpret: {in.x: t(b)}\n", 3, 21, "no column 'b'"),
         ("scenario:\n  interpret: {in.x: u(b)}\n", 2, 21, "no table 'u'"),
@@ -281,12 +286,89 @@ def test_plain_words_owners_and_dates_are_checked(tmp_path: Path, entry: str, co
     assert fault.span.line == 2
 
 
+ACCEPTED = {"reason": "a spare brake", "who": "A. Person", "date": "2026-11-20", "expires": "2030-01-01"}
+AMOUNTS = {"because": "it does", "who": "A. Person", "date": "2026-11-20", "until": "2030-01-01"}
+CONFIRMED = {"who": "A. Person", "on": "2026-11-20", "sentence": "0123456789abcdef"}
+SIGNED: dict[str, tuple[str, dict[str, str]]] = {
+    # what a person signs by name: where it stands, and what it has to hold
+    "accepted": ("accepted:\n  - obligation: a/b/c\n    verdict: unknown\n{}", ACCEPTED),
+    "amounts": ("requirements:\n  R:\n    text: t\n    amounts:\n      says: It does\n{}", AMOUNTS),
+    "confirmed": ("requirements:\n  R:\n    text: t\n    confirmed:\n{}", CONFIRMED),
+}
+BAD_TEXTS = {
+    "blank": '" "',
+    "empty": "''",
+    "nothing": "",
+    "of no width": '"\u200b"',
+    "a letter that nobody sees": '"\u3164"',
+    "punctuation": '"…"',
+    "a mark of direction": '"A. \\u202enosreP"',
+    "a mark of direction, as itself": '"A. Person\u200f"',
+    "a control character": '"A. Person\\u0007"',
+    "padded by what is not seen": '"\ufeffA. Person"',
+}
+BAD_DAYS = {
+    "blank": '" "',
+    "of no calendar": "2026-02-30",
+    "padded": '" 2026-11-20"',
+    "padded by what is not seen": '"2026-11-20\u200b"',
+    "a line more": '"2026-11-20\\n"',
+    "other digits": '"٢٠٢٦-11-20"',
+}
+
+
+def signed(name: str, **given: str | None) -> str:
+    """A plan whose one entry is whole, but for what is given; None: left out."""
+    text, keys = SIGNED[name]
+    indent = " " * (6 if name != "accepted" else 4)
+    lines = [f"{indent}{key}: {value}\n" for key, value in {**keys, **given}.items() if value is not None]
+    return text.format("".join(lines))
+
+
+def test_entries_that_are_whole_are_right(tmp_path: Path) -> None:
+    assert not [f for name in SIGNED for f in faults(tmp_path, signed(name))]
+    persian = "درست است\u200cها"  # letters are parted by a mark of no width
+    assert not faults(tmp_path, signed("amounts", because=persian, who="O'Neill-Łuk Ånström"))
+    assert not faults(tmp_path, signed("accepted", who='"  A.   Person  "'))
+
+
+@pytest.mark.parametrize("key", [(name, key) for name, (_, keys) in SIGNED.items() for key in keys])
+def test_what_a_person_signs_is_whole(tmp_path: Path, key: tuple[str, str]) -> None:
+    """Person, reason, date and last day: missing, blank, or not what it looks like, each is told at its place."""
+    name, field = key
+    assert [f.code for f in faults(tmp_path, signed(name, **{field: None}))] == ["PLAN104"]
+    for what, value in (BAD_DAYS if field in ("date", "on", "expires", "until") else BAD_TEXTS).items():
+        if field == "sentence" and what in ("punctuation", "blank", "a letter that nobody sees"):
+            continue  # a digest that fits nothing: the sentence is suspect
+        text = signed(name, **{field: value})
+        found = faults(tmp_path, text)
+        line = next(k for k, said in enumerate(text.split("\n"), 1) if said.strip().startswith(f"{field}:"))
+        assert {f.span.line for f in found if f.span is not None} == {line}, (field, what, found)
+
+
+@pytest.mark.parametrize("key", [("accepted", "date"), ("amounts", "date"), ("confirmed", "on")])
+def test_nobody_signs_tomorrow_nor_what_has_ended_before(tmp_path: Path, key: tuple[str, str]) -> None:
+    name, field = key
+    ends = [end for end in ("expires", "until") if end in SIGNED[name][1]]
+    (fault,) = faults(tmp_path, signed(name, **{field: "2999-01-01", **dict.fromkeys(ends, "2999-12-31")}))
+    assert "still to come" in fault.message
+    for end in ends:
+        (fault,) = faults(tmp_path, signed(name, **{end: "2026-11-19"}))
+        assert "before" in fault.message
+
+
+def test_what_nobody_sees_stands_nowhere_in_a_plan(tmp_path: Path) -> None:
+    """A pattern or a name that is not what it looks like would match something else, or nothing."""
+    for text in ('title: "a\u200bb"\n', 'lints_off: ["RCL\u200f401"]\n', '"no\u2066des": {}\n'):
+        assert "PLAN101" in [f.code for f in faults(tmp_path, text)], text
+
+
 def test_statements_of_a_plan(tmp_path: Path) -> None:
     text = (
         "compose: {D: {persistence: {because: b, says: It stays, who: W, date: 2026-11-20, until: 2030-01-01},"
         " entered: {because: e}}}\n"
         "suppositions: {hoare.map: {says: The map fits}}\n"
-        "requirements: {R: {text: t, amounts: {because: it does}}}\n"
+        "requirements: {R: {text: t, amounts: {because: it does, who: W, date: 2026-11-20, until: 2030-01-01}}}\n"
         "nodes: {a: {title: the first, methods: [hoare: {}]}}\n"
     )
     (tmp_path / "plan.yaml").write_text(text)
@@ -297,7 +379,7 @@ def test_statements_of_a_plan(tmp_path: Path) -> None:
         ("D.persistence", "It stays", "b", "W", "2030-01-01", "2026-11-20"),
         ("D.entered", "", "e", "", "", ""),
         ("suppositions.hoare.map", "The map fits", "", "", "", ""),
-        ("requirements.R.amounts", "", "it does", "", "", ""),
+        ("requirements.R.amounts", "", "it does", "W", "2030-01-01", "2026-11-20"),
     ]
     assert plan.node("a").title == "the first"
 
