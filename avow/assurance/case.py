@@ -441,7 +441,7 @@ def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
         return False, "digests were not verified in this run"
     serious = sum(d.serious for d in facts.discrepancies)
     if serious:
-        return False, f"the audit found {serious} discrepanc{'y' if serious == 1 else 'ies'}"
+        return False, f"the audit found {count(serious, 'discrepancy', 'discrepancies')}"
     if not facts.run.fresh:
         cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
         if not cached:
@@ -457,5 +457,5 @@ def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
         )
     )
     if unanswered:
-        return False, f"{unanswered} planned attempt{'' if unanswered == 1 else 's'} not made in this run"
+        return False, f"{count(unanswered, 'planned attempt')} not made in this run"
     return True, "every answer was computed in this run, and every digest verified"

@@ -10,6 +10,7 @@ from dataclasses import field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.evidence.claims import Reestablished
 from avow.evidence.obligation import Kind
@@ -114,9 +115,8 @@ def standing(proofs: Sequence[ProofView], kernel: KernelRun, run: str) -> tuple[
     if kernel.run != run:
         return False, "the kernel was not asked in this run"
     if lacking := claimed(wanted):
-        names = ", ".join(name.split("/", 1)[1] for name in lacking[:3])
-        more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
-        return False, f"{len(lacking)} of {len(wanted)} proofs have no certificate: {names}{more}"
+        names = listed([name.split("/", 1)[1] for name in lacking], 3)
+        return False, f"{len(lacking)} of {len(wanted)} proofs have no certificate: {names}"
     certified = [p for p in wanted if p.grade is not ProofGrade.TOOL_TRUSTED]
     if not certified:
         return False, "no proof of the composition or of the requirements has a certificate"
@@ -134,7 +134,5 @@ def trusted_base(proofs: Iterable[ProofView], kernel: KernelRun) -> tuple[Truste
     for proof in proofs:
         for tool in proof.tools:
             tools[tool] = tools.get(tool, 0) + 1
-    words = [
-        Trusted(f"{tool} (not certified)", f"{n} proof{'' if n == 1 else 's'}") for tool, n in sorted(tools.items())
-    ]
+    words = [Trusted(f"{tool} (not certified)", count(n, "proof")) for tool, n in sorted(tools.items())]
     return (*own, *solvers, *words)

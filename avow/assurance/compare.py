@@ -9,6 +9,7 @@ from typing import assert_never
 from avow.assurance.answers import How
 from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
+from avow.base.plain import listed
 from avow.base.verdict import said
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
@@ -233,9 +234,9 @@ def _why(before: Told, after: Told) -> Iterator[str]:
     came = [name for name in after.below if name not in before.below]
     went = [name for name in before.below if name not in after.below]
     if came:
-        yield f"it rests on {_list(list(map(short, came)))}, which {_be(came)} not shown now"
+        yield f"it rests on {listed(list(map(short, came)), 4)}, which {_be(came)} not shown now"
     if went:
-        yield f"{_list(list(map(short, went)))}, on which it rested, {_be(went)} no obstacle any more"
+        yield f"{listed(list(map(short, went)), 4)}, on which it rested, {_be(went)} no obstacle any more"
 
 
 def _be(names: Sequence[str]) -> str:
@@ -253,7 +254,7 @@ def _of_method(method: str, old: Answer | None, new: Answer | None) -> Iterator[
         reason = f"does not count any more: {new.gone}" if new is not None else "is not there any more"
         yield f"{method}'s answer ({effective(was.record)}) {reason}"
     elif was is not None and now is not None and was.mark != now.mark:
-        changed = _list(list(_changed(was.record, now.record)))
+        changed = listed(list(_changed(was.record, now.record)), 4)
         reason = f"since {changed}" if changed else "with nothing changed that it depends on"
         same = effective(was.record) is effective(now.record)
         answer = f"{effective(now.record)} as before" if same else f"{effective(was.record)} → {_said(now)}"
@@ -276,7 +277,3 @@ def _changed(was: Evidence, now: Evidence) -> Iterator[str]:
         yield f"the tool is another ({was.tool} {was.tool_version} → {now.tool} {now.tool_version})"
     if was.key != now.key and not (was.obligation_digest != now.obligation_digest or was.inputs != now.inputs):
         yield "its options, the scenario, the wiring or a version changed"
-
-
-def _list(parts: Sequence[str]) -> str:
-    return ", ".join(parts[:4]) + (f" and {len(parts) - 4} more" if len(parts) > 4 else "")

@@ -36,7 +36,7 @@ from avow.assurance.relied import (
     word,
 )
 from avow.assurance.weakenings import briefly, of_weakening
-from avow.base.plain import count
+from avow.base.plain import count, listed
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
@@ -248,12 +248,8 @@ def _refuted(
     first = min(wrong, key=lambda v: v.obligation.kind is not Kind.GUARANTEE).obligation
     where = next((f"{node.title}: " for node in nodes if node.name == first.node), "")
     more = f", and {count(len(wrong) - 1, 'more claim')}" if len(wrong) > 1 else ""
-    takes = f" Open: {_some(felled)}." if felled else ""
+    takes = f" Open: {listed(felled, 6)}." if felled else ""
     return f"Refuted: {where}“{first.claim.rstrip('.')}”{more}.{takes}"
-
-
-def _some(names: Sequence[str], most: int = 6) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _lines(suppositions: Sequence[Supposition]) -> Iterable[SupposedLine]:
@@ -272,12 +268,11 @@ def _owners(suppositions: Sequence[Supposition]) -> str:
     if not number:
         return ""
     ends = sorted({s.until for s in owned})
-    named = ", ".join(f"{who} ({many})" if len(number) > 1 else who for who, many in number[:OWNERS])
-    more = f" and {len(number) - OWNERS} more" if len(number) > OWNERS else ""
+    named = listed([f"{who} ({many})" if len(number) > 1 else who for who, many in number], OWNERS)
     made = sorted({s.date for s in owned})
     since = f", supposed {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
     until = f", until {ends[0]}" if len(ends) == 1 else f"; the first ends {ends[0]}"
-    return f"{named}{more}{since}{until}"
+    return f"{named}{since}{until}"
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

@@ -12,6 +12,7 @@ from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationV
 from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.persons import one_person
+from avow.base.plain import count
 from avow.base.verdict import Isolation, Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
@@ -44,7 +45,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     number = independent(speaking) if demand.independent else len({item.method for item in speaking})
     if number < demand.methods:
         kind = "independent method" if demand.independent else "method"
-        return f"{number} {kind}{'' if number == 1 else 's'}, but {demand.methods} are asked{because}"
+        return f"{count(number, kind)}, but {demand.methods} are asked{because}"
     return None
 
 

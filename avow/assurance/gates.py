@@ -14,6 +14,7 @@ from avow.assurance.gap import shortfall, suggest
 from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.relied import Relied, looked_at
+from avow.base.plain import count, listed
 from avow.base.verdict import Object
 from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.status import Status
@@ -71,7 +72,7 @@ def _integrity(facts: Facts) -> Gate:
     serious = [d for d in facts.discrepancies if d.serious]
     if not serious:
         return Gate("integrity", title, True, "every digest was computed again and agrees")
-    reason = f"{_count(len(serious), 'discrepancy', 'discrepancies')}; first: {serious[0].text}"
+    reason = f"{count(len(serious), 'discrepancy', 'discrepancies')}; first: {serious[0].text}"
     anew = Suggestion(
         "find out who changed it; what cannot be restored is computed again once "
         f"artifacts/ledger/{facts.system}.jsonl* is deleted (the loss is told from then on)",
@@ -99,7 +100,7 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
             f"{f.pattern} was expected until {f.expires}" for f in findings if f.how == "expected" and f.expired
         ]
         reasons += [f"there but not expected: {short(name)}" for name in extra]
-        good = f"exactly the {_count(sum(f.how == 'expected' for f in findings), 'expected finding')}"
+        good = f"exactly the {count(sum(f.how == 'expected' for f in findings), 'expected finding')}"
         yield Gate(
             "expected",
             "The findings are the expected ones, all of them and no others",
@@ -113,13 +114,12 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
         reason = "; ".join(f"{f.pattern} ({f.verdict}) was accepted by {f.who} until {f.expires}" for f in expired)
         title = "Accepted risks have not expired"
         names = tuple(name for f in expired for name in f.obligations)
-        yield Gate("accepted", title, not expired, reason or _count(len(accepted), "accepted risk"), names)
+        yield Gate("accepted", title, not expired, reason or count(len(accepted), "accepted risk"), names)
 
 
 def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:
     wrong = [v for v in obligations if v.status in FINDINGS and not v.advice]
     return _gate(
-        facts,
         "refuted",
         "Nothing is refuted, contradictory or vacuous",
         wrong,
@@ -142,7 +142,6 @@ def _kind(
     of_kind = [v for v in obligations if v.obligation.kind is kind and not v.advice]
     failing = [v for v in of_kind if good and v.status not in good]
     return _gate(
-        facts,
         kind.value,
         title,
         failing,
@@ -173,7 +172,6 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
         lacking = {v.id: shortfall(v, demand, facts.policy, facts.today) for v in of_kind}
         failing = [v for v in of_kind if lacking[v.id]]
         yield _gate(
-            facts,
             f"guarantees-{criticality}",
             f"Guarantees of {criticality} criticality",
             failing,
@@ -197,7 +195,6 @@ def _programs(
     asked = [v for v in own if v.obligation.name != ProgramClaim.LINKED or v.obligation.node in of_models]
     good = facts.policy.programs
     yield _gate(
-        facts,
         Kind.PROGRAM.value,
         "Programs run without fault, and answer as the models that are relied upon",
         [v for v in asked if good and v.status not in good],
@@ -313,25 +310,20 @@ def _certified(facts: Facts, proofs: Sequence[ProofView], fresh: bool) -> Iterab
     if facts.policy.proved:
         wanted = certifiable(proofs)
         lacking = claimed(wanted)
-        names = ", ".join(short(name) for name in lacking[:5]) + (
-            f" and {len(lacking) - 5} more" if lacking[5:] else ""
-        )
         reason = (
-            f"by the calculus' word alone: {names}"
+            f"by the calculus' word alone: {listed(list(map(short, lacking)), 5)}"
             if lacking
-            else f"{_count(len(wanted), 'proof')}, none by its word alone"
+            else f"{count(len(wanted), 'proof')}, none by its word alone"
         )
         yield Gate(
             "proved", "What is proved of composition and requirements is certified", not lacking, reason, lacking
         )
     if facts.policy.certified:
-        done = fresh
-        reason = "every answer is of this run, every digest verified" if done else "run `avow verify --fresh`"
-        yield Gate("certified", "Every answer is fresh and every digest verified", done, reason)
+        reason = "every answer is of this run, every digest verified" if fresh else "run `avow verify --fresh`"
+        yield Gate("certified", "Every answer is fresh and every digest verified", fresh, reason)
 
 
 def _gate(
-    facts: Facts,
     name: str,
     title: str,
     failing: Sequence[ObligationView],
@@ -348,7 +340,7 @@ def _gate(
     if bad:
         reason = shown + more
     elif let_off:
-        reason = f"{good}; {_count(len(let_off), 'finding')} excused by the plan"
+        reason = f"{good}; {count(len(let_off), 'finding')} excused by the plan"
     else:
         reason = good
     suggestions = {s.text: s for view in bad for s in _suggestion(view)}
@@ -419,9 +411,4 @@ def _tool_only(below: Sequence[str], views: Mapping[str, ObligationView]) -> boo
 
 
 def _because(below: Sequence[str]) -> str:
-    names = ", ".join(short(name) for name in below[:4]) + (f" and {len(below) - 4} more" if len(below) > 4 else "")
-    return f"it rests on {names}" if below else "its own evidence is lacking"
-
-
-def _count(number: int, one: str, many: str | None = None) -> str:
-    return f"{number} {one if number == 1 else many or one + 's'}"
+    return f"it rests on {listed(list(map(short, below)), 4)}" if below else "its own evidence is lacking"

@@ -16,6 +16,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.plain import bare
 from avow.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
 
 _BLOCKS = frozenset(
@@ -172,8 +173,8 @@ def read_objects(data: bytes, file: str) -> Iterator[tuple[Thing, dict[str, str]
         listed += [thing for key, thing in reader.things.items() if key not in reader.order]
         for thing in listed:
             values = {**reader.defaults.get(thing.kind, {}), **thing.values}
-            named = {_bare(reader.names.get(key, "")): _plain(v, reader.enumerated) for key, v in values.items()}
-            if not _is_heading(named, _bare(reader.types.get(thing.kind, ""))):
+            named = {bare(reader.names.get(key, "")): _plain(v, reader.enumerated) for key, v in values.items()}
+            if not _is_heading(named, bare(reader.types.get(thing.kind, ""))):
                 yield thing, named
 
 
@@ -188,10 +189,6 @@ def _is_heading(values: Mapping[str, str], kind: str) -> bool:
 def _plain(value: str, enumerated: Mapping[str, str]) -> str:
     first, *marks = value.split("\x00")
     return " ".join(", ".join([*([first] if first else []), *(enumerated.get(m, m) for m in marks)]).split())
-
-
-def _bare(name: str) -> str:
-    return " ".join(name.lower().split())
 
 
 def _parse(data: bytes, file: str) -> _ReqifReader:

@@ -14,6 +14,7 @@ from avow.assurance.naming import requirement_claim, short
 from avow.assurance.relied import EVIDENCE, Relied
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
+from avow.base.plain import count, listed
 from avow.evidence.claims import Standing
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -116,7 +117,7 @@ def _answer(
         name, status = standing.weakest
         how = standing.status.word.capitalize()
         hypotheses = len(standing.hypotheses)
-        rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
+        rest = f", on {count(hypotheses, 'hypothesis', 'hypotheses')}" if hypotheses else ""
         return f"{how}{rest}; the weakest claim under it is {short(name)}, {status.word}."
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
@@ -125,8 +126,7 @@ def _answer(
     if standing.below:
         below = worst_first(standing.below, statuses)
         causes = [f"{short(name)} is {_word(statuses.get(name))}" for name in below]
-        more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
-        return f"Not shown: {', '.join(causes[:3])}{more}."
+        return f"Not shown: {listed(causes, 3)}."
     if not standing.direct:
         return "Not shown."
     formal = requirement.formula or requirement.temporal

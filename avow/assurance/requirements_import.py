@@ -16,6 +16,7 @@ from pathlib import Path
 
 from avow.assurance.reqif import read_objects
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.plain import bare
 from avow.system.plan import Requirement
 from avow.system.strict_yaml import read_yaml
 
@@ -70,7 +71,7 @@ def read_csv(text: str, file: str) -> tuple[Requirement, ...]:
         raise Rejected(Diagnostic("REQS001", f"{file} is no CSV: {error}", _at(file, reader.line_num))) from None
     if not rows:
         raise Rejected(Diagnostic("REQS002", f"{file} is empty: a header row is wanted", _at(file, 1)))
-    header = [_bare(cell) for cell in rows[0][1]]
+    header = [bare(cell) for cell in rows[0][1]]
     columns = {field: header.index(name) for field, names in _COLUMNS.items() for name in names[::-1] if name in header}
     if "text" not in columns:
         known = ", ".join(_COLUMNS["text"])
@@ -161,16 +162,8 @@ def _requirements(rows: Iterable[tuple[int, Mapping[str, str]]], file: str) -> t
     return tuple(found.values())
 
 
-def _bare(name: str) -> str:
-    return " ".join(name.lower().split())
-
-
 def _quoted(text: str) -> str:
-    return (
-        json.dumps(text, ensure_ascii=True)
-        if not any(ord(c) > 0xFFFF for c in text)
-        else json.dumps(text, ensure_ascii=False)
-    )
+    return json.dumps(text, ensure_ascii=max(text, default="") <= "\uffff")
 
 
 def _at(file: str, line: int) -> Span:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.base.plain import listed
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -56,10 +57,10 @@ def open_items(
             items.append(OpenItem(r.status.value, requirement_claim(r.id), r.answer))
     for f in findings:
         if f.unlisted:
-            listed = ", ".join(dict.fromkeys((*f.matched, *f.unlisted)))
+            whole = ", ".join(dict.fromkeys((*f.matched, *f.unlisted)))
             text = (
-                f"{f.how} as {f.verdict}, it matches what it did not when it was written: {_list(list(f.unlisted))}; "
-                f"if these are meant too, write  matched: [{listed}]"
+                f"{f.how} as {f.verdict}, it matches what it did not when it was written: {listed(f.unlisted, 12)}; "
+                f"if these are meant too, write  matched: [{whole}]"
             )
             items.append(OpenItem("unlisted", f.pattern, text))
         if f.now and f.found:
@@ -107,7 +108,7 @@ def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
     for (method, summary), failed in told.items():
         first, *others = failed
         stands = f"{short(first.id)} is {first.status.word} by other evidence alone"
-        same = f"; the same for {_list([short(view.id) for view in others])}" if others else ""
+        same = f"; the same for {listed([short(view.id) for view in others], 12)}" if others else ""
         title = f"{method} gives no answer: {first.obligation.claim}"
         yield OpenItem(Status.ERROR.value, first.id, f"{method}: {summary} ({stands}{same})", title=title)
 
@@ -190,7 +191,7 @@ def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, st
             if record.bound:
                 text = ", ".join(f"{name} = {_short(value)}" for name, value in record.bound.items())
                 bounds.setdefault((view.obligation.node, record.method, text), []).append(view.obligation.name)
-    found = [(f"{node}: {method} ({_list(names)})", text) for (node, method, text), names in bounds.items()]
+    found = [(f"{node}: {method} ({listed(names, 12)})", text) for (node, method, text), names in bounds.items()]
     return (*facts.run.limits.items(), *found)
 
 
@@ -209,20 +210,19 @@ def not_shown(
     prose = [r.id for r in requirements if not r.formula and not r.temporal]
     if prose:
         lines.append(
-            f"{_list(prose)}: stated in prose. That the guarantees named amount to the requirement is a person's "
+            f"{listed(prose, 12)}: stated in prose. That the guarantees named amount to the requirement is a person's "
             "judgement; no tool has checked it."
         )
     told = (Kind.GUARANTEE, Kind.REQUIREMENT)
     bounded = [short(v.id) for v in views if v.obligation.kind in told and v.status is Status.CHECKED]
     if bounded:
-        lines.append(
-            f"{_list(bounded)}: checked exhaustively, but only within the finite scenario; nothing is said outside it."
-        )
+        names = listed(bounded, 12)
+        lines.append(f"{names}: checked exhaustively, but only within the finite scenario; nothing is said outside it.")
     sampled = [
         short(v.id) for v in views if v.obligation.kind in told and v.status in (Status.TESTED, Status.MONITORED)
     ]
     if sampled:
-        lines.append(f"{_list(sampled)}: observed on samples; other inputs and other runs may behave otherwise.")
+        lines.append(f"{listed(sampled, 12)}: observed on samples; other inputs and other runs may behave otherwise.")
     lines += _protocols(views)
     person = [
         short(v.id)
@@ -230,7 +230,7 @@ def not_shown(
         if v.obligation.kind is Kind.GUARANTEE and v.status in (Status.REVIEWED, Status.JUSTIFIED)
     ]
     if person:
-        lines.append(f"{_list(person)}: rests on a person's word alone.")
+        lines.append(f"{listed(person, 12)}: rests on a person's word alone.")
     linked = [
         short(v.id)
         for v in views
@@ -238,13 +238,13 @@ def not_shown(
     ]
     if linked:
         lines.append(
-            f"{_list(linked)}: what was verified is tied to the formula by a table or a judgement of a person, "
+            f"{listed(linked, 12)}: what was verified is tied to the formula by a table or a judgement of a person, "
             "not by translation; that the tie is right is not shown."
         )
     trusted = [e.port for e in facts.environment if e.assume]
     if trusted:
         lines.append(
-            f"{_list(trusted)}: what is assumed of these environment inputs is believed for a reason, not shown."
+            f"{listed(trusted, 12)}: what is assumed of these environment inputs is believed for a reason, not shown."
         )
     used = {v.entry.evidence.backend for view in views for v in view.counting}
     if any(m.strength in (Verdict.PROVED, Verdict.CHECKED) and m.name in used for m in facts.methods):
@@ -268,8 +268,4 @@ def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
                 case str(text) if text.strip():
                     found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
     for text, names in found.items():
-        yield f"{_list(names)}: measured under this protocol, and not beyond it: {text}."
-
-
-def _list(names: Sequence[str]) -> str:
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+        yield f"{listed(names, 12)}: measured under this protocol, and not beyond it: {text}."

@@ -49,6 +49,22 @@ def is_intact(path: Path, sha: str) -> bool:
         return False
 
 
+def text_or_nothing(path: Path) -> str:
+    """A file's text, whatever its bytes; empty where there is nothing to read."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def digest_or_missing(path: Path) -> str:
+    """As `digest_file`; ``missing`` where there is nothing to read."""
+    try:
+        return digest_file(path)
+    except OSError:
+        return "missing"
+
+
 def digest_once(path: Path) -> str:
     """As `digest_file`; a file that this process has read is not read again while it is the same."""
     return _digest_as(path, identity(path.stat()))

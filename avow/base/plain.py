@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 
 _IDENTIFIER = re.compile(
     r"""[A-Za-z]\w*\.[A-Za-z_]\w*      # node.port
@@ -54,6 +55,27 @@ def is_blank(text: str) -> bool:
 _UNSEEN = frozenset(("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"))
 
 
+def bare(name: str) -> str:
+    """A heading as it is compared: in small letters, with single blanks."""
+    return " ".join(name.lower().split())
+
+
+def as_identifier(name: str) -> str:
+    """A name from outside as part of an identifier or of a file's name; the real one is data."""
+    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+
+
+def one_line(text: str) -> str:
+    """Text of a contract within a line, such as a comment: no line break may end it early."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
 def count(number: int, one: str, many: str = "") -> str:
     """``1 gate``, ``3 gates``."""
     return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")
+
+
+def listed(items: Sequence[str], most: int = 8) -> str:
+    """So many items at most, and how many more there are: ``a, b and 3 more``."""
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(items[:most]) + more

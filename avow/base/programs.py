@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_or_missing, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
@@ -30,7 +30,7 @@ def program_digest(places: tuple[str, ...]) -> str:
     note = cache_folder() / f"program-{sha256(json.dumps(places))[:16]}.json"
     known = read_note(note) or {}
     if known.get("of") != mark:
-        known = {"of": mark, "digest": sha256(json.dumps([[str(file), _digest(file)] for file in files]))}
+        known = {"of": mark, "digest": sha256(json.dumps([[str(file), digest_or_missing(file)] for file in files]))}
         with contextlib.suppress(OSError):  # a read-only home costs that each time
             write_note(note, known)
     return str(known["digest"])
@@ -85,10 +85,3 @@ def _mark(file: Path) -> list[int]:
     except OSError:
         return []
     return [info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns]
-
-
-def _digest(file: Path) -> str:
-    try:
-        return digest_file(file)
-    except OSError:
-        return "missing"

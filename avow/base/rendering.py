@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
@@ -19,6 +20,7 @@ from avow.base import codec
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.plain import count
 from avow.tuning.shown import SOURCE_COLUMNS
 from avow.tuning.sizes import SOURCE_SHOWN
 
@@ -35,13 +37,8 @@ def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] | None 
 
 def summary(diagnostics: Iterable[Diagnostic]) -> str:
     """``2 errors, 1 warning``, or ``no errors``."""
-    found = list(diagnostics)
-    parts = []
-    for severity in Severity:
-        count = sum(d.severity is severity for d in found)
-        if count:
-            parts.append(f"{count} {severity}{'' if count == 1 else 's'}")
-    return ", ".join(parts) or "no errors"
+    found = Counter(d.severity for d in diagnostics)
+    return ", ".join(count(found[severity], severity) for severity in Severity if found[severity]) or "no errors"
 
 
 class _Lines:

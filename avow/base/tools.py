@@ -45,6 +45,11 @@ class Tool:
         return (self.path, *self.parts) if self.path is not None else ()
 
 
+def z3_tool() -> Tool:
+    """The solver that Avow brings along."""
+    return Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3")
+
+
 @functools.cache
 def find_tool(
     name: str,

@@ -26,7 +26,7 @@ from avow.tuning.effort import CUT_EFFORT
 
 def first_cut(node: Answerer, deadline: float) -> str:
     """In words, the first inputs at which an allowed output of a node was not looked at; nothing where all were."""
-    ports = [port for port in node.others.values() if is_restricted(node.world, node, port)]
+    ports = [port for port in node.others.values() if is_restricted(node, port)]
     if not ports:
         return ""
     shared = Translator()

@@ -125,7 +125,7 @@ def _are_all(values: Sequence[Value], sort: Sort) -> bool:
     return everything is not None and set(everything) <= set(values)
 
 
-def is_restricted(world: World, node: Answerer, port: Port) -> bool:
+def is_restricted(node: Answerer, port: Port) -> bool:
     """Whether not every value of an output's sort is tried; of functions, and of sequences element by element, at some
     point."""
     choices = node.choices.get(f"out.{port.name}")

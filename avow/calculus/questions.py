@@ -7,6 +7,7 @@ from dataclasses import field, replace
 from typing import Protocol, assert_never
 
 from avow.base.files import sha256
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition
@@ -99,8 +100,7 @@ def certified(answer: Answer, found: Established | None, *, late: bool, fallen: 
     if found is None:
         told = f"the engine finds that it {answer.summary}; the kernel could not establish it"
         if fallen:
-            more = f" and {len(fallen) - 3} more" if len(fallen) > 3 else ""
-            told += f": what rests on these may not be used, they do not stand: {', '.join(fallen[:3])}{more}"
+            told += f": what rests on these may not be used, they do not stand: {listed(fallen, 3)}"
         if late:
             told += ": the clock ended a question to Z3 before its own steps did, ask again"
         return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=told, vacuous=False)

@@ -11,6 +11,7 @@ from fractions import Fraction
 from itertools import product
 
 from avow.base.diagnostics import Rejected
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
@@ -254,10 +255,8 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
         sort = named.get(name) or (ports[0][1].sort if ports else None)
         everything = None if sort is None or isinstance(sort, FunctionSort) else finite_values(sort)
         if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
-            more = len(texts) - DOMAIN_VALUES
-            shown = ", ".join(texts[:DOMAIN_VALUES]) + (f" and {more} more" if more > 0 else "")
             place = f"scenario.domains.{name}"
-            found.append(bound(place, f"{place}: it is one of {shown}"))
+            found.append(bound(place, f"{place}: it is one of {listed(texts, DOMAIN_VALUES)}"))
     for name, (table, columns) in scenario.interpret.items():
         place = f"scenario.interpret.{name}"
         found.append(bound(place, f"{place}: it is as {table}({', '.join(columns)}) has it"))
@@ -265,7 +264,7 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
         for port in (*node.inputs, *node.outputs):
             role = "in" if port in node.inputs else "out"
             said = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
-            if not said and port.sort not in world.domains and _is_sampled(world, port.sort):
+            if not said and port.sort not in world.domains and _is_sampled(port.sort):
                 text = f"scenario: {node.name}.{port.name} has one of the values that are tried"
                 found.append(bound(f"scenario.values.{node.name}.{port.name}", text))
     if world.frame.timed and STEP_LENGTH not in scenario.domains:
@@ -273,7 +272,7 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _is_sampled(world: World, sort: Sort) -> bool:
+def _is_sampled(sort: Sort) -> bool:
     """Whether not all of a sort's values are tried, though no range for it is written down."""
     if isinstance(sort, FunctionSort):
         return any(finite_values(s) is None for s in (*sort.parameters, sort.result))

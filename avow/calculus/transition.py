@@ -129,7 +129,7 @@ class Machine:
         self.initial()
         for endpoint, condition, given, found in self._begun:
             node, port = self.nodes[endpoint.node], self.frame.node(endpoint.node).output(endpoint.port)
-            if is_restricted(self.world, node, port) and another_first(node, port, condition or TRUE, given, found):
+            if is_restricted(node, port) and another_first(node, port, condition or TRUE, given, found):
                 self.incomplete.add(f"before the first step {endpoint} may have other values than the scenario's")
 
     def _unspecified(self) -> Iterator[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
+from avow.base.plain import count
 from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def command(
             click.echo(render(found, colour=tint), color=tint)
         if explain:
             _explain(found)
-        click.echo(f"{files} file{'' if files == 1 else 's'}: {summary(found)}")
+        click.echo(f"{count(files, 'file')}: {summary(found)}")
     return 2 if any(d.is_error for d in found) else 0
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document, to_json
+from avow.base.plain import count
 from avow.cli.options import json_option
 from avow.tuning.shown import DIFF_REASONS
 
@@ -62,7 +63,7 @@ def _tell(changes: list[Change]) -> None:
                 click.echo(f"      {line}")
     again = [change for change in changes if change.kind == "rerun"]
     if again:
-        click.echo(f"  asked again, with the same verdict: {len(again)} claim{'' if len(again) == 1 else 's'}")
+        click.echo(f"  asked again, with the same verdict: {count(len(again), 'claim')}")
 
 
 def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:

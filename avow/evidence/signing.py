@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 _CONTEXT = "avow ledger head 1"
 
 
-def signature_path(ledger: Path) -> Path:
-    return ledger.with_name(ledger.name + ".sig")
+def signature_path(signed: Path) -> Path:
+    """Where the signature of a ledger or of a review's record lies."""
+    return signed.with_name(signed.name + ".sig")
 
 
 def new_key_pair(private: Path) -> Path:

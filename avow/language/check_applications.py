@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.language.check_base import count
+from avow.base.plain import count
 from avow.language.check_names import Names
 from avow.language.conversions import WHOLE, common, joined
 from avow.language.operators import OPERATORS, Mistyped, operation

@@ -104,7 +104,3 @@ class Base(ABC):
             message = f"{what} must be of type {show_sort(sort)} and is of type {show_sort(term.sort)}"
             self.error("RCL303", message, tree, hint=hint)
         return converted
-
-
-def count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

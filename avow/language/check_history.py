@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from avow.language.check_base import count
+from avow.base.plain import count
 from avow.language.check_relations import Relations
 from avow.language.conversions import WHOLE, common, joined, widen
 from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from avow.base.diagnostics import Span
-from avow.language.check_base import Base, count
+from avow.base.plain import count
+from avow.language.check_base import Base
 from avow.language.environment import did_you_mean
 from avow.language.foreign import FIELDS, FOREIGN_NAMES
 from avow.language.lexer import KEYWORDS, unquote

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.base.plain import count
 from avow.language.chains import arithmetic
 from avow.language.check_applications import Applications
-from avow.language.check_base import count
 from avow.language.conversions import NUMERIC, alike, common, convert, joined
 from avow.language.lexer import Token
 from avow.language.printer import show_sort

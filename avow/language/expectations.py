@@ -90,7 +90,7 @@ def _in_formula(
     return (
         _in_relation(earlier, before, found, after, expected)
         or _in_quantifier(earlier, before, found, expected)
-        or _in_general(earlier, before, found, after, expected)
+        or _in_general(earlier, before, found, expected)
     )
 
 
@@ -172,9 +172,7 @@ def _in_quantifier(
     return None
 
 
-def _in_general(
-    earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
-) -> str | None:
+def _in_general(earlier: Sequence[Token], before: Token | None, found: Token, expected: frozenset[str]) -> str | None:
     if found.type in ("AND", "OR", "IMPLIES", "IFF") and expected >= _TERM:
         return f"`{found.text}` joins two formulas: one is missing before it"
     if found.type in _ORDER and "RBRACE" in expected:

@@ -309,13 +309,11 @@ def parse_term(
     node: Node | None = None,
     contract: Contract = NOTHING,
     span: Span | None = None,
-    extra: Mapping[str, Sort] | None = None,
     *,
-    roles: frozenset[Role] = BOTH_ROLES,
     sort: Sort | None = None,
 ) -> Term:
     """As `parse_formula`, of a term of any sort (``move(0, 1)``, ``red``); with `sort`, converted to that."""
-    return _parse(text, node, contract, span, extra, roles, formula=False, sort=sort)
+    return _parse(text, node, contract, span, None, BOTH_ROLES, formula=False, sort=sort)
 
 
 def _parse(

@@ -17,6 +17,7 @@ from functools import reduce
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.language.conversions import NUMERIC, WHOLE, common, joined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
@@ -250,7 +251,7 @@ def _wrong_count(name: Builtin, given: int) -> Mistyped | None:
     least, most = counts
     if given >= least and (most is None or given <= most):
         return None
-    wanted = f"{least} argument{'' if least == 1 else 's'}{'' if most else ' or more'}"
+    wanted = count(least, "argument") + ("" if most else " or more")
     return Mistyped("RCL305", f"`{name}` takes {wanted} and is given {given or 'none'}", None)
 
 

@@ -17,7 +17,7 @@ from avow.language.contract import Contract
 from avow.language.environment import of_contract
 from avow.language.terms import Role
 from avow.lsp.names import Meaning, Occurrence, Ports, What
-from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.strict_yaml import Piece, listed, read_yaml
 
 _WORD = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\.")
 _PORT = re.compile(r"\b(?:in|out)\s*\.\s*[A-Za-z_]")
@@ -93,7 +93,7 @@ class _Reader:
 
     def scalar(self, piece: Piece | None, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
         """A scalar, or each of a list, that is one name."""
-        for item in _items(piece):
+        for item in listed(piece):
             region = self.region(item.span)
             if self.plan.text[region.start : region.end] == item.text:
                 yield from self.one(what(item.text), region.start)
@@ -166,13 +166,13 @@ class _Reader:
                 pass
 
     def formula(self, piece: Piece | None, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
-        for item in _items(piece):
+        for item in listed(piece):
             yield from self.words(self.region(item.span), node, side)
 
     # -- the plan ------------------------------------------------------------------------------------------------------
 
     def everything(self, root: Piece) -> Iterator[Occurrence]:
-        for connection in _items(root.at("connections")):
+        for connection in listed(root.at("connections")):
             for key, side in (("from", Role.OUTPUT), ("to", Role.INPUT)):
                 yield from self.formula(connection.at(key), None, side)
             source = connection.at("from")
@@ -197,16 +197,16 @@ class _Reader:
         for _, _, picture in self.keys(root.at("pictures")):
             yield from self.scalar(picture.at("places"), self.element)
         for key in _FINDINGS:
-            for finding in _items(root.at(key)):
+            for finding in listed(root.at(key)):
                 for inner in ("obligation", "matched"):
-                    for item in _items(finding.at(inner)):
+                    for item in listed(finding.at(inner)):
                         yield from self.obligation(item)
 
     def requirements(self, root: Piece) -> Iterator[Occurrence]:
         for _, _, requirement in self.keys(root.at("requirements")):
             for key in ("formula", "temporal"):
                 yield from self.formula(requirement.at(key), None)
-            for item in _items(requirement.at("supported_by")):
+            for item in listed(requirement.at("supported_by")):
                 node, dot, name = item.text.partition(".")
                 region = self.region(item.span)
                 yield from self.one(self.node(node), region.start)
@@ -224,7 +224,7 @@ class _Reader:
 
     def method_options(self, piece: Piece | None, node: str) -> Iterator[Occurrence]:
         """The names in the options of a node's methods, at any depth."""
-        for inner in _items(piece) if piece is not None and piece.items is not None else ():
+        for inner in listed(piece) if piece is not None and piece.items is not None else ():
             yield from self.method_options(inner, node)
         if piece is not None and piece.entries is None and piece.items is None:
             region = self.region(piece.span)
@@ -257,12 +257,6 @@ class _Reader:
             if name.startswith(("constrained-", "determined-")):
                 output = name.partition("-")[2]
                 yield from self.one(self.port(node, output, Role.OUTPUT), at + len(name) - len(output))
-
-
-def _items(piece: Piece | None) -> list[Piece]:
-    if piece is None:
-        return []
-    return piece.items if piece.items is not None else [piece]
 
 
 def _scalars(piece: Piece) -> Iterator[Piece]:

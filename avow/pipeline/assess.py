@@ -163,7 +163,7 @@ def build(assessment: Assessment) -> Case:
         derivations=derivation_views(system),
         discharging=discharging(system),
         methods=_methods(assessment),
-        tools=_tools(assessment),
+        tools=_tools(),
         discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
         digests={path: sha256(data) for path, data in texts.items()},
         ledger_head=ledger.head,
@@ -204,7 +204,7 @@ def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
     return tuple(found)
 
 
-def _tools(assessment: Assessment) -> tuple[ToolInfo, ...]:
+def _tools() -> tuple[ToolInfo, ...]:
     from avow.pipeline.doctor import findings
 
     return tuple({f.tool.name: ToolInfo(f.tool.name, f.tool.version, f.tool.install) for f in findings()}.values())

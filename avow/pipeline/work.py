@@ -17,7 +17,7 @@ from avow.backend_kit.linked import beside, models, unrun
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_or_missing, sha256
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
@@ -390,13 +390,13 @@ def _keys(
 
 
 def _files(paths: Iterable[Path]) -> str:
-    return json.dumps([[path.name, _digest(path)] for path in paths])
+    return json.dumps([[path.name, digest_or_missing(path)] for path in paths])
 
 
 def texts_digest(system: System) -> str:
     """Of the files that contract and plan were read from: comments count."""
     plan = system.plan
-    return sha256(json.dumps(list(map(_digest, (plan.path, *plan.contract_files, *plan.included)))))
+    return sha256(json.dumps(list(map(digest_or_missing, (plan.path, *plan.contract_files, *plan.included)))))
 
 
 def _contract_digest(contract: Contract) -> str:
@@ -405,13 +405,6 @@ def _contract_digest(contract: Contract) -> str:
         parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
         parts += [[node.name, c.kind, c.name, node_digest(node, c)] for c in node.clauses]
     return sha256(json.dumps(sorted(parts)))  # the order of declarations means nothing
-
-
-def _digest(path: Path) -> str:
-    try:
-        return digest_file(path)
-    except OSError:
-        return "missing"
 
 
 def _scenario(system: System) -> str:

@@ -15,6 +15,7 @@ from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import kept_apart, word
+from avow.base.plain import count, listed
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
@@ -65,7 +66,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             others=lambda line: others(case, line),
             refuted=_refuted,
             said_of=lambda name: ((said := case.said(name)) and said.reason) or "",
-            some=some,
+            some=listed,
             titles={node.name for node in case.nodes},
             tone_of_how={how: _tone_of(case, how) for how in How},
             word=_word,
@@ -91,10 +92,6 @@ def others(case: Case, line: SupposedLine) -> list[Supposition]:
 def worded(case: Case) -> bool:
     """Whether a printed first sheet has room for all suppositions in words; a sheet has no folds to open."""
     return sum(len(s.words) for s in case.suppositions) + sum(len(r.text) for r in case.listed) <= SHEET_LETTERS
-
-
-def some(names: Sequence[str], most: int = 8) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _many(case: Case) -> bool:
@@ -171,16 +168,16 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
     relied = [case for case in cases if case.answers.headline is not Headline.EXAMINED]
     failing = [case for case in relied if case.answers.tone is Tone.RED]
     if failing:
-        line, tone = f"{len(failing)} of {wording.count(len(cases), 'system')} not shown", Tone.RED
+        line, tone = f"{len(failing)} of {count(len(cases), 'system')} not shown", Tone.RED
     elif not relied:
         line, tone = "None is relied upon", Tone.GREY
     else:
         rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
         tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
         supposing = ", on suppositions" if any(case.suppositions for case in relied) else ""
-        line = f"{wording.count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{supposing}{rest}"
+        line = f"{count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{supposing}{rest}"
     if earlier:
-        line += f"; {wording.count(len(earlier), 'report')} as of an earlier state"
+        line += f"; {count(len(earlier), 'report')} as of an earlier state"
         tone = Tone.AMBER if tone is Tone.GREEN else tone
     return (
         environment()

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from avow.assurance.model import Case
 from avow.assurance.modules import requirement_modules
 from avow.assurance.naming import short
-from avow.report.answers_page import WORDS, full_reason, some
+from avow.base.plain import listed
+from avow.report.answers_page import WORDS, full_reason
 from avow.report.identified import identified
 
 
@@ -24,11 +25,11 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
             lines += [f"rests on {title}: {words}" for _, title, words in module.away]
             lines += [f"composition: {module.conditions}"] if module.conditions else []
             lines += [f"supposes {', '.join(module.supposes)}"] if module.supposes else []
-            lines += [f"not shown, because of: {some([short(n) for n in module.failing])}"] if module.failing else []
+            lines += [f"not shown, because of: {listed([short(n) for n in module.failing])}"] if module.failing else []
             yield f"requirement {r.id}", lines
     for s in case.suppositions:
         if name in (s.number, s.key):
-            lines = [s.words, full_reason(s), s.term, f"needed by {some(s.needing)}", f"from {some(s.where)}"]
+            lines = [s.words, full_reason(s), s.term, f"needed by {listed(s.needing)}", f"from {listed(s.where)}"]
             yield f"supposition {s.number} ({s.sort}), {s.key}", [line for line in lines if line]
     for node in case.nodes:
         if name in (node.name, node.title):
@@ -45,7 +46,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
             yield f"gate {gate.id}: {gate.title}", lines
     for w in case.weakenings:
         if name in (w.key, w.words):
-            yield f"weakening {w.key}: {w.count} {w.words}", [w.why, some([short(claim) for claim in w.claims], 20)]
+            yield f"weakening {w.key}: {w.count} {w.words}", [w.why, listed([short(claim) for claim in w.claims], 20)]
     for d in case.derivations:
         if d.derivation.name == name:
             lines = [*d.derivation.text.splitlines(), f"{d.status.word}: {d.derivation.conclusion}"]

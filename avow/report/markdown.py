@@ -11,7 +11,7 @@ from avow.assurance.remarks import REMARK
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
-from avow.report.short import markdown_head
+from avow.report.short import escaped, markdown_head
 from avow.report.source import plain_lines
 from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
 from avow.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
@@ -26,18 +26,18 @@ _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 def render_markdown(case: Case) -> str:
     """The summary: the five answers, the gates, the open items, the table, what is not shown."""
     parts = [
-        f"# {_md(case.title)}: assurance report",
+        f"# {escaped(case.title)}: assurance report",
         *markdown_head(case),
         _origin(case),
-        _table(("file", "SHA-256"), ((_md(path), f"`{mark}`") for path, mark in case.digests)),
+        _table(("file", "SHA-256"), ((escaped(path), f"`{mark}`") for path, mark in case.digests)),
         "## Gates",
         _table(
             ("gate", "", "why"),
             (
                 (
-                    _md(g.title),
+                    escaped(g.title),
                     "not asked" if g.idle else "passes" if g.passed else "**fails**",
-                    _md(gate_line(g.reason)),
+                    escaped(gate_line(g.reason)),
                 )
                 for g in case.gates
             ),
@@ -46,32 +46,39 @@ def render_markdown(case: Case) -> str:
         _table(
             ("", "claim", "why", "what was found", "next"),
             (
-                (i.kind, f"{_md(i.title)} ({_md(short(i.claim))})", _md(i.reason), _md(i.text), _md(i.suggestion))
+                (
+                    i.kind,
+                    f"{escaped(i.title)} ({escaped(short(i.claim))})",
+                    escaped(i.reason),
+                    escaped(i.text),
+                    escaped(i.suggestion),
+                )
                 for i in case.open_items
                 if not i.advice
             ),
         ),
-        _md(open_line(case)),
+        escaped(open_line(case)),
         *_remarks(case),
         "## Guarantees",
         _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in _guarantees(case))),
         "## Hypotheses and environment",
-        "\n".join(f"- {_md(h.text)} ({_md(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses) or "None.",
+        "\n".join(f"- {escaped(h.text)} ({escaped(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses)
+        or "None.",
         _table(
             ("environment input", "assumed", "because"),
-            ((_md(e.port), _md(e.assume) or "nothing", _md(e.because)) for e in case.environment),
+            ((escaped(e.port), escaped(e.assume) or "nothing", escaped(e.because)) for e in case.environment),
         )
         if case.environment
         else "The plan assumes nothing of the environment's inputs.",
         "## Trusted base",
-        f"{case.grade}: {_md(case.grade_reason)}.",
+        f"{case.grade}: {escaped(case.grade_reason)}.",
         _table(
             ("proof", "grade", "by"),
-            ((_md(short(p.obligation)), p.grade, _md(", ".join(p.tools))) for p in case.proofs),
+            ((escaped(short(p.obligation)), p.grade, escaped(", ".join(p.tools))) for p in case.proofs),
         ),
-        _table(("what", "which"), ((_md(t.what), _md(t.which)) for t in case.trusted)),
+        _table(("what", "which"), ((escaped(t.what), escaped(t.which)) for t in case.trusted)),
         "## What is not shown",
-        "\n".join(f"- {_md(line)}" for line in case.not_shown),
+        "\n".join(f"- {escaped(line)}" for line in case.not_shown),
         *_contracts(case),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -82,7 +89,7 @@ def _remarks(case: Case) -> Iterable[str]:
     found = [item for item in case.open_items if item.kind == REMARK]
     if found:
         yield "## Remarks on contracts and models"
-        yield "\n".join(f"- {_md(item.title)} ({_md(item.text)})" for item in found[:SUMMARY_ROWS])
+        yield "\n".join(f"- {escaped(item.title)} ({escaped(item.text)})" for item in found[:SUMMARY_ROWS])
 
 
 def _contracts(case: Case) -> Iterable[str]:
@@ -92,7 +99,7 @@ def _contracts(case: Case) -> Iterable[str]:
         if not source.is_contract:
             continue
         text = "\n".join(plain_lines(source)).rstrip("\n")
-        yield f"## {_md(source.path)}, as written"
+        yield f"## {escaped(source.path)}, as written"
         room -= len(text)
         if room < 0:
             yield "Too long for a summary: see index.html or report.json."
@@ -103,8 +110,8 @@ def _contracts(case: Case) -> Iterable[str]:
 
 def _origin(case: Case) -> str:
     run = f"run `{_code(case.run.id)}`, ledger `{case.ledger_head}`"
-    grade = f"{case.grade}: {_md(case.grade_reason)}"
-    return f"Grade {grade}. System `{_code(case.system)}`, policy {_md(case.policy.name)}, {case.today}, {run}."
+    grade = f"{case.grade}: {escaped(case.grade_reason)}"
+    return f"Grade {grade}. System `{_code(case.system)}`, policy {escaped(case.policy.name)}, {case.today}, {run}."
 
 
 def _guarantees(case: Case) -> list[ObligationView]:
@@ -113,7 +120,13 @@ def _guarantees(case: Case) -> list[ObligationView]:
 
 def _row(view: ObligationView) -> tuple[str, ...]:
     methods = ", ".join(_answer(item.entry.evidence) for item in view.counting)
-    return _md(short(view.id)), _md(view.criticality), view.standing.word, _md(methods), _md(where(view))
+    return (
+        escaped(short(view.id)),
+        escaped(view.criticality),
+        view.standing.word,
+        escaped(methods),
+        escaped(where(view)),
+    )
 
 
 def _answer(evidence: Evidence) -> str:
@@ -129,10 +142,6 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         return "None." if len(head) > 2 else ""
     more = f"\n\nand {len(lines) - SUMMARY_ROWS} more: see report.json" if len(lines) > SUMMARY_ROWS else ""
     return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines[:SUMMARY_ROWS]]) + more
-
-
-def _md(text: str) -> str:
-    return _MARKDOWN.sub(r"\\\1", " ".join(clean(text).split()))
 
 
 def _code(text: str) -> str:

@@ -20,6 +20,7 @@ from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.backend_kit.timeline import in_words, picture, timelines
+from avow.base.plain import count
 from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -68,7 +69,7 @@ def environment() -> Environment:
         "location": source.location,
         "source_lines": source.lines_of,
         "math": _math,
-        "count": wording.count,
+        "count": count,
         "mutation": wording.mutation,
         "details_text": wording.details_text,
         "outline": wording.outline,

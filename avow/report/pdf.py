@@ -13,11 +13,12 @@ from avow.assurance.modules import RequirementModule, requirement_modules
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
+from avow.base.plain import listed
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import example
-from avow.report.answers_page import TONE_MARKS, full_reason, others, some, worded
+from avow.report.answers_page import TONE_MARKS, full_reason, others, worded
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
@@ -188,14 +189,14 @@ def _weakest(case: Case) -> str:
     found = case.answers.weakest
     if found is None:
         return "There is no evidence."
-    rests = f" On it rest {some(found.needed_by)}{found.others}." if found.needed_by else ""
+    rests = f" On it rest {listed(found.needed_by)}{found.others}." if found.needed_by else ""
     return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
 
 
 def _supposition(supposition: Supposition) -> list[str]:
     s = supposition
     reason = full_reason(s)
-    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needing), s.term]
+    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), listed(s.needing), s.term]
 
 
 def _module(module: RequirementModule) -> dict[str, Any]:

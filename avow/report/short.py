@@ -15,8 +15,8 @@ _MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 
 
-def terminal_lines(case: Case, command: str = "") -> list[str]:
-    """At most 24 lines of 80 columns, in the order of the first page; `command` is the one thing to do next."""
+def terminal_lines(case: Case) -> list[str]:
+    """At most 24 lines of 80 columns, in the order of the first page; the last says the one thing to do next."""
     a = case.answers
     verdict = f": {a.verdict}"
     title = _cut(f"{_MARKS[a.tone]} {case.title}", WIDTH - len(verdict))
@@ -43,7 +43,7 @@ def terminal_lines(case: Case, command: str = "") -> list[str]:
     if over > 0:  # a sort of suppositions, or two, whose number stands in the verdict
         at = next(n for n, line in enumerate(lines) if line.startswith("5 Changed"))
         lines = [*lines[: at - over - 1], "  …", *lines[at:]]
-    return [*lines, _cut(f"next: {command or _next(case)}")]
+    return [*lines, _cut(f"next: {_next(case)}")]
 
 
 def comment(case: Case) -> str:
@@ -51,15 +51,17 @@ def comment(case: Case) -> str:
     a = case.answers
     was = f"{case.baseline.verdict} → " if case.baseline else ""
     lines = [
-        f"<!-- avow {_md(case.system)} -->",
-        f"**{_MARKS[a.tone]} {_md(case.title)}: {_md(was + a.verdict)}**",
-        _md(a.beside),
-        _md(a.changed_against) or "No report has been signed yet.",
-        "\n".join(f"- {mark} {_md(_few(words))}" for mark, words in a.changed if mark),
-        f"Weakest evidence: {_md(_few(_weakest_words(case)))}",
+        f"<!-- avow {escaped(case.system)} -->",
+        f"**{_MARKS[a.tone]} {escaped(case.title)}: {escaped(was + a.verdict)}**",
+        escaped(a.beside),
+        escaped(a.changed_against) or "No report has been signed yet.",
+        "\n".join(f"- {mark} {escaped(_few(words))}" for mark, words in a.changed if mark),
+        f"Weakest evidence: {escaped(_few(_weakest_words(case)))}",
         "<details><summary>Requirements and suppositions</summary>",
-        "\n".join(f"- {_MARKS[r.tone]} **{_md(r.id)}** {r.how}: {_md(_one(r))}" for r in case.requirements[:40]),
-        "\n".join(f"- {s.number} {_md(s.words)}" for s in case.suppositions[:40]),
+        "\n".join(
+            f"- {_MARKS[r.tone]} **{escaped(r.id)}** {r.how}: {escaped(_one(r))}" for r in case.requirements[:40]
+        ),
+        "\n".join(f"- {s.number} {escaped(s.words)}" for s in case.suppositions[:40]),
         "</details>",
     ]
     return "\n\n".join(line for line in lines if line) + "\n"
@@ -68,35 +70,36 @@ def comment(case: Case) -> str:
 def markdown_head(case: Case) -> Iterator[str]:
     """The five answers as paragraphs of Markdown."""
     a = case.answers
-    yield f"**{_MARKS[a.tone]} {_md(a.verdict)}**"
-    yield _md(f"{a.beside} · {a.signed}")
+    yield f"**{_MARKS[a.tone]} {escaped(a.verdict)}**"
+    yield escaped(f"{a.beside} · {a.signed}")
     yield "## 1 What is claimed?"
     rows = [
-        f"| **{_md(r.id)}** {_md(_one(r))} | {_MARKS[r.tone]} {r.how} | {_md(_weakest(r))} | {len(r.supposes)} |"
+        f"| **{escaped(r.id)}** {escaped(_one(r))} | {_MARKS[r.tone]} {r.how} "
+        f"| {escaped(_weakest(r))} | {len(r.supposes)} |"
         for r in case.requirements
     ]
     head = "| requirement | how it stands | weakest evidence | supposes |\n| --- | --- | --- | --- |\n"
     yield head + "\n".join(rows) if rows else "No requirement is named."
-    yield _md(a.legend)
+    yield escaped(a.legend)
     yield "## 2 What is it based on?"
-    yield "\n".join(f"- {_md(b.title)}: {_md(b.words)}" for b in a.bases) or "Nothing."
+    yield "\n".join(f"- {escaped(b.title)}: {escaped(b.words)}" for b in a.bases) or "Nothing."
     if a.objects:
-        yield _md(f"{a.objects}.")
+        yield escaped(f"{a.objects}.")
     yield "## 3 What is the weakest evidence?"
-    yield _md(_weakest_words(case))
+    yield escaped(_weakest_words(case))
     yield "## 4 What is supposed, not shown?"
-    owners = f": {_md(a.owners)}" if a.owners else ""
+    owners = f": {escaped(a.owners)}" if a.owners else ""
     owned = f"{a.owned} with owner and date{owners}.\n\n" if a.owned else ""
     yield owned + (
-        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {_md(s.words)}; {_md(s.term)}" for s in case.suppositions)
+        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {escaped(s.words)}; {escaped(s.term)}" for s in case.suppositions)
         or "Nothing."
     )
     yield "## 5 What changed since the last signed report?"
     if a.changed_against:
-        yield _md(a.changed_against)
-    yield "\n".join(f"- {mark} {_md(words)}" if mark else _md(words) for mark, words in a.changed)
+        yield escaped(a.changed_against)
+    yield "\n".join(f"- {mark} {escaped(words)}" if mark else escaped(words) for mark, words in a.changed)
     yield "## Weakenings"
-    yield "\n".join(f"- {w.count} {_md(w.words)}. {_md(w.why)}" for w in case.weakenings) or "None."
+    yield "\n".join(f"- {w.count} {escaped(w.words)}. {escaped(w.why)}" for w in case.weakenings) or "None."
 
 
 def _weakest(r: RequirementView) -> str:
@@ -144,5 +147,6 @@ def _few(text: str, most: int = 24) -> str:
     return " ".join(words) if len(words) <= most else " ".join(words[:most]) + " …"
 
 
-def _md(text: str) -> str:
+def escaped(text: str) -> str:
+    """Any text as Markdown of one line."""
     return _MARKDOWN.sub(r"\\\1", " ".join(clean(text).split()))

@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from avow.assurance.model import Case, EvidenceView, ObligationView
+from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
@@ -343,10 +344,6 @@ def _indented(value: object, margin: str) -> Iterator[str]:
 def history(view: ObligationView) -> tuple[EvidenceView, ...]:
     """Evidence that no longer counts, newest first."""
     return tuple(item for item in reversed(view.evidence) if not item.counts)
-
-
-def count(number: int, one: str, many: str = "") -> str:
-    return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")
 
 
 def _plain(value: object) -> str:

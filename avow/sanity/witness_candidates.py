@@ -265,7 +265,7 @@ def _atom(
     atom = term.body if isinstance(term, Not) else term
     match atom:
         case Apply(function=Variable() as function, arguments=arguments) if function in found.outputs:
-            definition = _definition(found, function, arguments, conditions, open_variables, known)
+            definition = _definition(function, arguments, conditions, open_variables, known)
             if definition is not None:
                 side = found.lower if positive else found.upper
                 side.setdefault(function, []).append(definition)
@@ -367,7 +367,6 @@ def _neighbours(value: Term) -> list[Term]:
 
 
 def _definition(
-    found: Candidates,
     function: Variable,
     arguments: Sequence[Term],
     conditions: Sequence[Term],
@@ -425,7 +424,7 @@ def _branch(
     """``out.f(arguments) == value`` is demanded under the conditions."""
     if value.sort == BOOL or function in free_variables(value):
         return
-    definition = _definition(found, function, arguments, conditions, open_variables, known)
+    definition = _definition(function, arguments, conditions, open_variables, known)
     if definition is None:
         return
     direct: dict[Variable, Term] = {v: t for v, t in known.items() if v not in open_variables}

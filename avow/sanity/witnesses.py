@@ -97,7 +97,7 @@ def witnesses(found: Candidates) -> list[Witness]:
         if isinstance(output.sort, FunctionSort):
             choices.append(list(_functions(found, output, output.sort)))
         else:
-            terms = _unique([*found.values.get(output, ()), *_ground(found, output.sort)])
+            terms = dict.fromkeys([*found.values.get(output, ()), *_ground(found, output.sort)])
             choices.append(list(islice(terms, WITNESSES_PER_OUTPUT)))
     result = []
     for combination in islice(product(*choices), WITNESSES * 4):
@@ -136,7 +136,7 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
         yield Definition(parameters, TRUE)
         return
     parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
-    yield from _unique_definitions(_partly_applied(found, parameters, sort))
+    yield from dict.fromkeys(_partly_applied(found, parameters, sort))
     branches = found.branches.get(function, [])
     for default in _ground(found, sort.result)[:8]:
         cases = tuple(
@@ -177,14 +177,6 @@ def _rising(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionS
         yield Definition(parameters, Arithmetic("+", argument, start, whole))
 
 
-def _unique_definitions(definitions: Iterable[Definition]) -> Iterable[Definition]:
-    seen: list[Definition] = []
-    for definition in definitions:
-        if definition not in seen:
-            seen.append(definition)
-            yield definition
-
-
 def _at(definition: Definition, parameters: Sequence[Variable]) -> Term:
     return substitute(definition.body, dict(zip(definition.parameters, parameters, strict=True)))
 
@@ -199,16 +191,16 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
         case BoolSort():
             return [TRUE, FALSE]
         case EnumSort(members=members):
-            return list(_unique([*(EnumValue(m, sort) for m in members), *seen]))
+            return list(dict.fromkeys([*(EnumValue(m, sort) for m in members), *seen]))
         case NaturalSort():
-            return list(_unique([*seen, Literal(0, sort)]))
+            return list(dict.fromkeys([*seen, Literal(0, sort)]))
         case IntegerSort():
             naturals = found.pool.get(NaturalSort(), ())
-            return list(_unique([*seen, *naturals, Literal(0, sort)]))
+            return list(dict.fromkeys([*seen, *naturals, Literal(0, sort)]))
         case RealSort():
-            return list(_unique([*seen, Literal(Fraction(0), sort)]))
+            return list(dict.fromkeys([*seen, Literal(Fraction(0), sort)]))
         case StringSort():
-            return list(_unique([*seen, Literal("", sort)]))
+            return list(dict.fromkeys([*seen, Literal("", sort)]))
         case DataSort(constructors=constructors) if level < 2:
             made: list[Term] = []
             for constructor in constructors:
@@ -220,14 +212,14 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
                     Construct(constructor.name, tuple(term for _, term in combination), sort)
                     for combination in combinations[:12]
                 )
-            return list(_unique([*seen, *made]))
+            return list(dict.fromkeys([*seen, *made]))
         case TupleSort(items=items) if level < 2:
             pools = [_ground(found, item, level + 1) for item in items]
             tried = (list(enumerate(pool))[:WITNESS_ARGUMENTS] for pool in pools)
             combinations = sorted(product(*tried), key=_spread)
-            return list(_unique([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
+            return list(dict.fromkeys([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
         case SequenceSort():
-            return list(_unique([*seen, SequenceTerm((), sort)]))
+            return list(dict.fromkeys([*seen, SequenceTerm((), sort)]))
         case OpaqueSort() if not seen:
             # Nothing in the contract names an element, but the sort is not empty: any constant is one.
             constant = Variable(Role.BOUND, f"{sort.name} (some)", sort)
@@ -245,14 +237,6 @@ def _spread(combination: tuple[tuple[int, Term], ...]) -> tuple[int, int]:
     positions = [position for position, _ in combination]
     steps = sum(abs(later - earlier - 1) for earlier, later in pairwise(positions))
     return steps, sum(positions)
-
-
-def _unique(terms: Iterable[Term]) -> Iterable[Term]:
-    seen: list[Term] = []
-    for term in terms:
-        if term not in seen:
-            seen.append(term)
-            yield term
 
 
 def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) -> Witness | None:

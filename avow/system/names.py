@@ -12,7 +12,7 @@ from avow.system.plan import STEP_LENGTH, Plan
 from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.schema import suggest
 from avow.system.source_plan import check_memory
-from avow.system.strict_yaml import Piece
+from avow.system.strict_yaml import Piece, listed
 
 _FORMER = {
     "tautology": "not-tautological",
@@ -66,17 +66,11 @@ def _unknown(what: str, name: str, known: Iterable[str], span: Span) -> Diagnost
     )
 
 
-def _text_items(piece: Piece | None) -> list[Piece]:
-    if piece is None:
-        return []
-    return piece.items if piece.items is not None else [piece]
-
-
 def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     subsystems = {subsystem.name for subsystem in plan.subsystems}
-    for index, piece in enumerate(_text_items(root.at("connections"))):
+    for index, piece in enumerate(listed(root.at("connections"))):
         for key, side in (("from", "output"), ("to", "input")):
-            for item in _text_items(piece.at(key)):
+            for item in listed(piece.at(key)):
                 name, _, port = item.text.partition(".")
                 where = f"connections[{index}].{key}"
                 if name in subsystems:
@@ -111,7 +105,7 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
     piece = root.at("requirements")
     for name, requirement in (piece.entries or {}).items() if piece else ():
-        for item in _text_items(requirement.at("supported_by")):
+        for item in listed(requirement.at("supported_by")):
             owner, dot, clause = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
                 continue
@@ -139,7 +133,7 @@ def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnost
     known = [*nodes, *(subsystem.name for subsystem in plan.subsystems)]
     piece = root.at("compose")
     for name, goal in (piece.entries or {}).items() if piece else ():
-        for item in _text_items(goal.at("select")):
+        for item in listed(goal.at("select")):
             if item.text not in known:
                 yield _unknown(f"compose.{name}.select: node", item.text, known, item.span)
 
@@ -223,11 +217,11 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
 
 def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     for key in ("expected", "accepted"):
-        for item in _text_items(root.at(key)):
+        for item in listed(root.at(key)):
             obligation = item.at("obligation")
             if obligation is None:
                 continue
-            for piece in (obligation, *_text_items(item.at("matched"))):
+            for piece in (obligation, *listed(item.at("matched"))):
                 if today := renamed(piece.text):
                     message = f"{key}: sanity's {piece.text!r} is now named by the good thing that it states"
                     yield Diagnostic("PLAN106", message, piece.span, hint=f"write {today!r}")

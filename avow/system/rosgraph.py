@@ -110,13 +110,11 @@ def account(system: System, dataflow: Graph) -> Account | None:
         if node.name not in made and not node.relay:
             message = f"{node.name} is not on the ROS graph, is no compound and is not external"
             findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
-    findings += _flows(graph, home, external, dataflow, at("graph"))
+    findings += _flows(graph, home, dataflow, at("graph"))
     return Account(graph, home, gone, external, tuple(findings))
 
 
-def _flows(
-    graph: RosGraph, home: dict[str, str], external: dict[str, str], dataflow: Graph, span: Span
-) -> Iterator[Diagnostic]:
+def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -> Iterator[Diagnostic]:
     """Data that flows between two nodes of the model according to ROS alone."""
     linked = {(edge.source.node, edge.target.node) for edge in dataflow.edges}
     linked |= {(one, end) for one, middle in linked for start, end in linked if start == middle in dataflow.relays}

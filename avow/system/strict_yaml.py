@@ -80,27 +80,27 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     Raises Rejected, with the place, for anything that is not one YAML document.
     """
     if len(data) > PLAN_BYTES:
-        raise Rejected(_error("PLAN101", f"the file has {len(data)} bytes; at most {PLAN_BYTES} are read", file, 1, 1))
+        raise Rejected(_error(f"the file has {len(data)} bytes; at most {PLAN_BYTES} are read", file, 1, 1))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8", errors="replace")
         line, column = _position(before, len(before))
-        raise Rejected(_error("PLAN101", "not UTF-8 text", file, line, column)) from None
+        raise Rejected(_error("not UTF-8 text", file, line, column)) from None
     try:
         builder = _Builder(file)
         return builder.build(text), tuple(builder.problems)
     except yaml.reader.ReaderError as error:
         line, column = _position(text, int(error.position))
         shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"
-        raise Rejected(_error("PLAN101", f"{shown} does not belong in YAML", file, line, column)) from None
+        raise Rejected(_error(f"{shown} does not belong in YAML", file, line, column)) from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         problem, hint = _in_words(error.problem or "not YAML")
-        raise Rejected(_error("PLAN101", problem, file, line, column, hint)) from None
+        raise Rejected(_error(problem, file, line, column, hint)) from None
     except yaml.YAMLError:
-        raise Rejected(_error("PLAN101", "not YAML", file, 1, 1)) from None
+        raise Rejected(_error("not YAML", file, 1, 1)) from None
 
 
 _PROBLEMS = (
@@ -190,7 +190,7 @@ class _Builder:
                 case yaml.AliasEvent():
                     self.alias(event)
         if self.root is None:
-            raise Rejected(_error("PLAN101", "the file is empty", self.file, 1, 1))
+            raise Rejected(_error("the file is empty", self.file, 1, 1))
         return self.root
 
     def scalar(self, event: yaml.ScalarEvent) -> None:
@@ -278,6 +278,13 @@ class _Builder:
         return Rejected(Diagnostic(code, message, self.span(event)))
 
 
+def listed(piece: Piece | None) -> list[Piece]:
+    """The pieces of a list; a piece that is none stands for a list of it alone."""
+    if piece is None:
+        return []
+    return piece.items if piece.items is not None else [piece]
+
+
 def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
     yield path, piece.span
     if piece.entries is not None:
@@ -292,5 +299,5 @@ def _position(text: str, offset: int) -> tuple[int, int]:
     return before.count("\n") + 1, offset - (before.rfind("\n") + 1) + 1
 
 
-def _error(code: str, message: str, file: str, line: int, column: int, hint: str | None = None) -> Diagnostic:
-    return Diagnostic(code, message, Span(file, line, column, line, column + 1), hint=hint)
+def _error(message: str, file: str, line: int, column: int, hint: str | None = None) -> Diagnostic:
+    return Diagnostic("PLAN101", message, Span(file, line, column, line, column + 1), hint=hint)

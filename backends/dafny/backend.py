@@ -11,6 +11,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Transl
 from avow.backend_kit.runs import unsaid
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.plain import one_line
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.isolation.outside import Outside
 from avow.language.contract import Clause, Node
@@ -18,7 +19,7 @@ from avow.system.plan import System
 
 from .codes import CODES
 from .judge import Settled, settle
-from .modules import PROBE_FILE, Generated, generate, lines_map, one_line
+from .modules import PROBE_FILE, Generated, generate, lines_map
 from .printer import NotExpressible
 from .runner import INSTALL, dafny
 from .scanner import Scan, scan

@@ -8,6 +8,7 @@ shows that it holds first, and Step that it keeps it.
 from __future__ import annotations
 
 from avow.backend_kit.stepping import Stepping
+from avow.base.plain import one_line
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction
 from avow.formulas.temporal.cell import CELL
@@ -120,7 +121,7 @@ def history(steps: Stepping, words: Vocabulary) -> History:
     """The history of a node. Raises NotExpressible."""
     cells = tuple(cell.before for cell in steps.cells)
     told = tuple(
-        f"  //   {words.local(c.before)}: {_one_line(show_term(c.record, 'rcl'))}"
+        f"  //   {words.local(c.before)}: {one_line(show_term(c.record, 'rcl'))}"
         for c in steps.cells
         if c.record is not None
     )
@@ -135,10 +136,6 @@ def _named(wanted: str, words: Vocabulary) -> str:
     name = f"{wanted} {CELL}"
     words.names("clause", name, wanted)
     return name
-
-
-def _one_line(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def _declared(predicate: Predicate, sort: str, words: Vocabulary) -> list[str]:

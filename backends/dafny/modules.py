@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from avow.backend_kit.stepping import stepping
 from avow.base.codec import document
+from avow.base.plain import one_line
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cell import CELL
@@ -359,8 +360,3 @@ def _skeleton(
 
 def _sentence(clause: Clause) -> str:
     return f": {one_line(clause.sentence)}" if clause.sentence else ""
-
-
-def one_line(text: str) -> str:
-    """Text of the contract within a line, such as a comment: no line break may end it early."""
-    return "".join(c if c.isprintable() else " " for c in text)

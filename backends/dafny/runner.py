@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.protocol import Limits, Tool
+from avow.base.files import text_or_nothing
 from avow.base.records import dataclass
 from avow.base.tools import find_tool
 from avow.isolation.outside import Outside
@@ -137,13 +138,5 @@ def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits, outside
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         done = outside.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
-        answers = {each: _read(folder / each) for each in (_ANSWER, _MODEL, _RESOLVED, modern.LOG)}
+        answers = {each: text_or_nothing(folder / each) for each in (_ANSWER, _MODEL, _RESOLVED, modern.LOG)}
     return _Done(command, done.code, quiet(done.stdout + done.stderr), answers)
-
-
-def _read(path: Path) -> str:
-    """Empty where there is no such file: what is missing is noticed by what it should have said."""
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""

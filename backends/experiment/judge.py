@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 
@@ -184,9 +185,8 @@ def _counterexample(failed: Sequence[Run], experiment: Experiment) -> Counterexa
         return None
     worst = max(failed, key=lambda run: run.measure.low)
     unit = _unit(experiment.unit)
-    listed = ", ".join(f"{run.name} ({show(run.measure.low)}{unit})" for run in failed[:FAILURES_SHOWN])
-    more = f" and {len(failed) - FAILURES_SHOWN} more" if len(failed) > FAILURES_SHOWN else ""
-    explanation = f"beyond {show(experiment.within, 9)}{unit} in run {listed}{more}"
+    runs = listed([f"{run.name} ({show(run.measure.low)}{unit})" for run in failed], FAILURES_SHOWN)
+    explanation = f"beyond {show(experiment.within, 9)}{unit} in run {runs}"
     measure = (experiment.measure.text if experiment.measure else "measure", f"{show(worst.measure.low, 6)}{unit}")
     pairs = (("run", worst.name), *worst.values, measure)
     return Counterexample(tuple(dict(pairs).items()), explanation)

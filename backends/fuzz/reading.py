@@ -81,7 +81,7 @@ def load(job: Job) -> Reading:
         faults.append(Diagnostic("FUZZ102", message, source.place.at("numbers")))
     clauses = (*job.node.assumptions, *(job.clause(o) for o in job.obligations))
     spoken = {v.qualified for clause in clauses for v in free_variables(clause.formula)}
-    odd_ports = [p for p in (*job.node.inputs, *job.node.outputs) if not isinstance(_item(p.sort), PLAIN)]
+    odd_ports = [p for p in (*job.node.inputs, *job.node.outputs) if not isinstance(item_of(p.sort), PLAIN)]
     for port in odd_ports:
         if port.variable.qualified in spoken or port.name in source.memory:
             faults.append(Diagnostic("FUZZ102", f"no compiled step is given what {port.name} is", place))
@@ -102,7 +102,8 @@ def load(job: Job) -> Reading:
     )
 
 
-def _item(sort: Sort) -> Sort:
+def item_of(sort: Sort) -> Sort:
+    """What an element of a sequence is; of what is none, itself."""
     return sort.item if isinstance(sort, SequenceSort) else sort
 
 

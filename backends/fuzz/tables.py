@@ -29,7 +29,7 @@ from avow.language.sorts import (
 )
 
 from .guide import Guide
-from .reading import Reading, texts
+from .reading import Reading, item_of, texts
 from .tuning import WRITTEN
 
 TABLES = "contract.inc"
@@ -50,9 +50,9 @@ class Drawable:
     lengths: tuple[int, ...]
 
 
-def native(folder: Path | None = None) -> Mapping[str, str]:
+def native() -> Mapping[str, str]:
     """The fixed files of the harness, by name."""
-    place = folder or Path(__file__).with_name("native")
+    place = Path(__file__).with_name("native")
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(place.iterdir()) if path.is_file()}
 
 
@@ -94,7 +94,7 @@ def tables(reading: Reading, made: Drawable) -> str:
         "namespace avow {",
     ]
     for k, port in enumerate((*node.inputs, *node.outputs)):
-        item = _item(port.sort)
+        item = item_of(port.sort)
         names = ", ".join(map(_text, item.members)) if isinstance(item, EnumSort) else '""'
         lines.append(f"static const char* const ELEMENTS_{k}[] = {{{names}}};")
     lines += _array("Port", "INPUT", "INPUTS", (_port(p, k, reading) for k, p in enumerate(node.inputs)), _NO_PORT)
@@ -124,7 +124,7 @@ def _array(kind: str, one: str, name: str, items: Iterable[str], nothing: str) -
 
 
 def _port(port: Port, k: int, reading: Reading) -> str:
-    item = _item(port.sort)
+    item = item_of(port.sort)
     many, natural = isinstance(port.sort, SequenceSort), isinstance(item, NaturalSort)
     flags = ", ".join(str(flag).lower() for flag in (many, natural, port.name in reading.memory))
     members = len(item.members) if isinstance(item, EnumSort) else 1
@@ -146,10 +146,6 @@ def sort_name(sort: Sort) -> str:
             raise TypeError(f"{sort} is no machine value")
         case _:
             assert_never(sort)
-
-
-def _item(sort: Sort) -> Sort:
-    return sort.item if isinstance(sort, SequenceSort) else sort
 
 
 def _parameters(data: Any, where: str) -> Iterator[str]:

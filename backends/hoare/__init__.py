@@ -9,7 +9,7 @@ from avow.backend_kit.given import file, schema
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tools import package_version
+from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Verdict
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Node
@@ -74,7 +74,7 @@ class Hoare(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
+        return (z3_tool(),)
 
     def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
         from .model import answering

@@ -24,6 +24,7 @@ from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
 from avow.base.codec import to_json
+from avow.base.files import text_or_nothing
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
@@ -35,7 +36,7 @@ from avow.language.terms import Term
 from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire
-from .beside import kept_inputs, system_root, table_rows, text_of
+from .beside import kept_inputs, system_root, table_rows
 from .convention import Malformed, outputs, sent
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
@@ -77,7 +78,7 @@ class Bench:
         self.remembers = bool(records.cells)
         formulas = [wire.decode(c["formula"]) for c in (*data["assumptions"], *data["guarantees"])]
         root = system_root(data, folder)
-        written = constants(text_of(root / data["subject"]["file"]))
+        written = constants(text_or_nothing(root / data["subject"]["file"]))
         self.generator = Generator(
             self.inputs_sorts, pools(formulas, table_rows(data["scenario"], self.inputs_sorts), written)
         )

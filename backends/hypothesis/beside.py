@@ -48,14 +48,6 @@ def table_rows(
     return found
 
 
-def text_of(path: Path) -> str:
-    """The subject's text, which is only looked at for its constants; empty where there is none to be read."""
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-
-
 def system_root(data: Mapping[str, Any], folder: Path) -> Path:
     """The system's folder: known from the environment, or beside the artifacts."""
     root = os.environ.get("AVOW_SYSTEM_ROOT")

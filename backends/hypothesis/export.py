@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from avow.backend_kit.protocol import Job
+from avow.base.plain import as_identifier
 from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
@@ -83,17 +84,12 @@ def numbers(job: Job) -> str:
 
 
 def test_name(job: Job) -> str:
-    return f"test_{plain(job.node.name)}.py"
+    return f"test_{as_identifier(job.node.name)}.py"
 
 
 def files(job: Job, subject: SubjectFile) -> Mapping[str, str]:
     """Relative path → text. Pure. Raises `wire.TooDeep`."""
     return {DATA: _data(job, subject), test_name(job): _module(job, subject)}
-
-
-def plain(name: str) -> str:
-    """A name from outside as part of an identifier or a file's name; the real one is data."""
-    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
 
 
 def _module(job: Job, subject: SubjectFile) -> str:
@@ -104,7 +100,7 @@ def _module(job: Job, subject: SubjectFile) -> str:
         module, bench = ("sequences", "SequenceBench") if subject.driven else ("functions", "FunctionBench")
         head, test = _HEAD_RUNS.format(data=DATA, module=module, bench=bench), _TEST_RUNS
     for obligation in job.obligations:
-        function = f"test_{plain(obligation.name)}"
+        function = f"test_{as_identifier(obligation.name)}"
         while function in taken:
             function += "_"
         taken.add(function)

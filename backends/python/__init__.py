@@ -7,7 +7,7 @@ from pathlib import Path
 from avow.backend_kit.given import NAN, schema
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tools import package_version
+from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import ProgramClaim
 
@@ -36,7 +36,7 @@ class PythonBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
+        return (z3_tool(),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .reading import load

@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 from avow.backend_kit.programs.samples import around
+from avow.base.plain import as_identifier
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.values import Value
@@ -215,7 +216,7 @@ class Conditions:
         for end in run.ends:
             wanted = substitute(goal, self.outputs(end))
             facts = (*assumed, *run.facts[: end.facts], end.guard)
-            if self.proves(facts, wanted, f"{_plain(clause.name)}-line-{end.line}"):
+            if self.proves(facts, wanted, f"{as_identifier(clause.name)}-line-{end.line}"):
                 self._log.append(f"{clause.name}: proved at the return of line {end.line}")
                 continue
             self._log.append(f"{clause.name}: not proved at the return of line {end.line}")
@@ -239,7 +240,7 @@ class Conditions:
             for end in run.ends:
                 after = {v: end.outputs[f"memory.{v.name}"] for v in free}
                 facts = (*assumed, *run.facts[: end.facts], end.guard)
-                if not self.proves(facts, substitute(clause.formula, after), f"kept-{_plain(clause.name)}"):
+                if not self.proves(facts, substitute(clause.formula, after), f"kept-{as_identifier(clause.name)}"):
                     yield f"memory: {clause.name} holds at every step: it is not shown that a step keeps it"
                     break
 
@@ -267,10 +268,6 @@ class Conditions:
                 values[variable] = _sequence(model.get(length), model.get(elements))
             restored.append(values)
         return restored
-
-
-def _plain(name: str) -> str:
-    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
 
 
 def _sequence(length: Any, elements: Any) -> Any:

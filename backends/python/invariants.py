@@ -32,7 +32,7 @@ from avow.language.terms import (
 )
 
 from .program import Assign, For, Item, View, parts
-from .symbolic import ZERO, Candidate, Turn
+from .symbolic import ZERO, Candidate, Turn, widest
 from .tuning import CANDIDATES
 
 _NUMBERS = (INTEGER, REAL)
@@ -67,7 +67,7 @@ def candidates(
     for loop, first in {loop.counter: (loop, first) for loop, first in loops}.values():
         made = (
             *_written(loop, node, contract, known),
-            *_promised(loop, first, node, promised, known),
+            *_promised(loop, first, promised, known),
             *_shapes(loop, first, known),
         )
         for candidate in made[:CANDIDATES]:
@@ -80,7 +80,7 @@ def _written(loop: For, node: Node, contract: Contract, known: Sequences) -> Ite
 
         def build(turn: Turn, text: str = text) -> Term | None:
             meanings = _readable(turn)
-            extra: dict[str, Sort] = {name: _wide(term.sort) for name, term in meanings.items()}
+            extra: dict[str, Sort] = {name: widest(term.sort) for name, term in meanings.items()}
             try:
                 formula = parse_formula(text, node, contract, None, extra, roles=frozenset({Role.INPUT}))
             except Rejected:
@@ -107,7 +107,7 @@ def _readable(turn: Turn) -> dict[str, Term]:
     return found
 
 
-def _promised(loop: For, first: Turn, node: Node, promised: Sequence[Term], known: Sequences) -> Iterator[Candidate]:
+def _promised(loop: For, first: Turn, promised: Sequence[Term], known: Sequences) -> Iterator[Candidate]:
     """A guarantee, said of what is done so far."""
     offsets = {view.sequence: view.start for view in _views(loop)}
     lengths = {pair[0]: offsets.get(v.name, 0) for v, pair in known.parts.items()}
@@ -119,7 +119,7 @@ def _promised(loop: For, first: Turn, node: Node, promised: Sequence[Term], know
         stands: list[tuple[str, Callable[[Turn], Term]]] = [
             (name, lambda turn, name=name: turn.values[name])  # type: ignore[misc]
             for name in first.carried
-            if _wide(first.values[name].sort) == _wide(output.sort)
+            if widest(first.values[name].sort) == widest(output.sort)
         ]
         if output.sort == BOOL:
             stands += [("TRUE", lambda turn: TRUE), ("FALSE", lambda turn: FALSE)]
@@ -147,7 +147,7 @@ def _hash_text(formula: Term) -> str:
 def _shapes(loop: For, first: Turn, known: Sequences) -> Iterator[Candidate]:
     views = list(_views(loop))
     for name in first.carried:
-        sort = _wide(first.values[name].sort)
+        sort = widest(first.values[name].sort)
         if sort in _NUMBERS:
             for operator in ("<=", ">="):
                 yield _compared(loop, name, operator, lambda turn, name=name: turn.entry[name], "it was first")  # type: ignore[misc]
@@ -159,7 +159,7 @@ def _shapes(loop: For, first: Turn, known: Sequences) -> Iterator[Candidate]:
         for view in views:
             length, elements = known.of(view.sequence)
             assert isinstance(elements.sort, FunctionSort)
-            if _wide(elements.sort.result) != sort or sort not in _NUMBERS:
+            if widest(elements.sort.result) != sort or sort not in _NUMBERS:
                 continue
             yield Candidate(loop.counter, f"{name} is first or an item", _item_or_first(name, view, elements))
             for operator in ("<=", ">="):
@@ -217,10 +217,6 @@ def _plus(term: Term, more: Term | int) -> Term:
     if isinstance(more, int):
         return term if more == 0 else Arithmetic("+", term, Literal(more, INTEGER), INTEGER)
     return Arithmetic("+", term, more, INTEGER)
-
-
-def _wide(sort: Sort) -> Sort:
-    return INTEGER if sort == NATURAL else sort
 
 
 __all__ = ["Sequences", "candidates"]

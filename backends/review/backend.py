@@ -14,13 +14,14 @@ from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.envelope import Opened
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import SIGNED_BY
+from avow.evidence.signing import signature_path
 from avow.system.paths import inside
 from avow.system.schema import suggest
 
 from .codes import CODES
 from .freshness import current_meaning, stale_clause, stale_files
 from .record import CONCLUSIONS, Judged, Record, read_record
-from .signature import signature_path, signed
+from .signature import signed
 
 _KEY = {
     "type": ["string", "array"],

@@ -12,14 +12,11 @@ from pathlib import Path
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, read_regular, sha256, write
 from avow.evidence.envelope import Opened, seal, unseal
+from avow.evidence.signing import signature_path
 
 from .record import Record, read_record
 
 PREDICATE = "https://avow.invalid/signed-review/v1"
-
-
-def signature_path(record: Path) -> Path:
-    return record.with_name(record.name + ".sig")
 
 
 def sign_record(path: Path, private: Path) -> Path:

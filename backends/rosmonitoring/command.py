@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from avow.base.codec import document
+from avow.base.plain import listed
 
 from .coverage import coverage
 from .tuning import VIOLATIONS_SHOWN
@@ -300,9 +301,8 @@ def _print_summary(running: Session) -> None:
     if unmonitored := running.unmonitored():
         click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
     if running.unheard:
-        told = ", ".join(f"{topic} ({count})" for topic, count in list(running.unheard.items())[:10])
-        more = f" and {len(running.unheard) - 10} more" if len(running.unheard) > 10 else ""
-        click.echo(f"topics of the trace that no clause speaks of, and their events: {told}{more}")
+        told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
+        click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
         for topic in list(running.unheard)[:10]:
             if near := get_close_matches(topic, running.topics, n=1):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from avow.base.plain import listed
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
@@ -52,10 +53,9 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
     if ways == 0:
         every = ", ".join(f"{'.'.join(map(str, p))} : {w}" for p, w, _ in places[:CANDIDATES_SHOWN] if p) or "none"
         raise Undecided(f"no field of {message.name} can be read as it; its fields are {every}", hint)
-    more = f" and {len(told) - CANDIDATES_SHOWN} more" if len(told) > CANDIDATES_SHOWN else ""
     what = "field" if len(wanted) == 1 else f"{len(wanted)} fields"
     which = f"which {what} of {message.name} it means is not said"
-    raise Undecided(f"{which}: {', '.join(told[:CANDIDATES_SHOWN])}{more}", hint)
+    raise Undecided(f"{which}: {listed(told, CANDIDATES_SHOWN)}", hint)
 
 
 def _hint(

@@ -38,7 +38,7 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         seen += monitor.finish()
         return JudgedRun(
             {name: _judged(monitor, name, seen, unsaid[name] or monitor.backwards) for name in names},
-            next((_assumption(used, v) for v in seen if _breaks(used, v)), None),
+            next((_assumption(v) for v in seen if _breaks(used, v)), None),
         )
 
     return run
@@ -86,7 +86,7 @@ def _breaks(found: Setup, violation: Violation) -> bool:
     )
 
 
-def _assumption(found: Setup, violation: Violation) -> tuple[int, str]:
+def _assumption(violation: Violation) -> tuple[int, str]:
     return violation.index, f"{violation.clause}: {violation.explanation}"
 
 

@@ -12,8 +12,9 @@ import pytest
 import avow.cli
 from avow.backend_kit.protocol import Limits
 from avow.backends.review import BACKEND
-from avow.backends.review.signature import sign_record, signature_path
+from avow.backends.review.signature import sign_record
 from avow.base.verdict import Outcome, Verdict
+from avow.evidence.signing import signature_path
 
 pytest.importorskip("cryptography")
 
