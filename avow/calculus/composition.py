@@ -15,7 +15,7 @@ from avow.calculus.kept_answers import ask_once
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
-from avow.calculus.subsystem_contracts import Level, composed_node, innermost, level, shown_contract, with_persistence
+from avow.calculus.subsystem_contracts import Level, Said, composed_node, innermost, level, with_persistence
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.kernel.solvers import Solvers
@@ -168,6 +168,7 @@ def composed_over(flat: Frame) -> Composition:
     inside = leaves(system.plan)
     faces = {name: face(system, flat.graph, name, held) for name, held in inside.items()}
     composed: dict[str, Node] = {}
+    said: Said = {}
     goals: dict[str, Goal] = {}
     levels: dict[str, Level] = {}
 
@@ -188,8 +189,8 @@ def composed_over(flat: Frame) -> Composition:
     for name in inner_first(system.plan):
         entry = subsystems[name]
         goal = add(ComposeGoal(name, entry.members, entry.rule, entry.options, entry.span), entry.members, carry=True)
-        composed[name] = composed_node(levels.get(name, flat), goal, faces[name])
-        goals[name] = replace(goal, contract=shown_contract(composed[name]))
+        composed[name], contract = composed_node(levels.get(name, flat), goal, faces[name], said)
+        goals[name] = replace(goal, contract=contract)
     for wanted in system.plan.compose:
         members = wanted.select or nodes
         add(replace(wanted, select=members), members)

@@ -20,7 +20,7 @@ from avow.base.records import dataclass
 from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame
-from avow.formulas.formula import conjunction, free_variables, substitute
+from avow.formulas.formula import conjunction, free_variables, rename
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
@@ -119,9 +119,14 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
     )
 
 
-def composed_node(frame: Frame, goal: Goal, face: Face) -> Node:
-    """The subsystem with its derived contract: clauses are called ``camera.sharp``, as the node inside calls them; and
-    it reads what they remember (``camera.once#…``)."""
+Said = dict[ClauseName, Term]
+"""The clauses of subsystems over the whole system's values, as the nodes inside say them: with `previous` and the like,
+where the calculus has cells."""
+
+
+def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Node, tuple[str, ...]]:
+    """The subsystem with its derived contract, and that in lines of text. Clauses are called ``camera.sharp``, as the
+    node inside calls them; and it reads what they remember (``camera.once#…``). What they say is added to `said`."""
     flat = frame.flat if isinstance(frame, Level) else frame
     ports: dict[Variable, Variable] = {}
     for port in (*face.node.outputs, *face.node.inputs):
@@ -140,14 +145,35 @@ def composed_node(frame: Frame, goal: Goal, face: Face) -> Node:
         for number, name in enumerate(names, start=1):
             original = frame.node(name.node).clause(name.clause)
             term = carried(frame, goal, name) if kind is ClauseKind.ASSUMPTION else frame.clause(name.node, name.clause)
-            formula = substitute(term, {v: ports[v] for v in free_variables(term) if v in ports})
+            formula = rename(term, ports)
             clauses[kind].append(replace(original, kind=kind, name=str(name), position=number, formula=formula))
-    return replace(
+            used = _carrying(frame, goal, name) if kind is ClauseKind.ASSUMPTION else ()
+            told = _under((_said(frame, name, said) for name in used), _said(frame, name, said))
+            said[ClauseName(face.node.name, str(name))] = told
+    node = replace(
         face.node,
         inputs=(*face.node.inputs, *kept),
         assumptions=tuple(clauses[ClauseKind.ASSUMPTION]),
         guarantees=tuple(clauses[ClauseKind.GUARANTEE]),
     )
+    lines = [f"{node.name} as a node"]
+    lines += [f"  reads {', '.join(port.name for port in face.node.inputs)}"] if face.node.inputs else []
+    lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
+    for verb, these in (("assumes", node.assumptions), ("guarantees", node.guarantees)):
+        for clause in these:
+            lines += [f"  {verb} {clause.name}: {show_term(rename(said[ClauseName(node.name, clause.name)], ports))}"]
+    return node, tuple(lines)
+
+
+def _said(frame: Frame, name: ClauseName, said: Said) -> Term:
+    """A clause of a node or subsystem as it was written, over the whole system's values; what nobody wrote (that time
+    goes on) is as the calculus has it."""
+    if name in said:
+        return said[name]
+    flat = frame.flat if isinstance(frame, Level) else frame
+    node = flat.system.contract.node(name.node)
+    written = next((clause.formula for clause in node.clauses if clause.name == name.clause), None)
+    return frame.clause(name.node, name.clause) if written is None else flat.placed(name.node, written)
 
 
 def carried(frame: Frame, goal: Goal, name: ClauseName) -> Term:
@@ -157,26 +183,38 @@ def carried(frame: Frame, goal: Goal, name: ClauseName) -> Term:
     A node to which the assuming one gives something at that step does not count: what it guarantees may rest on the
     very assumption.
     """
+    used = _carrying(frame, goal, name)
+    return _under((frame.clause(each.node, each.clause) for each in used), frame.clause(name.node, name.clause))
+
+
+def _under(conditions: Iterable[Term], claim: Term) -> Term:
+    found = tuple(conditions)
+    return Implies(conjunction(found), claim) if found else claim
+
+
+def _carrying(frame: Frame, goal: Goal, name: ClauseName) -> tuple[ClauseName, ...]:
+    """The clauses under which an assumption is carried outward."""
     claim = frame.clause(name.node, name.clause)
     selected = frozenset(goal.nodes)
     inside = {frame.output(node, port.name) for node in goal.nodes for port in frame.node(node).outputs}
     if inside.isdisjoint(free_variables(claim)):
-        return claim
+        return ()
     after = _reached(name.node, frame.graph.consumers, selected)
-    known: dict[str, Term] = {}
+    known: dict[ClauseName, Term] = {}
     for provider in _reached(name.node, frame.graph.providers, selected):
         if provider not in after:
-            known |= {f"{provider}.{c.name}": frame.clause(provider, c.name) for c in frame.node(provider).clauses}
+            known |= {
+                ClauseName(provider, c.name): frame.clause(provider, c.name) for c in frame.node(provider).clauses
+            }
     spoken = free_variables(claim)
-    near: dict[str, Term] = {}
+    near: dict[ClauseName, Term] = {}
     growing = True
     while growing:  # what shares no value with the claim cannot help
         found = {k: term for k, term in known.items() if k not in near and not spoken.isdisjoint(free_variables(term))}
         near |= found
         spoken = spoken.union(*map(free_variables, found.values()))
         growing = bool(found)
-    used = [near[label] for label in known if label in near]
-    return Implies(conjunction(used), claim) if used else claim
+    return tuple(each for each in known if each in near)
 
 
 def _reached(node: str, neighbours: Callable[..., tuple[str, ...]], selected: frozenset[str]) -> tuple[str, ...]:
@@ -213,13 +251,3 @@ def with_persistence(frame: Level, goal: Goal) -> Goal:
 def innermost(name: str) -> str:
     """``reader.scaled`` of ``robot.sensor.reader.scaled``: the node's own clause."""
     return ".".join(name.split(".")[-2:])
-
-
-def shown_contract(node: Node) -> tuple[str, ...]:
-    """A derived contract in lines of text."""
-    lines = [f"{node.name} as a node"]
-    lines += [f"  reads {', '.join(port.name for port in node.inputs)}"] if node.inputs else []
-    lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
-    lines += [f"  assumes {clause.name}: {show_term(clause.formula)}" for clause in node.assumptions]
-    lines += [f"  guarantees {clause.name}: {show_term(clause.formula)}" for clause in node.guarantees]
-    return tuple(lines)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from avow.base.verdict import Verdict
+from avow.calculus.composition import compose
 
 from .make import make, node, outcomes
 
@@ -33,3 +34,23 @@ def test_known_answers(tmp_path: Path, grouped: bool, claim: str, verdict: Verdi
     assert found["R"].verdict is Verdict.PROVED
     inside = found["s.latch.pulse" if grouped else "whole.latch.pulse"]
     assert inside.verdict is Verdict.PROVED, "what the plan assumes of the environment with memory helps inside"
+
+
+def test_the_contract_is_told_in_words(tmp_path: Path) -> None:
+    """As the nodes inside say it, not in the cells that stand for what is remembered."""
+    text = TEXT.replace("{}", "previous(in.heard, TRUE) -> in.heard")
+    aged = text.replace("once(in.e) -> out.on", "once[2 s](in.e) and previous(out.on, FALSE) -> out.on")
+    aged_plan = PLAN.replace("formula: 'once(latch.e) -> echo.heard'", "formula: 'not latch.e or echo.heard'")
+    for number, (said, plan, kept) in enumerate(
+        (
+            (text, PLAN, "once(in.e) → out.on"),
+            (aged, aged_plan, "once[2 s](in.e) ∧ previous(out.on, false) → out.on"),
+        )
+    ):
+        assert compose(make(tmp_path / str(number), said, plan)).goal("s").contract == (
+            "s as a node",
+            "  reads e",
+            "  puts out on, heard",
+            f"  guarantees latch.keep: {kept}",
+            "  guarantees echo.same: out.heard ↔ out.on",
+        )
