@@ -354,6 +354,11 @@ class Grade(StrEnum):
     CERTIFIED = "CERTIFIED"
     """The kernel established every such proof of the calculus again in this run, and every digest was verified."""
 
+    @property
+    def word(self) -> str:
+        """For people, after the word *proofs*: it says nothing of the verdict, beside which it stands."""
+        return "certified" if self is Grade.CERTIFIED else "not certified"
+
 
 @dataclass(frozen=True, slots=True)
 class Case:

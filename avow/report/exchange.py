@@ -135,7 +135,7 @@ def render_sarif(case: Case, *, findings_only: bool = False) -> str:
             "system": case.system,
             "result": _result_of(case),
             "title": case.title,
-            "grade": case.grade.value,
+            "proofs": case.grade.word,
             "ledgerHead": case.ledger_head,
         },
     }

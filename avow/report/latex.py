@@ -73,7 +73,7 @@ def render_latex(case: Case) -> str:
         rf"\author{{Avow {latex(case.run.avow_version)}}}",
         r"\begin{document}\maketitle",
         rf"\textbf{{{latex(case.answers.told)}}}. {latex(case.answers.beside)}.",
-        rf"{latex(verdict_line(case))} Grade {case.grade}. Policy {latex(case.policy.name)}.",
+        rf"{latex(verdict_line(case))} Proofs: {case.grade.word}. Policy {latex(case.policy.name)}.",
         rf"Ledger \texttt{{{case.ledger_head[:16]}}}.",
         r"\section{Requirements}",
         r"\begin{longtable}{p{0.12\textwidth}p{0.5\textwidth}p{0.3\textwidth}}",

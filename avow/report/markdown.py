@@ -71,7 +71,7 @@ def render_markdown(case: Case) -> str:
         if case.environment
         else "The plan assumes nothing of the environment's inputs.",
         "## Trusted base",
-        f"{case.grade}: {escaped(case.grade_reason)}.",
+        f"Proofs {case.grade.word}: {escaped(case.grade_reason)}.",
         _table(
             ("proof", "grade", "by"),
             ((escaped(short(p.obligation)), p.grade, escaped(", ".join(p.tools))) for p in case.proofs),
@@ -110,8 +110,8 @@ def _contracts(case: Case) -> Iterable[str]:
 
 def _origin(case: Case) -> str:
     run = f"run `{_code(case.run.id)}`, ledger `{case.ledger_head}`"
-    grade = f"{case.grade}: {escaped(case.grade_reason)}"
-    return f"Grade {grade}. System `{_code(case.system)}`, policy {escaped(case.policy.name)}, {case.today}, {run}."
+    proofs = f"{case.grade.word} ({escaped(case.grade_reason)})"
+    return f"Proofs: {proofs}. System `{_code(case.system)}`, policy {escaped(case.policy.name)}, {case.today}, {run}."
 
 
 def _guarantees(case: Case) -> list[ObligationView]:

@@ -52,13 +52,17 @@ def _data(case: Case) -> dict[str, Any]:
     views = case.obligations[:PDF_OBLIGATIONS]
     levels = {node.name: node.criticality for node in case.nodes}
     nodes = dict.fromkeys(v.obligation.node for v in views if v.obligation.kind is Kind.GUARANTEE)
-    facts = [("system", case.system), ("grade", f"{case.grade}: {case.grade_reason}"), ("policy", case.policy.name)]
+    facts = [
+        ("system", case.system),
+        ("proofs", f"{case.grade.word}: {case.grade_reason}"),
+        ("policy", case.policy.name),
+    ]
     facts += [("date", case.today), ("run", case.run.id), ("ledger", case.ledger_head)]
     left_out = len(case.obligations) - len(views)
     more = [f"{left_out} obligations are left out of this document: see report.json."] if left_out else []
     found: dict[str, Any] = {
         "title": case.title,
-        "grade": str(case.grade),
+        "proofs": f"proofs {case.grade.word}",
         "facts": [*facts, *case.digests],
         "first": _first(case),
         "suppositions": [_supposition(s) for s in case.suppositions],

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import avow.report
 from avow.assurance.answers import EARLIER, Tone
 from avow.assurance.case import as_of_earlier
 from avow.assurance.codec import case_schema
-from avow.assurance.model import Case
+from avow.assurance.model import Case, Grade
 from avow.assurance.traceability import COLUMNS, trace
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
@@ -332,6 +333,15 @@ def test_the_matrix_page_counts_what_is_covered() -> None:
     assert "<b>2 orphans</b>" in text
     assert text.count('href="index.html#rover/n/guarantee/g"') == 1, "one row for a claim, with all of its evidence"
     assert "hypothesis" in text
+
+
+def test_the_grade_of_the_proofs_is_told_as_one_of_proofs() -> None:
+    """Beside WARNED a bare CERTIFIED would read as a verdict; only report.json has that word, as its schema says."""
+    found = replace(rover_case(), grade=Grade.CERTIFIED)
+    for name, text in dict(formats(found)).items():
+        if name != "report.json" and isinstance(text, str):
+            assert "CERTIFIED" not in text, name
+    assert "Proofs certified" in str(dict(formats(found))["claims.html"])
 
 
 def test_the_index_does_not_call_known_bad_material_passed() -> None:
