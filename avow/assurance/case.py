@@ -3,7 +3,7 @@
 The pipeline calls, once a system:
 
     ledger = Ledger(workspace.ledger(system.name))
-    case = build_case(
+    facts = facts_of_system(
         system,
         obligations,                       # every Obligation of the system, of every kind
         ledger.records(),                  # every Entry, oldest first; current, stale and superseded alike. What the
@@ -22,6 +22,7 @@ The pipeline calls, once a system:
         graph_svg="<svg…>",
         sources={"contracts/x/system.rcl": "the text…"},  # what `digests` are the digests of
     )
+    case = conclude(facts)
     render_all(case, workspace.report(system.name))
     exit code: case.exit_code
 
@@ -35,11 +36,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.answers import EARLIER, Baseline
-from avow.assurance.certification import KernelRun, ProofView, proof_views, standing, trusted_base
+from avow.assurance.answers import EARLIER
+from avow.assurance.certification import ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
 from avow.assurance.closure import Closure
-from avow.assurance.facts import Facts, facts_of_case, facts_of_system
+from avow.assurance.facts import Facts, facts_of_case
 from avow.assurance.findings import handle
 from avow.assurance.first_screen import answers, weakest_of, with_signature
 from avow.assurance.gap import independent
@@ -52,11 +53,9 @@ from avow.assurance.model import (
     EvidenceView,
     Grade,
     HypothesisView,
-    MethodInfo,
     ObligationView,
     OpenItem,
     RunInfo,
-    ToolInfo,
 )
 from avow.assurance.naming import derivation_claim
 from avow.assurance.programs import shown_by_programs
@@ -77,63 +76,11 @@ from avow.assurance.suppositions import Statements, suppositions
 from avow.assurance.weakenings import weakenings
 from avow.base.plain import count
 from avow.base.verdict import Link, Verdict, in_words
-from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
-from avow.evidence.ledger import GENESIS, Entry
+from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, behind, best_link, effective, roll_up, weigh
-from avow.system.plan import System
-
-
-def build_case(
-    system: System,
-    obligations: Sequence[Obligation],
-    records: Sequence[Entry],
-    *,
-    keys: Mapping[tuple[str, str], str],
-    today: date,
-    run: RunInfo,
-    derivations: Sequence[Derivation] = (),
-    methods: Sequence[MethodInfo] = (),
-    tools: Sequence[ToolInfo] = (),
-    discrepancies: Sequence[Discrepancy] | None = None,
-    digests: Mapping[str, str] | None = None,
-    ledger_head: str = GENESIS,
-    graph_svg: str = "",
-    sources: Mapping[str, str] | None = None,
-    baseline: Baseline | None = None,
-    discharging: Mapping[str, tuple[str, ...]] | None = None,
-    kernel: KernelRun | None = None,
-    recorded: Sequence[Entry] | None = None,
-) -> Case:
-    """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names;
-    `discharging`: of each node the obligations that settle its assumptions; `kernel`: what the
-    kernel established in this run; `recorded`: the records as the ledger has them, where `records` are as they count
-    now.
-    Raises Rejected for an unusable policy."""
-    return conclude(
-        facts_of_system(
-            system,
-            obligations,
-            records,
-            keys,
-            today,
-            run,
-            derivations,
-            methods,
-            tools,
-            discrepancies,
-            digests or {},
-            ledger_head,
-            graph_svg,
-            sources or {},
-            baseline,
-            discharging or {},
-            kernel,
-            recorded,
-        )
-    )
 
 
 def conclude_again(case: Case) -> Case:
@@ -147,7 +94,7 @@ def as_of_earlier(case: Case) -> Case:
 
 
 def conclude(facts: Facts) -> Case:
-    """Everything that follows from the facts."""
+    """Everything that follows from the facts. Pure: same facts, same case."""
     evidence, orphans = _evidence(facts)
     counting = {name: tuple(v.entry for v in views if v.counts) for name, views in evidence.items()}
     statuses = {

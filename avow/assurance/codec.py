@@ -1,18 +1,16 @@
-"""Cases as JSON, there and back, and the JSON schemas that are published (`avow.base.codec`)."""
+"""Cases as JSON, there and back, and their published schema (`avow.base.codec`)."""
 
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
 from avow.base import codec
-from avow.base.codec import Unreadable, document
+from avow.base.codec import Unreadable
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import write
 from avow.evidence.ledger import Line
 
 SCHEMA = "https://avow.invalid/schemas/case-4"
@@ -64,22 +62,3 @@ def case_schema() -> dict[str, Any]:
 def evidence_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of one line of the ledger."""
     return codec.published(Line, "https://avow.invalid/schemas/evidence-1", "A line of Avow's evidence ledger")
-
-
-def schemas() -> dict[str, dict[str, Any]]:
-    """The published schemas that follow from dataclasses, by the names of their files."""
-    from avow.calculus.document import ComposeDocument
-    from avow.sanity.document import SanityDocument
-
-    place = "https://avow.example/schemas/"
-    return {
-        "case": case_schema(),
-        "evidence": evidence_schema(),
-        "compose": codec.published(ComposeDocument, f"{place}compose.schema.json", "avow compose --json"),
-        "sanity": codec.published(SanityDocument, f"{place}sanity.schema.json", "avow sanity --json"),
-    }
-
-
-if __name__ == "__main__":  # python -m avow.assurance.codec docs/schemas
-    for name, found in schemas().items():
-        write(Path(sys.argv[1]) / f"{name}.schema.json", document(found) + "\n")

@@ -31,7 +31,7 @@ from avow.base.diagnostics import Span
 from avow.base.plain import words_of
 from avow.base.records import dataclass
 from avow.evidence.audit import Discrepancy
-from avow.evidence.ledger import Entry
+from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause
 from avow.system.names import ports_named
@@ -74,23 +74,26 @@ def facts_of_system(
     system: System,
     obligations: Sequence[Obligation],
     records: Sequence[Entry],
+    *,
     keys: Mapping[tuple[str, str], str],
     today: date,
     run: RunInfo,
-    derivations: Sequence[Derivation],
-    methods: Sequence[MethodInfo],
-    tools: Sequence[ToolInfo],
-    discrepancies: Sequence[Discrepancy] | None,
-    digests: Mapping[str, str],
-    ledger_head: str,
-    graph_svg: str,
-    sources: Mapping[str, str],
+    derivations: Sequence[Derivation] = (),
+    methods: Sequence[MethodInfo] = (),
+    tools: Sequence[ToolInfo] = (),
+    discrepancies: Sequence[Discrepancy] | None = None,
+    digests: Mapping[str, str] = MappingProxyType({}),
+    ledger_head: str = GENESIS,
+    graph_svg: str = "",
+    sources: Mapping[str, str] = MappingProxyType({}),
     baseline: Baseline | None = None,
     discharging: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
     kernel: KernelRun | None = None,
     recorded: Sequence[Entry] | None = None,
 ) -> Facts:
-    """Raises Rejected for an unusable policy."""
+    """`sources` are the texts behind `digests`, by the same names; `discharging`: of each node the obligations that
+    settle its assumptions; `kernel`: what the kernel established in this run; `recorded`: the records as the ledger has
+    them, where `records` are as they count now. Raises Rejected for an unusable policy."""
     plan = system.plan
     planned: dict[str, tuple[tuple[str, str], ...]] = {}
     for (obligation, method), key in sorted(keys.items()):

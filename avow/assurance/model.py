@@ -1,7 +1,7 @@
 """The assurance case as data: what every report format is rendered from, and nothing else.
 
 One frozen object holds it all, so that two formats cannot disagree. The first part is what the pipeline hands in
-(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`; `Discrepancy` is the audit's), the second what `build_case` makes.
+(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`; `Discrepancy` is the audit's), the second what `conclude` makes.
 Times and dates are texts in ISO 8601; paths are relative to the workspace; every text is data, never markup.
 """
 
@@ -100,7 +100,7 @@ class Derivation:
     conditional: tuple[str, ...] = ()
 
 
-# -- made by build_case ---------------------------------------------------------------------------------------------
+# -- made by conclude ------------------------------------------------------------------------------------------------
 
 
 class Currency(StrEnum):

@@ -11,7 +11,7 @@ def command() -> int:
     from avow.base.diagnostics import Diagnostic, Rejected
 
     try:
-        from avow.lsp.clause_status import standing
+        from avow.cli.clause_status import standing
         from avow.lsp.server import serve
     except ImportError:
         raise Rejected(

@@ -67,7 +67,8 @@ def _checkout(place: Workspace, revision: str, folder: Path) -> None:
 
 
 def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:
-    from avow.assurance.case import build_case
+    from avow.assurance.case import conclude
+    from avow.assurance.facts import facts_of_system
     from avow.pipeline.workload import survey
 
     found = {}
@@ -77,13 +78,15 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]
             found[folder.name] = Snapshot(folder.name, {}, {})
             continue
         system = surveyed.system
-        case = build_case(
-            system,
-            surveyed.catalogue.obligations,
-            _records(place.ledger(system.name)),
-            keys=surveyed.keys,
-            today=date.today(),
-            run=RunInfo("diff", "", 0.0, __version__),
+        case = conclude(
+            facts_of_system(
+                system,
+                surveyed.catalogue.obligations,
+                _records(place.ledger(system.name)),
+                keys=surveyed.keys,
+                today=date.today(),
+                run=RunInfo("diff", "", 0.0, __version__),
+            )
         )
         found[system.name] = of_case(case)
     return found

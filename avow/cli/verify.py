@@ -44,21 +44,13 @@ def command(
 ) -> int:
     """Verify every system under contracts/, or only each SYSTEM (its name or folder)."""
     from avow.base.workspace import require_systems, workspace
-    from avow.isolation.level import SANDBOX
-    from avow.pipeline.run_info import EXPLAIN, FRESH, SECONDS, sign_with
+    from avow.pipeline.run_info import asked_of_runs, sign_with
     from avow.pipeline.tasks import execute
 
     place = workspace()
     systems = require_systems(place, systems)
     sign_with(key)
-    if fresh:
-        os.environ[FRESH] = "1"
-    if sandbox:
-        os.environ[SANDBOX] = "required"
-    if seconds is not None:
-        os.environ[SECONDS] = str(seconds)
-    if explain:
-        os.environ[EXPLAIN] = "1"
+    asked_of_runs(fresh=fresh, explain=explain, sandbox=sandbox, seconds=seconds)
     wanted = [f"verify:{name}" for name in systems] or ["verify"]
     cluster, elsewhere = _cluster(address) if address else (None, None)
     if jobs is None:

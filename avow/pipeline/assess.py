@@ -130,7 +130,8 @@ def case_of(assessment: Assessment) -> Case:
 
 def build(assessment: Assessment) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
-    from avow.assurance.case import build_case
+    from avow.assurance.case import conclude
+    from avow.assurance.facts import facts_of_system
     from avow.assurance.signed import newest_signed
     from avow.pipeline.derivations import derivation_views, discharging, graph_svg
 
@@ -141,37 +142,39 @@ def build(assessment: Assessment) -> Case:
     files = (*plan.contract_files, plan.path, *plan.included)
     entries = counting_now(ledger, workspace.root, system, assessment.run)
     texts = {workspace.relative(path): path.read_bytes() for path in files}
-    return build_case(
-        system,
-        assessment.surveyed.catalogue.obligations,
-        entries,
-        keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
-        today=_today(),
-        run=RunInfo(
-            assessment.run.id,
-            datetime.now(UTC).isoformat(timespec="seconds"),
-            round(assessment.run.seconds, 1),
-            __version__,
-            assessment.run.fresh,
-            f"doit verify:{system.name}",
-            head(workspace.root),
-            {
-                "seconds for each tool": _seconds_in_words(),
-                "seed": "0, unless the plan says otherwise",
-            },
-        ),
-        derivations=derivation_views(system),
-        discharging=discharging(system),
-        methods=_methods(assessment),
-        tools=_tools(),
-        discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
-        digests={path: sha256(data) for path, data in texts.items()},
-        ledger_head=ledger.head,
-        graph_svg=graph_svg(system),
-        sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
-        baseline=newest_signed(workspace.signed, system.name)[0],
-        kernel=kernel_run(entries, workspace.root, system, assessment.run),
-        recorded=ledger.records(),
+    return conclude(
+        facts_of_system(
+            system,
+            assessment.surveyed.catalogue.obligations,
+            entries,
+            keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
+            today=_today(),
+            run=RunInfo(
+                assessment.run.id,
+                datetime.now(UTC).isoformat(timespec="seconds"),
+                round(assessment.run.seconds, 1),
+                __version__,
+                assessment.run.fresh,
+                f"doit verify:{system.name}",
+                head(workspace.root),
+                {
+                    "seconds for each tool": _seconds_in_words(),
+                    "seed": "0, unless the plan says otherwise",
+                },
+            ),
+            derivations=derivation_views(system),
+            discharging=discharging(system),
+            methods=_methods(assessment),
+            tools=_tools(),
+            discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
+            digests={path: sha256(data) for path, data in texts.items()},
+            ledger_head=ledger.head,
+            graph_svg=graph_svg(system),
+            sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
+            baseline=newest_signed(workspace.signed, system.name)[0],
+            kernel=kernel_run(entries, workspace.root, system, assessment.run),
+            recorded=ledger.records(),
+        )
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avow.base.records import dataclass
+from avow.isolation.level import SANDBOX
 from avow.pipeline.forks import Forks
 
 if TYPE_CHECKING:
@@ -73,6 +74,14 @@ def signing_key() -> Path | None:
     """The private key that signs attestations, if there is one."""
     name = os.environ.get(KEY, "")
     return Path(name).absolute() if name else None
+
+
+def asked_of_runs(*, fresh: bool, explain: bool, sandbox: bool, seconds: float | None) -> None:
+    """Let the runs of this process be as the options of `avow verify` say; `seconds` is the time for one question."""
+    wanted = {FRESH: "1" if fresh else "", EXPLAIN: "1" if explain else "", SANDBOX: "required" if sandbox else ""}
+    os.environ.update({name: value for name, value in wanted.items() if value})
+    if seconds is not None:
+        os.environ[SECONDS] = str(seconds)
 
 
 def sign_with(key: object) -> None:

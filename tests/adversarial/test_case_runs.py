@@ -17,7 +17,8 @@ import pytest
 from assurance.sample import RUN, TODAY, chain, evidence
 from calculus.make import Limits
 
-from avow.assurance.case import build_case
+from avow.assurance.case import conclude
+from avow.assurance.facts import facts_of_system
 from avow.assurance.model import Case
 from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
@@ -116,15 +117,17 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
             records.append(evidence(o, Verdict.REFUTED if bad else Verdict.PROVED))
         elif o.kind is Kind.SANITY:
             records.append(evidence(o, Verdict.PROVED, "sanity"))
-    case = build_case(
-        system,
-        catalogue(system).obligations,
-        chain(records),
-        keys={(r.obligation, r.method): r.key for r in records},
-        today=TODAY,
-        run=RUN,
-        derivations=derivation_views(system),
-        discharging=discharging(system),
+    case = conclude(
+        facts_of_system(
+            system,
+            catalogue(system).obligations,
+            chain(records),
+            keys={(r.obligation, r.method): r.key for r in records},
+            today=TODAY,
+            run=RUN,
+            derivations=derivation_views(system),
+            discharging=discharging(system),
+        )
     )
     return case, [*calculus, *(r for r in kept if r not in good)]
 

@@ -8,7 +8,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from avow.assurance.case import build_case
+from avow.assurance.case import conclude
+from avow.assurance.facts import facts_of_system
 from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
 from avow.base.codec import canonical
 from avow.base.diagnostics import Span
@@ -205,16 +206,18 @@ def case(
     **others: Any,
 ) -> Case:
     entries = chain(records)
-    return build_case(
-        subject,
-        obligations,
-        entries,
-        keys=keys_of(records) if keys is None else keys,
-        today=TODAY,
-        run=run,
-        tools=TOOLS,
-        ledger_head=entries[-1].hash if entries else GENESIS,
-        **{"methods": METHODS, "discrepancies": (), **others},
+    return conclude(
+        facts_of_system(
+            subject,
+            obligations,
+            entries,
+            keys=keys_of(records) if keys is None else keys,
+            today=TODAY,
+            run=run,
+            tools=TOOLS,
+            ledger_head=entries[-1].hash if entries else GENESIS,
+            **{"methods": METHODS, "discrepancies": (), **others},
+        )
     )
 
 

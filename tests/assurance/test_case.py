@@ -25,12 +25,13 @@ from assurance.sample import (
 )
 from avow.assurance.answers import How
 from avow.assurance.case import conclude_again
-from avow.assurance.codec import case_schema, from_json, schemas, to_json
+from avow.assurance.codec import case_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, SideCondition
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
+from avow.cli.schemas import schemas
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
@@ -426,4 +427,4 @@ def test_other_json_is_no_case(bad: object) -> None:
 @pytest.mark.parametrize(("name", "schema"), schemas().items())
 def test_published_schemas_are_up_to_date(name: str, schema: dict[str, Any]) -> None:
     published = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
-    assert published == schema, "write it again: python -m avow.assurance.codec docs/schemas"
+    assert published == schema, "write it again: python -m avow.cli.schemas docs/schemas"

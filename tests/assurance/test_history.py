@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from avow.assurance.case import build_case, conclude, conclude_again
+from avow.assurance.case import conclude, conclude_again
 from avow.assurance.codec import from_json, to_json
-from avow.assurance.facts import facts_of_case
+from avow.assurance.facts import facts_of_case, facts_of_system
 from avow.assurance.history import history
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
@@ -161,5 +161,5 @@ def test_what_counts_no_more_since_a_file_changed_is_kept() -> None:
     entries = chain([evidence(G, key="now", details={OBSERVED: str(k)}) for k in range(6)])
     as_of_now = [changed_since(entry) for entry in entries]
     assert len(history(entries, [G, H], KEYS)[0]) == 6
-    found = build_case(subject(), [G, H], as_of_now, keys=KEYS, today=TODAY, run=RUN, recorded=entries)
+    found = conclude(facts_of_system(subject(), [G, H], as_of_now, keys=KEYS, today=TODAY, run=RUN, recorded=entries))
     assert len(found.obligations[0].evidence) == 6

@@ -8,6 +8,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.workspace import find_workspace
 from avow.evidence.ledger import Ledger
 from avow.lsp.features import StatusLookup
+from avow.system.plan_file import read_plan
 
 
 def standing(file: str) -> StatusLookup:
@@ -40,8 +41,6 @@ def standing(file: str) -> StatusLookup:
 
 def _system(folder: Path) -> str:
     """The name of the system in a folder: its plan's, else the folder's."""
-    from avow.system.plan_file import read_plan
-
     try:
         return read_plan(folder / "plan.yaml")[0].system
     except (Rejected, OSError):
