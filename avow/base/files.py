@@ -11,6 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from avow.base.file_systems import keeps_changes
 from avow.tuning.running import READER_SECONDS
 
 PART = ".part"
@@ -67,16 +68,27 @@ def digest_or_missing(path: Path) -> str:
 
 def digest_once(path: Path) -> str:
     """As `digest_file`; a file that this process has read is not read again while it is the same."""
-    return _digest_as(path, identity(path.stat()))
+    return _digest_as(path, identity(path.stat(), path))
 
 
-def identity(info: os.stat_result) -> tuple[int, ...]:
-    """What tells, without reading, that a file is as it was a moment ago: times in nanoseconds, size in bytes."""
-    return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
+def identity(info: os.stat_result, path: str | Path) -> tuple[int | str, ...]:
+    """What tells that a file is as it was a moment ago: its place on the disk, size in bytes, times in nanoseconds, the
+    time of its last change at the end. That time cannot be set back; where it can, or counts whole seconds only, the
+    content itself is looked at. Raises OSError."""
+    true = info.st_ctime_ns % 1_000_000_000 and keeps_changes(os.fspath(path), info.st_dev)
+    content = "" if true else _content(os.fspath(path), info.st_mode)
+    return info.st_dev, info.st_ino, info.st_size, content, info.st_mtime_ns, info.st_ctime_ns
+
+
+def _content(path: str, mode: int) -> str:
+    """Of a folder, the names in it."""
+    if stat.S_ISDIR(mode):
+        return sha256("\0".join(sorted(os.listdir(path))).encode("utf-8", "surrogateescape"))  # noqa: PTH208
+    return digest_file(Path(path)) if stat.S_ISREG(mode) else ""
 
 
 @functools.lru_cache(maxsize=100_000)
-def _digest_as(path: Path, mark: tuple[int, ...]) -> str:
+def _digest_as(path: Path, mark: tuple[int | str, ...]) -> str:
     """A file that is as it was a moment ago is not read again."""
     return digest_file(path)
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest_or_missing, sha256
+from avow.base.files import digest_or_missing, identity, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
@@ -79,9 +79,8 @@ def _named(file: Path) -> Iterator[Path]:
             yield from (Path(name) for name in re.findall(r"(?:=>|^)\s*(/\S+)", listed, re.MULTILINE))
 
 
-def _mark(file: Path) -> list[int]:
+def _mark(file: Path) -> tuple[int | str, ...]:
     try:
-        info = file.stat()
+        return identity(file.stat(), file)
     except OSError:
-        return []
-    return [info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns]
+        return ()

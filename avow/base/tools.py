@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_file, identity, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
@@ -84,8 +84,7 @@ def package_digest(name: str) -> str:
     place = Path(spec.submodule_search_locations[0])
     files = sorted(path for path in place.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     try:
-        told = [(str(file.relative_to(place)), file.stat()) for file in files]
-        marks = [[file, i.st_ino, i.st_size, i.st_mtime_ns, i.st_ctime_ns] for file, i in told]
+        marks = [[str(file.relative_to(place)), *identity(file.stat(), file)] for file in files]
         note = cache_folder() / f"package-{name}-{sha256(str(place))[:12]}.json"  # one for each environment
         mark = sha256(json.dumps([str(place), marks]))
         known = read_note(note) or {}

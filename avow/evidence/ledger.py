@@ -195,7 +195,7 @@ class Ledger:
     # -- inside -------------------------------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._seen: tuple[int, ...] = ()
+        self._seen: tuple[int | str, ...] = ()
         self._digest = hashlib.sha256()
         self._offset = 0
         self._lines = 0
@@ -253,18 +253,18 @@ class Ledger:
         if self._held:
             return
         try:
-            if self._seen and identity(self.path.stat()) == self._seen:
+            if self._seen and identity(self.path.stat(), self.path) == self._seen:
                 return
             with open(self.path, "rb", opener=open_file) as file:
                 info = os.fstat(file.fileno())
-                if info.st_size < self._offset or (self._seen and identity(info)[:2] != self._seen[:2]):
+                if info.st_size < self._offset or (self._seen and (info.st_dev, info.st_ino) != self._seen[:2]):
                     self._forget()
                 file.seek(self._offset)
                 data = file.read()
         except FileNotFoundError:
             self._forget()
             return
-        self._seen = identity(info)
+        self._seen = identity(info, self.path)
         known = self._remembered(data)
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)

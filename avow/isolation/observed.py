@@ -101,11 +101,13 @@ def marks(observed: Observed) -> tuple[object, ...] | None:
     look again costs no more."""
     try:
         if observed.kind is Seen.READ:
-            return identity(os.stat(observed.path))  # noqa: PTH116
+            return identity(os.stat(observed.path), observed.path)  # noqa: PTH116
         if observed.kind is Seen.FOLDER:
             with os.scandir(observed.path) as entries:
                 found = [(entry.name, entry) for entry in entries if entry.name != "__pycache__"]
-                return tuple((name, *identity(entry.stat())) for name, entry in sorted(found, key=lambda f: f[0]))
+                return tuple(
+                    (name, *identity(entry.stat(), entry.path)) for name, entry in sorted(found, key=lambda f: f[0])
+                )
     except (OSError, ValueError):
         return None
     return None

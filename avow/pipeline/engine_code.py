@@ -48,7 +48,7 @@ def backend_digest(tool: Backend) -> str:
 def code_mark() -> str:
     """Of this package's files as they lie there now, by their identity: a process that lives long has imported what lay
     there when it began."""
-    return sha256(json.dumps([[str(file), identity(file.stat())] for file in sorted(_PACKAGE.rglob("*.py"))]))
+    return sha256(json.dumps([[str(file), identity(file.stat(), file)] for file in sorted(_PACKAGE.rglob("*.py"))]))
 
 
 @functools.cache

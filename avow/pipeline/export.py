@@ -51,8 +51,9 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
 def _marks(place: Path, files: Iterable[str]) -> tuple[str, bool]:
     """A digest of what the shortcut takes for a file's identity, and whether all of them are of an earlier moment: an
     edit at the moment of a change may leave the times as they are. Raises OSError."""
-    marks = [identity(os.stat(f"{place}/{name}")) for name in files]  # noqa: PTH116 - of each artifact in every run
-    newest = max((mark[-1] for mark in marks), default=0)
+    paths = [f"{place}/{name}" for name in files]
+    marks = [identity(os.stat(path), path) for path in paths]  # noqa: PTH116 - of each artifact in every run
+    newest = max((int(mark[-1]) for mark in marks), default=0)
     return sha256(json.dumps(marks)), time.time_ns() - newest > SETTLED_NS
 
 

@@ -3,7 +3,9 @@
 After a complete run of everything, `keep` notes the identity (inode, size, times of change) of every file that the
 answer depends on: contracts, artifacts, reports, Avow's own code, and the folders in which tools and packages would
 appear; and the environment. While all that is the same, the next `doit verify` has nothing to do and says so. Times of
-*change* (ctime) cannot be set back, so an edit is never missed; a touched file only costs the long way.
+*change* (ctime) cannot be set back, so an edit is never missed; a touched file only costs the long way. Where a file
+system has no such times, the bytes count (`files.identity`). No file is believed that changed within the tick of the
+clock in which it is looked at: a tick passes first.
 """
 
 from __future__ import annotations
@@ -13,12 +15,14 @@ import hashlib
 import json
 import os
 import sys
+import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
 import avow.backends
 from avow.base import codec
+from avow.base.files import identity
 from avow.base.notes import read_note, write_note
 from avow.base.programs import program_files
 from avow.base.tools import package_digest
@@ -27,6 +31,7 @@ from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, look, marks
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
+from avow.tuning.running import TICK_SECONDS
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
@@ -48,6 +53,12 @@ class Shortcut:
     def nothing_to_do(self, wanted: Sequence[str]) -> tuple[Result, ...] | None:
         """The results of the last run, if only verification is `wanted` and nothing has changed since; else None.
         Called before anything is read."""
+        found = self._settled(wanted)
+        if found is None:
+            time.sleep(TICK_SECONDS)  # an edit from now on is told by its time
+        return found
+
+    def _settled(self, wanted: Sequence[str]) -> tuple[Result, ...] | None:
         with contextlib.suppress(OSError):
             self._begun = _sources(self.workspace)
         if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
@@ -70,6 +81,7 @@ class Shortcut:
         """Note that everything is settled as things stand, the outside tools' `programs` too. Without effect where a
         link leads out of the workspace, where a plan reads launch files (which stand anywhere, and say what else is
         read), or where something was edited during the run: the results are not of what stands there now."""
+        time.sleep(TICK_SECONDS)
         try:
             sources = _sources(self.workspace)
             if self._begun != sources or _reads_elsewhere(self.workspace):
@@ -172,5 +184,4 @@ def _files(folder: Path, without: Collection[str]) -> Iterator[str]:
 
 
 def _mark(path: str) -> str:
-    stat = os.stat(path)  # noqa: PTH116 - asked of each file of a workspace, in the run that is to cost nothing
-    return f"{stat.st_ino} {stat.st_size} {stat.st_mtime_ns} {stat.st_ctime_ns}"
+    return " ".join(map(str, identity(os.stat(path), path)))  # noqa: PTH116 - the run that is to cost nothing asks of each

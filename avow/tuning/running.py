@@ -121,6 +121,10 @@ DRIVEN_CALLBACKS = 200_000
 BYTE_CODE_ROOM = 100_000_000
 """Bytes free on the disk, below which no byte code is kept: all that Avow imports has a tenth of it."""
 
+TICK_SECONDS = 0.02
+"""Seconds in which the clock of file times ticks at least once (a hundredth, at most): two changes with more between
+them have different times, where the file system counts less than seconds."""
+
 SETTLED_NS = 2_000_000_000
 """Nanoseconds after a file's last change for which another change might show no other time: coarse clocks tick in
 hundredths of a second, some file systems in two seconds."""

@@ -39,6 +39,8 @@ ELSEWHERE = {
     "avow/assurance/policy._data": ONCE,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
+    "avow/base/file_systems._known": ONCE,
+    "avow/base/file_systems._mounts": ONCE,
     "avow/base/process.here": PROCESS,
     "avow/calculus/kept_answers._kept": "where a work's answers are kept, for the time of that work",
     "avow/calculus/scenario._KEYS": KEPT,

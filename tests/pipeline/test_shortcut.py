@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import sys
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +12,9 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence, guarantee
 
+from avow.base import file_systems
 from avow.base.codec import to_json
+from avow.base.tools import package_digest
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
@@ -60,6 +64,99 @@ def test_an_edit_of_the_same_length_under_an_old_time_is_seen(settled: Workspace
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert path.stat().st_mtime_ns == before.st_mtime_ns
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
+
+
+class Restoring:
+    """Stands for a file system on which the time of change can be set back: `os.stat` as it was of each file."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, times: str) -> None:
+        self.known: dict[tuple[int, int], os.stat_result] = {}
+        real, fstat = os.stat, os.fstat
+
+        def restored(info: os.stat_result) -> os.stat_result:
+            first = self.known.setdefault((info.st_dev, info.st_ino), info)
+            named = {name: getattr(info, name) for name in dir(info) if name.startswith("st_") and name.endswith("_ns")}
+            named |= {name: getattr(first, name) for name in ("st_mtime_ns", "st_ctime_ns")}
+            if times == "whole seconds":
+                named |= {name: value // 10**9 * 10**9 for name, value in named.items()}
+            return os.stat_result(tuple(info), named)
+
+        monkeypatch.setattr(os, "stat", lambda *a, **k: restored(real(*a, **k)))
+        monkeypatch.setattr(os, "fstat", lambda *a: restored(fstat(*a)))
+
+
+@pytest.mark.parametrize("times", ["set back", "whole seconds"])
+@pytest.mark.parametrize("what", ["contract", "ledger", "report", "observed", "tool", "package"])
+def test_where_times_of_change_can_be_set_back_the_bytes_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, times: str
+) -> None:
+    """FAT, some of the network; a second in which a file was written twice. For all that the shortcut looks at."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    if times == "set back":
+        monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
+    monkeypatch.setattr(file_systems, "_known", {})
+    Restoring(monkeypatch, times)
+    workspace = Workspace(tmp_path / "w")
+    package = tmp_path / "lib" / "z3"
+    places = {
+        "contract": workspace.contracts / "crane" / "plan.yaml",
+        "ledger": workspace.artifacts / "crane" / "log.txt",
+        "report": workspace.reports / "index.html",
+        "observed": tmp_path / "elsewhere" / "gain.txt",
+        "tool": tmp_path / "bin" / "prover",
+        "package": package / "__init__.py",
+    }
+    for path in places.values():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("text")
+    told = Observed(Seen.READ, str(places["observed"]), look(Seen.READ, str(places["observed"])))
+    record = evidence(guarantee("crane", "lifts"), Verdict.TESTED, "hypothesis")
+    workspace.ledger("crane").parent.mkdir(parents=True, exist_ok=True)
+    Ledger(workspace.ledger("crane")).append(replace(record, details={OBSERVED: to_json((told,))}))
+    monkeypatch.syspath_prepend(str(package.parent))
+    monkeypatch.delitem(sys.modules, "z3", raising=False)
+    importlib.invalidate_caches()
+
+    def settled() -> object:
+        package_digest.cache_clear()
+        return Shortcut(workspace).nothing_to_do(("verify",))
+
+    package_digest.cache_clear()
+    shortcut = Shortcut(workspace)
+    assert shortcut.nothing_to_do(("verify",)) is None
+    shortcut.keep([RESULT], [str(places["tool"])])
+    assert settled() == (RESULT,)
+    places[what].write_text("tExt")
+    assert settled() is None
+
+
+def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = [
+        "22 1 0:1 / / rw - rootfs none rw",
+        "23 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw",
+        "24 23 8:2 / /media/my\\040stick rw master:1 propagate_from:2 - vfat /dev/sdb1 rw",
+        "25 23 0:9 / /media rw - tmpfs none rw",
+        "26 24 8:3 /deep /media/my\\040stick/data rw - ext4 /dev/sdc1 rw",
+    ]
+    mounts = tmp_path / "mountinfo"
+    mounts.write_text("\n".join(lines) + "\n")
+    monkeypatch.setattr(file_systems, "_MOUNTS", mounts)
+    file_systems._mounts.cache_clear()
+    try:
+        kinds = {p: file_systems._kind(p) for p in ("/", "/home/a", "/media/x", "/media/my stick/a", "/mediax")}
+        assert kinds == {
+            "/": "ext4",
+            "/home/a": "ext4",
+            "/media/x": "tmpfs",
+            "/media/my stick/a": "vfat",
+            "/mediax": "ext4",
+        }
+        assert file_systems._kind("/media/my stick/data/a") == "ext4"
+        mounts.unlink()
+        file_systems._mounts.cache_clear()
+        assert file_systems._kind("/home/a") == ""  # no Linux: nobody says, and the bytes count
+    finally:
+        file_systems._mounts.cache_clear()
 
 
 def test_where_a_contract_was_edited_what_earlier_runs_wrote_is_not_looked_at(
