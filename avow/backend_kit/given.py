@@ -43,11 +43,11 @@ def file_path(job: Job, key: str) -> Path | None:
     return inside(job.root, name) if isinstance(name, str) else None
 
 
-def existing_file(job: Job, key: str, name: object, *, wrong: str, absent: str, hint: str | None = None) -> Path:
-    """The file that the option `key` names (`name` is its value). Raises Rejected: with code `wrong` where it is no
-    name of a file in the system's folder, with code `absent` where there is none; `hint` says how to get one."""
+def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hint: str | None = None) -> Path:
+    """The file that the option `key` names (`name` is its value). Raises Rejected: with code `wrong` where that is no
+    place in the system's folder, with code `absent` where no file is there; `hint` says how to get one."""
     place = job.method.options.at(key)
-    if not isinstance(name, str) or not name:
+    if not name:
         message = f"{job.method.backend} needs '{key}': a file of the system's folder"
         raise Rejected(Diagnostic(wrong, message, place))
     path = inside(job.root, name)

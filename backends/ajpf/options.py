@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.renaming import bound_names
@@ -16,7 +17,6 @@ from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Not, Quantified, Role, Term, Variable
-from avow.system.paths import inside
 from avow.system.schema import violations
 
 from .environment import Environment, read_environment
@@ -126,22 +126,12 @@ class _OptionsReader:
         )
 
     def file(self, key: str, read_file: Any) -> tuple[Any, Path | None]:
-        name = self.options.get(key)
-        if not isinstance(name, str):
-            self.fault("AJPF120", f"'{key}' must name a file")
-            return None, None
-        path = inside(self.job.root, name)
-        if path is None:
-            self.fault("AJPF120", f"{key}: {name!r} leaves the system's folder", key)
-            return None, None
-        if not path.is_file():
-            self.fault("AJPF120", f"{key}: there is no file {name!r}", key)
-            return None, None
         try:
+            path = existing_file(self.job, key, self.options.get(key, ""), wrong="AJPF120", absent="AJPF120")
             return read_file(path), path
         except Rejected as error:
             self.faults.extend(error.diagnostics)
-            return None, path
+            return None, None
 
     def agents(self, programs: Sequence[Program]) -> None:
         for program in programs:

@@ -153,7 +153,7 @@ def _outcome(obligation: str, settled: Settled) -> Outcome:
 
 def _implementation(job: Job) -> tuple[Path, str]:
     """The hand-written file. Raises Rejected."""
-    name, place = job.options.get("implementation"), job.method.options.at("implementation")
+    name, place = job.options.get("implementation", ""), job.method.options.at("implementation")
     hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
     path = existing_file(job, "implementation", name, wrong="DFY101", absent="DFY102", hint=hint)
     try:

@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from avow.backend_kit.given import file, schema, text
+from avow.backend_kit.given import existing_file, file, schema, text
 from avow.backend_kit.protocol import Job
-from avow.base.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.bounds import constant
 from avow.language.subterms import subterms
 from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable
-from avow.system.paths import inside
 
 from .bound import Bound, upper_bound
 from .expression import Expression, Malformed, parse
@@ -97,7 +96,7 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     data, summary = _path(problems, "data"), _path(problems, "summary")
     if ("data" in options) == ("summary" in options):
         problems.add(None, "an experiment has either 'data' (the runs) or 'summary' (printed figures)")
-    unit = _text(problems, "unit")
+    unit = options.get("unit", "")
     measure = _measure(problems, "data" in options)
     within = _within(problems, unit)
     confidence = _probability(problems, "confidence", Fraction(95, 100))
@@ -117,11 +116,8 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
             f"a success rate of {float(at_least):g} is too little at this criticality: {float(floor):g} at least",
             code="EXP105",
         )
-    id_column = _text(problems, "run_column") or None
-    protocol = _text(problems, "protocol")
     if problems.found or within is None or confidence is None:
         return None, tuple(problems.found)
-    protocol = " ".join(protocol.split())
     supposed = "" if within.contracts else f"a tolerance of {within.text} is what the guarantee allows"
     return Experiment(
         data,
@@ -130,51 +126,31 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
         within.value,
         within.strict,
         unit,
-        id_column,
+        options.get("run_column") or None,
         confidence,
         at_least,
         floor,
-        protocol,
+        " ".join(options.get("protocol", "").split()),
         supposed,
     ), ()
 
 
 def _path(problems: Problems, key: str) -> Path | None:
-    value = problems.job.options.get(key)
-    if value is None:
-        if key in problems.job.options:
-            problems.add(key, f"'{key}' names no file")
+    if key not in problems.job.options:
         return None
-    if not isinstance(value, str):
-        problems.add(key, f"'{key}' must be the name of a file")
+    try:
+        return existing_file(problems.job, key, problems.job.options[key], wrong="EXP101", absent="EXP102")
+    except Rejected as rejected:
+        problems.found.extend(rejected.diagnostics)
         return None
-    path = inside(problems.job.root, value)
-    if path is None:
-        problems.add(key, f"'{value}' is not a file in the system's folder")
-    elif not path.is_file():
-        problems.add(key, f"there is no file '{value}' in {problems.job.root.name}/", code="EXP102")
-    return path
-
-
-def _text(problems: Problems, key: str) -> str:
-    value = problems.job.options.get(key, "")
-    if not isinstance(value, str):
-        problems.add(key, f"'{key}' must be text")
-        return ""
-    return value
 
 
 def _measure(problems: Problems, wanted: bool) -> Expression | None:
     text = problems.job.options.get("measure")
     if text is None:
-        if wanted:
-            problems.add("data", "an experiment with data needs 'measure': a column or an expression over columns")
         return None
     if not wanted:
         problems.add("measure", "'measure' goes with 'data'; a summary has its figures already")
-    if not isinstance(text, str):
-        problems.add("measure", "'measure' must be text")
-        return None
     try:
         found = parse(text)
     except Malformed as error:
@@ -209,10 +185,7 @@ class _Tolerance:
 def _within(problems: Problems, unit: str) -> _Tolerance | None:
     """The tolerance, held against the contract: where a guarantee compares with numbers it is one of them; where it
     names none, a constant of the contract, or a person has to say that it is meant."""
-    written = problems.job.options.get("within")
-    if written is None:
-        problems.add(None, "an experiment needs 'within': the greatest measure of a run that succeeds")
-        return None
+    written = problems.job.options.get("within", "")
     constants = {n: v for n, t in problems.job.contract.constants if (v := constant(t)) is not None}
     found = _read_tolerance(problems, written, unit, constants)
     if found is None:
@@ -242,14 +215,14 @@ def _within(problems: Problems, unit: str) -> _Tolerance | None:
 
 
 def _read_tolerance(
-    problems: Problems, written: object, unit: str, constants: Mapping[str, Fraction]
+    problems: Problems, written: float | str, unit: str, constants: Mapping[str, Fraction]
 ) -> tuple[Fraction, Fraction] | None:
     """(in the measure's unit; as the contract would write it: without a unit of its own)."""
     number = _number(written)
     if number is not None:
         return number, number
-    name, _, own = written.strip().partition(" ") if isinstance(written, str) else ("", "", "")
-    given = figure(written) if isinstance(written, str) else None
+    name, _, own = str(written).strip().partition(" ")
+    given = figure(str(written))
     if name in constants and not own.strip():
         return constants[name], constants[name]
     if name in constants or given is not None:
@@ -291,16 +264,6 @@ def _probability(problems: Problems, key: str, default: Fraction | None) -> Frac
     return number
 
 
-def _number(value: object) -> Fraction | None:
-    match value:
-        case bool():
-            return None
-        case int():
-            return Fraction(value)
-        case float():
-            # The shortest decimal that reads as this float is what the person typed.
-            return decimal(repr(value))
-        case str():
-            return decimal(value)
-        case _:  # no quantity: refused by the caller
-            return None
+def _number(value: float | str) -> Fraction | None:
+    """Of a float what the person typed: the shortest decimal that reads as it."""
+    return decimal(str(value))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
@@ -107,15 +108,12 @@ def load(job: Job) -> Work:
 
 def program_file(job: Job) -> Path:
     """The plan's program. Raises Rejected (``HOARE400``) where there is none, or outside the system's folder."""
-    return existing_file(job, "program", job.options.get("program"), wrong="HOARE400", absent="HOARE400")
+    return existing_file(job, "program", job.options.get("program", ""), wrong="HOARE400", absent="HOARE400")
 
 
 def _table(job: Job) -> dict[str, tuple[str, Span]]:
     options = job.method.options
-    given = job.options.get("variables") or {}
-    if not isinstance(given, Mapping):
-        message = "`variables` maps inputs and outputs to the program's expressions"
-        raise Rejected(Diagnostic("HOARE400", message, options.at("variables")))
+    given: Mapping[str, Any] = job.options.get("variables", {})
     words = {True: "TRUE", False: "FALSE"}
     return {
         str(key): (words[value] if isinstance(value, bool) else str(value), options.at("variables", key))

@@ -134,7 +134,7 @@ def locate(job: Job) -> SubjectFile:
     options = job.method.options
     if text is None and job.source is not None and job.source.python:
         return _declared(job, job.source)
-    if not isinstance(text, str):
+    if text is None:
         message = "the method needs a subject: `subject: models/….py:function`, or a node with a Python source"
         raise Rejected(Diagnostic("HYPO100", message, options.span))
     name, colon, function = text.rpartition(":")

@@ -116,7 +116,7 @@ def _keys(job: Job) -> tuple[Path, ...]:
 def _read(job: Job) -> tuple[Record, Path]:
     """The record, held against plan and contract, and where it is. Raises Rejected."""
     problems = []
-    path = existing_file(job, "record", record_name(job), wrong="REV101", absent="REV102")
+    path = existing_file(job, "record", record_name(job) or "", wrong="REV101", absent="REV102")
     record = read_record(path)
     if record.node and record.node != job.node.name:
         message = f"this is a review of node '{record.node}', not of '{job.node.name}'"

@@ -165,7 +165,7 @@ def test_fairness_must_be_stated_and_then_helps(lift, tmp_path):
 
 BAD_OPTIONS = {
     "no program": ({"program": "nothing.gwen"}, "there is no file"),
-    "outside": ({"program": "../../../etc/passwd"}, "leaves the system's folder"),
+    "outside": ({"program": "../../../etc/passwd"}, "is not a file in the system's folder"),
     "other agent": ({"agent": "lorry"}, "called 'cabin'"),
     "agent in a row": ({"predicates": {"in.call(f)": "B(lorry, call(f))"}}, "there is no agent 'lorry'"),
     "keyword as agent": ({"predicates": {"in.call(f)": "B(U, call(f))"}}, "cannot be an agent's name"),
