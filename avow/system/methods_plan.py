@@ -6,7 +6,7 @@ import re
 
 from avow.base.diagnostics import Diagnostic
 from avow.system.plan import Method
-from avow.system.strict_yaml import Piece
+from avow.system.strict_yaml import Piece, listed
 
 _METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
 
@@ -58,7 +58,7 @@ def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnost
     if piece is None:
         return ()
     where = f"nodes.{node}: {method}: guarantees"
-    names = [part.text for part in piece.items] if piece.items is not None else [piece.text]
+    names = [part.text for part in listed(piece)]
     if not names or not all(names) or piece.entries is not None:
         hint = "leave the key out for all of the node's guarantees, or the method for none"
         faults.append(

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
-from avow.ros.launch import Launched
 from avow.system.launched import read_launched
 from avow.system.methods_plan import read_methods
 from avow.system.paths import inside
@@ -32,10 +32,8 @@ from avow.system.plan import (
     Picture,
     Plan,
     Requirement,
-    Ros,
     Scenario,
     Source,
-    Statement,
     Subsystem,
     Table,
     is_wild,
@@ -44,8 +42,10 @@ from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape, without_faults
 from avow.system.source_plan import files_of, read_source
 from avow.system.statements import read_statements, wrong_words
-from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.strict_yaml import Piece, listed, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
+
+T = TypeVar("T")
 
 RESERVED = ("interpret", "domains", "steps")
 """Keys of `scenario` that are not tables."""
@@ -134,7 +134,7 @@ class _PlanReader:
         }
         self.model_graph()
         scenario = self.scenario()
-        launched = self.launched()
+        launched = self.noted(read_launched(self.path, self.items("ros", "launch")))
         return Plan(
             system=name,
             title=self.text("title") or name,
@@ -155,24 +155,15 @@ class _PlanReader:
             lints_off=tuple(_texts(self.root.at("lints_off"))),
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
-            statements=self.statements(),
-            ros=self.ros(),
+            statements=self.noted(read_statements(self.root)),
+            ros=self.noted(read_ros(self.root)),
             launched=launched,
             included=launched.files if launched is not None else (),
         )
 
-    def ros(self) -> Ros:
-        found, faults = read_ros(self.root)
-        self.faults += faults
-        return found
-
-    def launched(self) -> Launched | None:
-        found, faults = read_launched(self.path, self.items("ros", "launch"))
-        self.faults += faults
-        return found
-
-    def statements(self) -> tuple[Statement, ...]:
-        found, faults = read_statements(self.root)
+    def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
+        """What was read; what was wrong with it is noted."""
+        found, faults = read
         self.faults += faults
         return found
 
@@ -224,10 +215,7 @@ class _PlanReader:
         return False
 
     def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:
-        piece = self.root.at(*keys)
-        if piece is None:
-            return
-        for item in piece.items if piece.items is not None else [piece]:
+        for item in listed(self.root.at(*keys)):
             path = self.resolve(item)
             if path is not None:
                 yield item, path
@@ -255,8 +243,7 @@ class _PlanReader:
             delayed, initial = entries.get("delayed"), entries.get("initial")
             if initial is not None and not (delayed and delayed.value):
                 self.fault("PLAN110", "an initial value needs a delayed edge", initial.span, hint="add  delayed: true")
-            targets = entries["to"].items if entries["to"].items is not None else [entries["to"]]
-            for target in targets:
+            for target in listed(entries["to"]):
                 yield Connection(
                     _endpoint(entries["from"].text),
                     _endpoint(target.text),
@@ -321,16 +308,12 @@ class _PlanReader:
 
     def table(self, name: str, piece: Piece) -> Table | None:
         if piece.items is not None:
-            table, faults = read_rows(name, piece)
-            self.faults += faults
-            return table
+            return self.noted(read_rows(name, piece))
         source = piece.at("file") or piece
         path = self.resolve(source)
         if path is None or not self.present(source, path):
             return None
-        table, faults = read_csv(name, path, source.span)
-        self.faults += faults
-        return table
+        return self.noted(read_csv(name, path, source.span))
 
     def requirements(self) -> Iterator[Requirement]:
         for name, piece in self.entries("requirements"):
@@ -391,15 +374,13 @@ class _PlanReader:
     def nodes(self) -> Iterator[NodePlan]:
         for name, piece in self.entries("nodes"):
             criticality, title = piece.at("criticality"), piece.at("title")
-            methods, faults = read_methods(name, piece)
-            self.faults += faults
+            methods = self.noted(read_methods(name, piece))
             level = criticality.text if criticality else "medium"
             words = " ".join(title.text.split()) if title else ""
             yield NodePlan(name, level, methods, piece.span, words, self.source(name, piece))
 
     def source(self, name: str, piece: Piece) -> Source | None:
-        found, faults = read_source(name, piece)
-        self.faults += faults
+        found = self.noted(read_source(name, piece))
         for part in files_of(piece):
             path = self.resolve(part)
             _ = path is not None and self.present(part, path)
@@ -458,8 +439,4 @@ def _value(piece: Piece) -> str:
 
 
 def _texts(piece: Piece | None) -> list[str]:
-    if piece is None:
-        return []
-    if piece.items is not None:
-        return [item.text for item in piece.items]
-    return [piece.text]
+    return [item.text for item in listed(piece)]

@@ -75,13 +75,8 @@ def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, 
             )
             faults.append(Diagnostic("PLAN109", message, row.span))
             continue
-        found.append(tuple(_cell_text(entries[column]) for column in columns))
+        found.append(tuple(entries[column].text for column in columns))
     return (None, tuple(faults)) if faults else (Table(name, columns, tuple(found)), ())
-
-
-def _cell_text(piece: Piece) -> str:
-    """A scalar as text, as written."""
-    return piece.text if piece.value is not None or piece.text else ""
 
 
 def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]] | str:
@@ -105,12 +100,12 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
     if piece.items is not None:
         found: dict[str, None] = {}
         for item in piece.items:
-            values = _each_row(_cell_text(item), tables)
+            values = _each_row(item.text, tables)
             if isinstance(values, str):
                 return values
             found.update(dict.fromkeys(values))
         return tuple(found)
-    text = _cell_text(piece)
+    text = piece.text
     span = _RANGE.match(text)
     if span:
         low, high = int(span[1]), int(span[2])
