@@ -1,4 +1,4 @@
-"""Directed graphs: strongly connected components, and circles within them."""
+"""Directed graphs: what can be reached, strongly connected components, and circles within them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,18 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from typing import TypeVar
 
 N = TypeVar("N", bound=Hashable)
+
+
+def reached(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> dict[N, None]:
+    """The roots and all that can be reached from them, each once, in the order in which they are met: depth first."""
+    found: dict[N, None] = {}
+    stack = [*roots][::-1]
+    while stack:
+        node = stack.pop()
+        if node not in found:
+            found[node] = None
+            stack.extend([*successors(node)][::-1])
+    return found
 
 
 def strong_components(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> Iterator[list[N]]:

@@ -11,7 +11,7 @@ from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING, assert_never
 
-from avow.base.graphs import components
+from avow.base.graphs import components, reached
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, Phase, Settled
@@ -257,12 +257,7 @@ def _pruned(certificate: Certificate, goal: Statement) -> Certificate:
     at = next((i for i, e in enumerate(certificate.entries) if (e.how, e.node, e.digest) == wanted), None)
     if at is None:
         return Certificate(certificate.scope, ())
-    kept, stack = {at}, [at]
-    while stack:
-        for i in certificate.entries[stack.pop()].named():
-            if i not in kept:
-                kept.add(i)
-                stack.append(i)
+    kept = reached([at], lambda i: certificate.entries[i].named())
     ranks = {old: new for new, old in enumerate(sorted(kept))}
 
     def renumbered(question: Question) -> Question:
@@ -306,11 +301,4 @@ def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
 
 
 def _behind(into: Mapping[str, list[str]], node: str) -> frozenset[str]:
-    found: set[str] = set()
-    stack = [node]
-    while stack:
-        for source in into.get(stack.pop(), ()):
-            if source not in found:
-                found.add(source)
-                stack.append(source)
-    return frozenset(found)
+    return frozenset(reached(into.get(node, ()), lambda name: into.get(name, ())))

@@ -122,7 +122,7 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
     consumer = condition.consumer
     attempts = tuple(solver.attempts(condition, [*condition.providers], solver.selected))
     same, before = attempts[-1]
-    if settled.circle or any(consumer in solver.ancestors(name, solver.selected) for name in same):
+    if settled.circle or any(consumer in frame.graph.ancestors(name, solver.selected) for name in same):
         return ()
     found: list[tuple[Phase, tuple[Offer, ...]]] = []
     for case in settled.cases:
@@ -302,7 +302,7 @@ class _Solver:
         first = before if condition.delayed else ()
         yield near, first
         tried = {(near, first)}
-        ancestors = self.ancestors(consumer, allowed)
+        ancestors = self.frame.graph.ancestors(consumer, allowed)
         # What holds one step earlier holds of every selected node: each step's assumptions come before the next's.
         earlier = tuple(
             dict.fromkeys(
@@ -321,17 +321,6 @@ class _Solver:
 
     def feeds(self, provider: str, consumer: str, *, delayed: bool) -> bool:
         return any(e.source.node == provider and e.delayed is delayed for e in self.frame.graph.feeding(consumer))
-
-    def ancestors(self, node: str, allowed: frozenset[str]) -> tuple[str, ...]:
-        """The allowed nodes from which values flow to a node within one step."""
-        found: dict[str, None] = {}
-        stack = [node]
-        while stack:
-            for provider in reversed(self.frame.graph.providers(stack.pop(), delayed=False)):
-                if provider in allowed and provider != node and provider not in found:
-                    found[provider] = None
-                    stack.append(provider)
-        return tuple(found)
 
     def case(
         self,

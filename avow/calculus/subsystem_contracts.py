@@ -13,7 +13,7 @@ is `Derived` in proofs/instances.dfy; the kernel's certificates are of the nodes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 
 from avow.base.records import dataclass
@@ -199,9 +199,9 @@ def _carrying(frame: Frame, goal: Goal, name: ClauseName) -> tuple[ClauseName, .
     inside = {frame.output(node, port.name) for node in goal.nodes for port in frame.node(node).outputs}
     if inside.isdisjoint(free_variables(claim)):
         return ()
-    after = _reached(name.node, frame.graph.consumers, selected)
+    after = frame.graph.heirs(name.node, selected)
     known: dict[ClauseName, Term] = {}
-    for provider in _reached(name.node, frame.graph.providers, selected):
+    for provider in frame.graph.ancestors(name.node, selected):
         if provider not in after:
             known |= {
                 ClauseName(provider, c.name): frame.clause(provider, c.name) for c in frame.node(provider).clauses
@@ -215,18 +215,6 @@ def _carrying(frame: Frame, goal: Goal, name: ClauseName) -> tuple[ClauseName, .
         spoken = spoken.union(*map(free_variables, found.values()))
         growing = bool(found)
     return tuple(each for each in known if each in near)
-
-
-def _reached(node: str, neighbours: Callable[..., tuple[str, ...]], selected: frozenset[str]) -> tuple[str, ...]:
-    """The other selected nodes to which edges of the same step lead, one way or the other."""
-    found: dict[str, None] = {}
-    stack = [node]
-    while stack:
-        for neighbour in reversed(neighbours(stack.pop(), delayed=False)):
-            if neighbour in selected and neighbour != node and neighbour not in found:
-                found[neighbour] = None
-                stack.append(neighbour)
-    return tuple(found)
 
 
 def with_persistence(frame: Level, goal: Goal) -> Goal:

@@ -9,11 +9,11 @@ lets a node feed itself; an input named by a connection takes that source and no
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.base.graphs import components, cycles_in
+from avow.base.graphs import components, cycles_in, reached
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.contract import Node, Port
@@ -67,13 +67,23 @@ class Graph:
 
     def upstream(self, node: str) -> frozenset[str]:
         """The nodes from which data reaches a node, at once or with delay: itself only where it is on a cycle."""
-        found: set[str] = set()
-        stack = [node]
-        while stack:
-            more = {edge.source.node for edge in self.feeding(stack.pop())} - found
-            found |= more
-            stack += more
-        return frozenset(found)
+        return frozenset(reached(self.providers(node), self.providers))
+
+    def ancestors(self, node: str, among: Collection[str]) -> tuple[str, ...]:
+        """The other nodes among these from which values flow to a node within one step."""
+        return self._within_a_step(node, among, self.providers)
+
+    def heirs(self, node: str, among: Collection[str]) -> tuple[str, ...]:
+        """The other nodes among these to which values flow from a node within one step."""
+        return self._within_a_step(node, among, self.consumers)
+
+    def _within_a_step(
+        self, node: str, among: Collection[str], next_to: Callable[..., tuple[str, ...]]
+    ) -> tuple[str, ...]:
+        def neighbours(name: str) -> list[str]:
+            return [n for n in next_to(name, delayed=False) if n in among and n != node]
+
+        return tuple(reached(neighbours(node), neighbours))
 
     def providers(self, node: str, *, delayed: bool | None = None) -> tuple[str, ...]:
         """The nodes that feed a node (with or without itself, as the edges have it), each once."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.graphs import reached
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.language.contract import Node, Port
@@ -132,17 +133,14 @@ def files(job: Job) -> tuple[Path, ...]:
     root = job.root.resolve()
     named = [source.cpp, source.parameters]
     extra = job.options.get("sources", [])
-    named += [name for name in extra if isinstance(name, str)] if isinstance(extra, list) else []
-    found = {path: None for name in named if name and (path := inside(job.root, name)) is not None}
+    named += extra if isinstance(extra, list) else [extra]
+    found = [path for name in named if name and (path := inside(job.root, name)) is not None]
     folders = _paths(job, "include", Path.is_dir)[0]
-    waiting = list(found)
-    while waiting:
-        file = waiting.pop()
-        for beside in _included(file, folders):
-            if beside not in found and beside.resolve().is_relative_to(root):
-                found[beside] = None
-                waiting.append(beside)
-    return tuple(found)
+
+    def included(file: Path) -> Iterator[Path]:
+        return (beside for beside in _included(file, folders) if beside.resolve().is_relative_to(root))
+
+    return tuple(reached(found, included))
 
 
 def _included(file: Path, folders: list[Path]) -> Iterator[Path]:

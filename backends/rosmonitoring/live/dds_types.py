@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.graphs import reached
 from avow.ros.bags import plainer
 from avow.ros.dds import dds_type
 from avow.ros.definitions import Array, Definitions, Field, Message, Nested, Scalar, Wire, parse_message
@@ -126,20 +127,16 @@ class Types:
 
     def _names(self, message: Message) -> list[str]:
         """The types that a message is made of, and its own."""
-        found: dict[str, None] = {}
-        stack = [message.name]
-        while stack:
-            name = stack.pop()
-            if name in found:
-                continue
-            found[name] = None
-            for inner in self._message(name).fields:
-                wire = inner.wire.item if isinstance(inner.wire, Array) else inner.wire
+
+        def inner(name: str) -> Iterator[str]:
+            for each in self._message(name).fields:
+                wire = each.wire.item if isinstance(each.wire, Array) else each.wire
                 if isinstance(wire, Nested):
-                    stack.append(wire.name)
+                    yield wire.name
                 elif wire.name in _TIME:
-                    stack.append(_TIME[wire.name].name)
-        return list(found)
+                    yield _TIME[wire.name].name
+
+        return list(reached([message.name], inner))
 
     def _idl(self, wire: Wire) -> Any:
         match wire:
