@@ -2,9 +2,10 @@
 follows.
 
 Writing, reading and the schema come from the same type hints, so they cannot drift apart. Reading is strict: an unknown
-or missing field, or a value of another type, is `Unreadable`, never a guess. What a field of type Any holds is made
-plain when it is written (fractions, paths, enumerations become texts). A NamedTuple is a row, a list without names, for
-what there are thousands of; bytes are text in base64. Of a union, what is read is the first that the data fits.
+or missing field, a value of another type, a key that stands twice, or what is no number, is `Unreadable`, never a
+guess; all that is wrong is told at once. What a field of type Any holds is made plain when it is written (fractions,
+paths, enumerations become texts). A NamedTuple is a row, a list without names, for what there are thousands of; bytes
+are text in base64. Of a union, what is read is the first that the data fits.
 
 Plain dictionaries are made elsewhere only where a standard says what is in them (SARIF, in-toto, DSSE, JUnit,
 CycloneDX, ReqIF, ROS), where a command shows what no dataclass holds, and in `avow.pipeline.blobs`, whose values share
@@ -18,12 +19,15 @@ import dataclasses
 import json
 import math
 import re
+import sys
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
+
+from avow.tuning.shown import FAULTS
 
 T = TypeVar("T")
 Read = Callable[[Any], Any]
@@ -37,8 +41,24 @@ def called(key: str) -> Mapping[str, Any]:
     return {"avow.key": key}
 
 
+class Foreign:
+    """Base of dataclasses for another program's format: of its fields only those that we read are declared, others are
+    passed over, and one with a default may be missing."""
+
+    __slots__ = ()
+
+
 class Unreadable(ValueError):  # noqa: N818 - it says what the text is
-    """Text that is not what it should be: torn, edited, or of another program."""
+    """Text that is not what it should be: torn, edited, or of another program. `faults`: each with its place."""
+
+    def __init__(self, *faults: str) -> None:
+        self.faults = faults
+        more = [f"{len(faults) - FAULTS} more"] if len(faults) > FAULTS else []
+        super().__init__("; ".join([*faults[:FAULTS], *more]))
+
+    def within(self, place: str) -> list[str]:
+        """The faults, where what was read stands at a place of something larger."""
+        return [place + fault for fault in self.faults]
 
 
 def canonical(value: object) -> str:
@@ -107,16 +127,37 @@ def from_json(kind: type[T], data: object) -> T:
     try:
         found: T = _reader(typing.cast(Any, kind))(data)
     except Unreadable as error:
-        raise Unreadable(f"{kind.__name__.lower()}{error}") from None
+        raise Unreadable(*error.within(kind.__name__.lower())) from None
     return found
 
 
 def from_text(kind: type[T], text: str | bytes) -> T:
     """As `from_json`, of the JSON text. Raises Unreadable, whatever the text is."""
+    return from_json(kind, parsed(text))
+
+
+def parsed(text: str | bytes) -> Any:
+    """The plain data of a JSON text, of which all readers of JSON would say the same. Raises Unreadable."""
     try:
-        return from_json(kind, json.loads(text))
-    except (ValueError, RecursionError) as error:
+        return json.loads(text, object_pairs_hook=once, parse_constant=_no_number)
+    except RecursionError:
+        raise Unreadable("it is nested too deeply") from None
+    except ValueError as error:
         raise Unreadable(str(error)) from None
+
+
+def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object each of whose keys stands once: readers of JSON differ in which value of a repeated one they take."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        double = next(key for key in keys if keys.count(key) > 1)
+        raise Unreadable(f"the key {json.dumps(double[:60])} stands twice in one object")
+    return found
+
+
+def _no_number(word: str) -> Any:
+    raise Unreadable(f"{word} is no number of JSON")
 
 
 class _Field(NamedTuple):
@@ -133,7 +174,16 @@ def _fields(kind: type) -> dict[str, _Field]:
 
 
 def _later(kind: type) -> frozenset[str]:
-    return frozenset(key for key, field in _fields(kind).items() if field.later)
+    """Fields that may be missing."""
+    return frozenset(
+        field.metadata.get("avow.key", field.name)
+        for field in dataclasses.fields(kind)
+        if "avow.later" in field.metadata
+        or (issubclass(kind, Foreign) and (field.default, field.default_factory) != (_MISSING, _MISSING))
+    )
+
+
+_MISSING = dataclasses.MISSING
 
 
 @cache
@@ -155,48 +205,52 @@ def _reader(kind: Any) -> Read:
 
 
 def _of_fields(kind: type) -> Read:
-    later, names = _later(kind), frozenset(_fields(kind))
-    readers = {key: (field.name, _reader(field.hint)) for key, field in _fields(kind).items()}
-    told = dataclasses.fields(kind)
-    defaults = [f.default if key in later else dataclasses.MISSING for key, f in zip(readers, told, strict=True)]
-    in_order = [(key, read, default) for (key, (_, read)), default in zip(readers.items(), defaults, strict=True)]
+    fields, foreign, told = _fields(kind), issubclass(kind, Foreign), dataclasses.fields(kind)
+    names, needed = list(fields), fields.keys() - _later(kind)
+    in_order = [
+        (key, _reader(field.hint), _MISSING if key in needed else one.default)
+        for (key, field), one in zip(fields.items(), told, strict=True)
+    ]
     by_place = all(f.init and not f.kw_only for f in told)
-
-    def at_once(data: dict[str, Any]) -> list[Any]:
-        """The values in the order of the fields, where all is as it should be: nearly always. Else none."""
-        values, there = [], 0
-        try:
-            for key, read, default in in_order:
-                if key in data:
-                    values.append(read(data[key]))
-                    there += 1
-                elif default is dataclasses.MISSING:
-                    return []
-                else:
-                    values.append(default)
-        except Unreadable:
-            return []
-        return values if by_place and there == len(data) else []
 
     def whole(data: Any) -> Any:
         if type(data) is not dict:
             raise Unreadable(f": not a {kind.__name__}")
-        if found := at_once(data):
-            return kind(*found)
-        if data.keys() != names:
-            missing, extra = names - later - data.keys(), data.keys() - names
+        values: list[Any] = []
+        there, faults = 0, tuple[str, ...]()
+        for key, read, default in in_order:
+            if key in data:
+                there += 1
+                try:
+                    values.append(read(data[key]))
+                except Unreadable as error:
+                    faults = (*faults, *error.within(f".{key}"))
+            else:
+                values.append(default)
+        if there != len(data) or (there != len(names) and not needed <= data.keys()):
+            missing, extra = needed - data.keys(), () if foreign else data.keys() - fields.keys()
             if missing or extra:
-                raise Unreadable(f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}")
-        values = {}
-        for key, item in data.items():
-            name, read = readers[key]
-            try:
-                values[name] = read(item)
-            except Unreadable as error:
-                raise Unreadable(f".{key}{error}") from None
-        return kind(**values)
+                faults = (f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}", *faults)
+        if faults:
+            raise Unreadable(*faults)
+        if by_place and (there == len(names) or not any(value is _MISSING for value in values)):
+            return kind(*values)
+        return kind(**{fields[key].name: value for key, value in zip(names, values, strict=True) if key in data})
 
     return whole
+
+
+def _every(reads: Iterable[tuple[str, Read, Any]]) -> list[Any]:
+    """What is read at each place. Raises Unreadable, with all faults."""
+    found, faults = list[Any](), list[str]()
+    for place, read, item in reads:
+        try:
+            found.append(read(item))
+        except Unreadable as error:
+            faults += error.within(place)
+    if faults:
+        raise Unreadable(*faults)
+    return found
 
 
 def _row(kind: Any) -> tuple[Any, ...]:
@@ -228,7 +282,11 @@ def _of_tuple(arguments: tuple[Any, ...]) -> Read:
         one = _reader(arguments[0])
 
         def several(data: Any) -> tuple[Any, ...]:
-            return tuple(map(one, _list(data)))
+            items = _list(data)
+            try:
+                return tuple(map(one, items))
+            except Unreadable:
+                return tuple(_every((f"[{at}]", one, item) for at, item in enumerate(items)))
 
         return several
     readers = tuple(map(_reader, arguments))
@@ -236,7 +294,11 @@ def _of_tuple(arguments: tuple[Any, ...]) -> Read:
     def fixed(data: Any) -> tuple[Any, ...]:
         if len(_list(data)) != len(readers):
             raise Unreadable(f": {len(readers)} items are wanted")
-        return tuple(read(item) for read, item in zip(readers, data, strict=True))
+        try:
+            return tuple([read(item) for read, item in zip(readers, data, strict=True)])
+        except Unreadable:
+            reads = enumerate(zip(readers, data, strict=True))
+            return tuple(_every((f"[{at}]", read, item) for at, (read, item) in reads))
 
     return fixed
 
@@ -251,7 +313,10 @@ def _of_mapping(read: Read) -> Read:
     def mapping(data: Any) -> dict[str, Any]:
         if type(data) is not dict:
             raise Unreadable(": not an object")
-        return {key: read(item) for key, item in data.items()}
+        try:
+            return {key: read(item) for key, item in data.items()}
+        except Unreadable:
+            return dict(zip(data, _every((f".{key}", read, item) for key, item in data.items()), strict=True))
 
     return mapping
 
@@ -290,6 +355,8 @@ def _of_enum(kind: type[StrEnum]) -> Read:
 def _float(data: Any) -> float:
     if type(data) not in (int, float):
         raise Unreadable(": not a number")
+    if not abs(data) <= sys.float_info.max:
+        raise Unreadable(": beyond all numbers of a machine")
     return float(data)
 
 

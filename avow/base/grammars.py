@@ -32,7 +32,7 @@ def lark_of(
     note = cache.with_suffix(".json")
     try:
         written = digest_file(cache)
-        known = (read_note(note) or {}).get("digest") == written
+        known = (read_note(dict[str, str], note) or {}).get("digest") == written
         if not known:
             cache.unlink()
     except FileNotFoundError:

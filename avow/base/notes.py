@@ -17,29 +17,31 @@ import pwd
 import secrets
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from avow.base.codec import from_json, parsed, to_json
 from avow.base.files import PART, read_regular, write
+
+T = TypeVar("T")
 
 _MARK = "mark"
 _KEY_BYTES = hashlib.sha256().digest_size
 
 
-def write_note(path: Path, data: Mapping[str, Any]) -> None:
-    """Raises OSError."""
-    body = dict(data)
+def write_note(path: Path, said: object) -> None:
+    """`said`: a dataclass, or a dictionary. Raises OSError."""
+    body = to_json(said)
     write(path, json.dumps({**body, _MARK: _mark(path, body)}) + "\n")
 
 
-def read_note(path: Path) -> dict[str, Any] | None:
+def read_note(kind: type[T], path: Path) -> T | None:
     """What this user's Avow wrote there, and nothing else."""
     try:
-        data = json.loads(read_regular(path))
+        data = parsed(read_regular(path))
         mark = data.pop(_MARK)
-        good = hmac.compare_digest(mark, _mark(path, data))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return from_json(kind, data) if hmac.compare_digest(mark, _mark(path, data)) else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
-    return data if good else None
 
 
 def sealed(path: Path, data: bytes) -> bytes:

@@ -7,12 +7,13 @@ import functools
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from avow.base import process
 from avow.base.files import digest_or_missing, identity, sha256
 from avow.base.notes import cache_folder, read_note, write_note
+from avow.base.records import dataclass
 from avow.tuning.running import VERSION_SECONDS
 from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
 
@@ -21,19 +22,32 @@ _SHARED = frozenset({"bin", "sbin", "lib", "lib64", "tmp", "etc", "dev"})
 
 
 def program_digest(places: tuple[str, ...]) -> str:
-    """SHA-256 of all files of `program_files` of these; empty where there are none. Kept, sealed, for as long as each
-    is the same by inode, size and times."""
+    """SHA-256 of all files of `program_files` of these; empty where there are none. Kept."""
     if not places:
         return ""
     files = sorted({file for place in places for file in program_files(place)})
-    mark = sha256(json.dumps([[str(file), _mark(file)] for file in files]))
-    note = cache_folder() / f"program-{sha256(json.dumps(places))[:16]}.json"
-    known = read_note(note) or {}
-    if known.get("of") != mark:
-        known = {"of": mark, "digest": sha256(json.dumps([[str(file), digest_or_missing(file)] for file in files]))}
+    return kept_digest(f"program-{sha256(json.dumps(places))[:16]}", {str(file): file for file in files})
+
+
+@dataclass(frozen=True, slots=True)
+class _Digest:
+    """Of files with these identities."""
+
+    of: str
+    digest: str
+
+
+def kept_digest(name: str, files: Mapping[str, Path]) -> str:
+    """SHA-256 of files, by what they are called. Kept, sealed, under that name, while each file is the same by its
+    identity: there are many, and some are large."""
+    mark = sha256(json.dumps([[str(file), _mark(file)] for file in files.values()]))
+    note = cache_folder() / f"{name}.json"
+    known = read_note(_Digest, note)
+    if known is None or known.of != mark:
+        known = _Digest(mark, sha256(json.dumps([[called, digest_or_missing(file)] for called, file in files.items()])))
         with contextlib.suppress(OSError):  # a read-only home costs that each time
             write_note(note, known)
-    return str(known["digest"])
+    return known.digest
 
 
 @functools.cache

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import digest_file, identity, sha256
+from avow.base.files import sha256
 from avow.base.notes import cache_folder, read_note, write_note
-from avow.base.programs import program_digest
+from avow.base.programs import kept_digest, program_digest
 from avow.base.records import dataclass
 from avow.tuning.running import VERSION_SECONDS
 
@@ -77,25 +77,13 @@ def package_version(name: str) -> str:
 @functools.cache
 def package_digest(name: str) -> str:
     """SHA-256 of all files of an installed top-level package, byte code aside; empty where there is none. Nothing is
-    imported. Kept, sealed, for as long as each file is the same by inode, size and times: libraries are large."""
+    imported. Kept, one for each environment."""
     spec = importlib.util.find_spec(name)
     if spec is None or not spec.submodule_search_locations:
         return ""
     place = Path(spec.submodule_search_locations[0])
     files = sorted(path for path in place.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-    try:
-        marks = [[str(file.relative_to(place)), *identity(file.stat(), file)] for file in files]
-        note = cache_folder() / f"package-{name}-{sha256(str(place))[:12]}.json"  # one for each environment
-        mark = sha256(json.dumps([str(place), marks]))
-        known = read_note(note) or {}
-        if known.get("of") != mark:
-            said = [[str(file.relative_to(place)), digest_file(file)] for file in files]
-            known = {"of": mark, "digest": sha256(json.dumps(said))}
-            with contextlib.suppress(OSError):  # a read-only home costs that each time
-                write_note(note, known)
-        return str(known["digest"])
-    except OSError:
-        return "unreadable"
+    return kept_digest(f"package-{name}-{sha256(str(place))[:12]}", {str(f.relative_to(place)): f for f in files})
 
 
 def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:
@@ -119,7 +107,7 @@ def _file() -> Path:
 
 
 def _read() -> dict[str, str]:
-    return {str(k): str(v) for k, v in (read_note(_file()) or {}).items()}
+    return read_note(dict[str, str], _file()) or {}
 
 
 def _remember(key: str, version: str) -> None:

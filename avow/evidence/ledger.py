@@ -66,6 +66,14 @@ class Damage:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """So many of a ledger's bytes, with this digest, were found without damage."""
+
+    bytes: int
+    sha256: str
+
+
 class Ledger:
     """One system's ledger file. Safe to use from several threads and several processes at once."""
 
@@ -218,16 +226,13 @@ class Ledger:
     def _remember(self) -> None:
         if self._remembers and not self._damage:
             with contextlib.suppress(OSError):  # the next run reads all of it again
-                write_note(self._note, {"bytes": self._offset, "sha256": self._digest.hexdigest()})
+                write_note(self._note, _Known(self._offset, self._digest.hexdigest()))
 
     def _remembered(self, data: bytes) -> int:
         """How many of a ledger's bytes were read before and found without damage."""
-        said = read_note(self._note) if self._remembers and not self._offset else None
-        match said:
-            case {"bytes": int(size), "sha256": str(digest)} if size <= len(data) and sha256(data[:size]) == digest:
-                return size
-            case _:  # no note, or one of another ledger
-                return 0
+        said = read_note(_Known, self._note) if self._remembers and not self._offset else None
+        known = said is not None and said.bytes <= len(data) and sha256(data[: said.bytes]) == said.sha256
+        return said.bytes if said is not None and known else 0
 
     def _mend(self, file: int) -> None:
         """Put a torn last line (a run was killed while writing it) aside, so that the chain goes on behind it."""

@@ -16,7 +16,6 @@ from avow.assurance.certification import KernelRun
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
-from avow.base import codec
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, is_intact, sha256
 from avow.base.git import head
@@ -77,7 +76,7 @@ def render(assessment: Assessment) -> Result:
     ledger = ledger_of(assessment.workspace.ledger(assessment.system))
     acknowledge(assessment.workspace, ledger)
     key = _key(assessment)
-    known = _read(assessment)
+    known = read_note(Rendering, assessment.stamp)
     root = assessment.workspace.root
     if known is not None and known.key == key and all(is_intact(root / p, sha) for p, sha in known.files.items()):
         result = known.result
@@ -89,7 +88,7 @@ def render(assessment: Assessment) -> Result:
         rendered = render_all(case, assessment.workspace.report(assessment.system), signing_key())
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
-        write_note(assessment.stamp, codec.to_json(Rendering(key, files, result)))
+        write_note(assessment.stamp, Rendering(key, files, result))
         assessment.state.changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
     return result
@@ -283,10 +282,3 @@ class Rendering:
     key: str
     files: Mapping[str, str]
     result: Result
-
-
-def _read(assessment: Assessment) -> Rendering | None:
-    try:
-        return codec.from_json(Rendering, read_note(assessment.stamp))
-    except codec.Unreadable:
-        return None

@@ -17,6 +17,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.base.remembered import Shelf
 from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
@@ -26,16 +27,26 @@ from avow.system.plan import Located, Method, System
 from avow.tuning.shown import WARNINGS
 
 
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What the last check was of, its warnings, and the keys of the methods of which there was nothing to say."""
+
+    key: str
+    warnings: tuple[str, ...]
+    clean: tuple[str, ...]
+
+
 def is_current(workspace: Workspace, surveyed: Survey) -> bool:
-    stamp = read_note(_stamp(workspace, surveyed))
-    return stamp is not None and stamp.get("key") == _key(surveyed)
+    stamp = read_note(Checked, _stamp(workspace, surveyed))
+    return stamp is not None and stamp.key == _key(surveyed)
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
     """Raises Rejected with all errors; warnings go into the report, the first few also to the terminal. A method of
     which there was nothing to say is not asked about again while its slice is the same."""
     keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
-    known = set((read_note(_stamp(workspace, surveyed)) or {}).get("clean", ()))
+    before = read_note(Checked, _stamp(workspace, surveyed))
+    known = set(before.clean) if before is not None else set()
     clean = {name for name, key in keys.items() if key in known}
     found = diagnostics(surveyed.system, clean, surveyed.shelf)
     if surveyed.shelf is not None:
@@ -43,10 +54,10 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
     errors = tuple(d for d in found if d.is_error)
     if errors:
         raise Rejected(*found)
-    warnings = [f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING]
+    warnings = tuple(f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING)
     _tell(workspace, surveyed.system.name, found)
-    kept = sorted(keys[name] for name in clean if name in keys)
-    write_note(_stamp(workspace, surveyed), {"key": _key(surveyed), "warnings": warnings, "clean": kept})
+    kept = tuple(sorted(keys[name] for name in clean if name in keys))
+    write_note(_stamp(workspace, surveyed), Checked(_key(surveyed), warnings, kept))
 
 
 def _depends_on_slice(work: Work) -> bool:

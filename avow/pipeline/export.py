@@ -6,14 +6,15 @@ import json
 import os
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from avow.backend_kit import one_step
+from avow.base.codec import LATER
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import identity, is_intact, sha256, write
 from avow.base.notes import read_note, write_note
+from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
@@ -24,6 +25,15 @@ from avow.tuning.running import SETTLED_NS
 STAMP = ".export.json"
 
 
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """Of what files were generated, their digests, and their identities where they were looked at since."""
+
+    key: str
+    files: Mapping[str, str]
+    seen: str = field(default="", metadata=LATER)
+
+
 def folder(workspace: Workspace, work: Work) -> Path:
     return workspace.node(work.system.name, work.node, work.method)
 
@@ -32,17 +42,17 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
     """Whether the files on disk are what this key generated: an edited or missing artifact is not."""
     place = folder(workspace, work)
     stamp = read_stamp(place)
-    if stamp is None or stamp.get("key") != key:
+    if stamp is None or stamp.key != key:
         return False
-    files = stamp["files"]
+    files = stamp.files
     try:
         seen, settled = _marks(place, files)
-        if stamp.get("seen") == seen:
+        if stamp.seen == seen:
             return True
         if not all(is_intact(place / name, sha) for name, sha in files.items()):
             return False
         if settled and _marks(place, files) == (seen, True):
-            write_note(place / STAMP, {"key": key, "files": files, "seen": seen})
+            write_note(place / STAMP, Stamp(key, files, seen))
     except OSError:  # a file that is gone; where nothing can be written, files are read every time
         return all(is_intact(place / name, sha) for name, sha in files.items())
     return True
@@ -101,33 +111,36 @@ def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     place = folder(workspace, work)
     for name in files:
         _inside(name, work)
-    old = read_stamp(place)
-    for name in (old or {}).get("files", {}):
+    for name in _listed(place):
         if name not in files:
             (place / name).unlink(missing_ok=True)
     for name, text in files.items():
         write(place / name, text)
     digests = {name: sha256(text) for name, text in sorted(files.items())}
-    write_note(place / STAMP, {"key": key, "files": digests})
+    write_note(place / STAMP, Stamp(key, digests))
     return tuple(sorted(files))
 
 
 def clean(workspace: Workspace, work: Work, dryrun: bool) -> None:
     """Remove what was generated, and only that."""
     place = folder(workspace, work)
-    for name in (*(read_stamp(place) or {"files": {}})["files"], STAMP):
+    for name in (*_listed(place), STAMP):
         if (place / name).is_file():
             print(f"{workspace.relative(place / name)}: removed")
             if not dryrun:
                 (place / name).unlink()
 
 
-def read_stamp(place: Path) -> dict[str, Any] | None:
-    stamp = read_note(place / STAMP)
-    if stamp is None or not isinstance(stamp.get("files"), dict):
-        return None
+def _listed(place: Path) -> Iterable[str]:
+    """The names of the files that were generated there."""
+    stamp = read_stamp(place)
+    return stamp.files if stamp is not None else ()
+
+
+def read_stamp(place: Path) -> Stamp | None:
+    stamp = read_note(Stamp, place / STAMP)
     # what is listed here is removed once it is generated no more: never what lies elsewhere
-    return stamp if all(_is_within(name) for name in stamp["files"]) else None
+    return stamp if stamp is not None and all(_is_within(name) for name in stamp.files) else None
 
 
 def _inside(name: str, work: Work) -> None:

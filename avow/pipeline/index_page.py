@@ -7,6 +7,7 @@ from pathlib import Path
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, is_intact, write
 from avow.base.notes import read_note, write_note
+from avow.base.records import dataclass
 from avow.pipeline.assess import case_of
 from avow.pipeline.run_info import signing_key
 from avow.pipeline.state import State
@@ -24,13 +25,21 @@ def earlier(state: State) -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in reports.glob("*/report.json") if p.parent.name not in read))
 
 
+@dataclass(frozen=True, slots=True)
+class _Overview:
+    """Of the page as it was written: its digest, and the systems that it says are of an earlier state."""
+
+    sha256: str
+    earlier: tuple[str, ...]
+
+
 def index_is_due(state: State) -> bool:
     """Whether the page over all systems no longer shows what its systems' reports show."""
-    known = read_note(state.workspace.artifacts / OVERVIEW) or {}
-    if state.changed or list(earlier(state)) != known.get("earlier", []):
+    known = read_note(_Overview, state.workspace.artifacts / OVERVIEW) or _Overview("", ())
+    if state.changed or earlier(state) != known.earlier:
         return True
     page = state.workspace.reports / "index.html"
-    return bool(state.assessments and state.results.all and not is_intact(page, str(known.get("sha256"))))
+    return bool(state.assessments and state.results.all and not is_intact(page, known.sha256))
 
 
 def write_overview(state: State) -> None:
@@ -42,7 +51,7 @@ def write_overview(state: State) -> None:
     if cases or old:
         write_index(cases, workspace.reports, old)
         page = digest_file(workspace.reports / "index.html")
-        write_note(workspace.artifacts / OVERVIEW, {"sha256": page, "earlier": list(old)})
+        write_note(workspace.artifacts / OVERVIEW, _Overview(page, old))
 
 
 def mark_earlier(state: State) -> None:

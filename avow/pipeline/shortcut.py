@@ -21,10 +21,10 @@ from datetime import datetime
 from pathlib import Path
 
 import avow.backends
-from avow.base import codec
 from avow.base.files import identity
 from avow.base.notes import read_note, write_note
 from avow.base.programs import program_files
+from avow.base.records import dataclass
 from avow.base.tools import package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
@@ -40,6 +40,16 @@ _OURS = (".doit.json", ".lock", ".settled.json")
 """Among the artifacts: doit's own memory and our locks, which change with every run."""
 _PACKAGES = ("z3", "cvc5", "hypothesis")
 """Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Settled:
+    """What a complete run was of, and what came of it."""
+
+    sources: str
+    identity: str
+    observed: tuple[Observed, ...]
+    results: tuple[Result, ...]
 
 
 class Shortcut:
@@ -64,18 +74,16 @@ class Shortcut:
         if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
             return None
         try:
-            kept = read_note(_stamp(self.workspace)) or {}
-            results = tuple(codec.from_json(Result, r) for r in kept["results"])
-            observed = codec.from_json(tuple[Observed, ...], kept["observed"])
-            if self._begun is None or kept["sources"] != self._begun:  # then the rest need not be looked at
+            kept = read_note(_Settled, _stamp(self.workspace))
+            if kept is None or self._begun != kept.sources:  # then the rest need not be looked at
                 return None
-            if kept["identity"] != _identity(self.workspace, self._begun, observed):
+            if kept.identity != _identity(self.workspace, kept.sources, kept.observed):
                 return None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError):
             return None
-        names = {r.system for r in results}
+        names = {r.system for r in kept.results}
         asked = {name.partition(":")[2] for name in wanted}
-        return results if asked - {""} <= names else None
+        return kept.results if asked - {""} <= names else None
 
     def keep(self, results: Sequence[Result], programs: Iterable[str] = ()) -> None:
         """Note that everything is settled as things stand, the outside tools' `programs` too. Without effect where a
@@ -88,13 +96,8 @@ class Shortcut:
                 return
             tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
             observed = (*_observed(self.workspace), *dict.fromkeys(tools))
-            kept = {
-                "sources": sources,
-                "identity": _identity(self.workspace, sources, observed),
-                "observed": codec.to_json(observed),
-                "results": codec.to_json(tuple(results)),
-            }
-            write_note(_stamp(self.workspace), kept)
+            identity = _identity(self.workspace, sources, observed)
+            write_note(_stamp(self.workspace), _Settled(sources, identity, observed, tuple(results)))
         except OSError:
             return
 

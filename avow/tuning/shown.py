@@ -35,6 +35,9 @@ SENTENCE_CHARACTERS = 60
 DIAGNOSTICS = 200
 """More than this of one file are of no use to anyone: reading ends there."""
 
+FAULTS = 20
+"""Faults of one JSON text that a message lists: whoever mends so many tries again."""
+
 WARNINGS = 3
 """Warnings of a system that a run prints, a line each: `avow check` shows all."""
 

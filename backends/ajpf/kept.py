@@ -10,17 +10,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
-from avow.base.codec import Unreadable, from_json, to_json
 from avow.base.notes import cache_folder, read_note, write_note
-from avow.evidence.record import OBSERVED
 from avow.isolation.observed import Observed, look
 
 from .ajpf_tool import Answer, Said
 
+K = TypeVar("K", "_Kept", "_Told")
 _FORM = 3
 """Of what is asked and how answers are read: another number, and nothing that was kept counts."""
 
@@ -31,46 +31,56 @@ def key(files: Mapping[str, str], formula: str, mark: str) -> str:
     return sha256(json.dumps([_FORM, asked, formula, mark], sort_keys=True).encode()).hexdigest()
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What AJPF decided (`Answer`); `observed` in both, of what it looked at besides its files."""
+
+    said: Said
+    path: tuple[int, ...]
+    log: str
+    framework: str
+    observed: tuple[Observed, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What AIL printed."""
+
+    told: str
+    observed: tuple[Observed, ...]
+
+
 def recall(key: str) -> Answer | None:
-    data = read_note(_path(key))
-    if data is None or data.get("said") not in (Said.HOLDS, Said.VIOLATED):
+    kept = _as_it_was(_Kept, key)
+    if kept is None or kept.said not in (Said.HOLDS, Said.VIOLATED):
         return None
-    said, observed = Said(data["said"]), _as_it_was(data)
-    if observed is None:
-        return None
-    return Answer(said, "", tuple(data["path"]), data["log"], data["framework"], kept=True, observed=observed)
+    return Answer(kept.said, "", kept.path, kept.log, kept.framework, kept=True, observed=kept.observed)
 
 
 def keep(key: str, answer: Answer) -> None:
     """Where it cannot be written, it will be asked again."""
     if answer.said not in (Said.HOLDS, Said.VIOLATED):
         return
-    said = {"said": str(answer.said), "path": list(answer.path), "log": answer.log, "framework": answer.framework}
-    said[OBSERVED] = to_json(answer.observed)
     with suppress(OSError):
-        write_note(_path(key), said)
+        write_note(_path(key), _Kept(answer.said, answer.path, answer.log, answer.framework, answer.observed))
 
 
 def told(key: str) -> tuple[str, tuple[Observed, ...]] | None:
     """What AIL printed in a run with these files, and what it looked at, where that was kept."""
-    data = read_note(_path(key))
-    text, observed = (data.get("told"), _as_it_was(data)) if data is not None else (None, None)
-    return (text, observed) if isinstance(text, str) and observed is not None else None
+    kept = _as_it_was(_Told, key)
+    return (kept.told, kept.observed) if kept is not None else None
 
 
 def keep_told(key: str, text: str, observed: tuple[Observed, ...]) -> None:
     """Where it cannot be written, the run will be done again."""
     with suppress(OSError):
-        write_note(_path(key), {"told": text, OBSERVED: to_json(observed)})
+        write_note(_path(key), _Told(text, observed))
 
 
-def _as_it_was(data: Mapping[str, Any]) -> tuple[Observed, ...] | None:
-    """What was looked at, where all of it is as it was."""
-    try:
-        observed = from_json(tuple[Observed, ...], data.get(OBSERVED, []))
-    except Unreadable:
-        return None
-    return observed if all(look(o.kind, o.path) == o.digest for o in observed) else None
+def _as_it_was(kind: type[K], key: str) -> K | None:
+    """What was kept, where all that was looked at is as it was."""
+    kept = read_note(kind, _path(key))
+    return kept if kept is not None and all(look(o.kind, o.path) == o.digest for o in kept.observed) else None
 
 
 def _path(key: str) -> Path:

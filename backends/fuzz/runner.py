@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import resource
 import secrets
@@ -13,17 +12,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
 from avow.base import process
-from avow.base.codec import to_json
+from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.verdict import Isolation
 from avow.isolation import judge
 from avow.isolation.level import available, sealed
+from avow.isolation.observed import Observed
 from avow.isolation.program import Program
-from avow.isolation.subject import SubjectFailed
+from avow.isolation.subject import Message, SubjectFailed
 from avow.tuning.running import SUBJECT_PATIENCE
 
 _OPTIONS = {
@@ -33,34 +34,102 @@ _OPTIONS = {
 _SCRATCH = "/tmp/avow-scratch"
 
 
-def campaign(question: dict[str, Any]) -> dict[str, Any]:
-    """One run of libFuzzer. `done`: it ended as it should, with so many runs; nothing that the subject prints says
-    so."""
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """One run of libFuzzer is wanted."""
+
+    folder: str
+    kept: str
+    options: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Campaigned:
+    """`done`: it ended as it should, with so many runs; nothing that the subject prints says so."""
+
+    code: int | None
+    done: int
+    fault: str
+    log: str
+    isolation: Isolation
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Runs, each of so many commands, are wanted of the program and of its `twin`, if one is named; so many of them may
+    end it."""
+
+    program: str
+    twin: str
+    runs: tuple[tuple[str, ...], ...]
+    crashes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The answers of one run, and the signal that ended it, if one did."""
+
+    replies: tuple[Any, ...]
+    crash: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    runs: tuple[Run, ...]
+    fault: str
+    silent: bool
+    unsteady: int | None
+    """The first run that the twin answers otherwise."""
+    observed: tuple[Observed, ...]
+    isolation: Isolation
+
+
+@dataclass(frozen=True, slots=True)
+class Show:
+    """One run is wanted of the program with sanitizers."""
+
+    program: str
+    commands: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """Its answers as far as they go, and the report with which it ends."""
+
+    replies: tuple[Any, ...]
+    code: int | None
+    log: str
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What the process is asked, in a file; `root` is the system's folder."""
+
+    ask: Campaign | Runs | Show
+    root: str
+    seconds: float
+
+
+def campaign(asked: Campaign, question: Question) -> Campaigned:
     level = available()
-    folder, kept = Path(question["folder"]), Path(question["kept"])
+    folder, kept = Path(asked.folder), Path(asked.kept)
     nonce = secrets.token_hex(16)
     channel = judge.Channel()
     source, nonces = os.pipe()
     os.write(nonces, nonce.encode() + b"\n")
     os.close(nonces)
-    command = [str(folder / "fuzz"), *question["options"], f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
+    command = [str(folder / "fuzz"), *asked.options, f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
     if level is Isolation.SEALED:
-        command = sealed(command, (folder, Path(question["root"])), _SCRATCH, (kept,))
+        command = sealed(command, (folder, Path(question.root)), _SCRATCH, (kept,))
     told = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
-    code, left, said, text = _ended(command, kept, question["seconds"], channel, told, source)
+    code, left, said, text = _ended(command, kept, question.seconds, channel, told, source)
     words = said.split()
     closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
     fault = "the source left processes behind" if left and level is not Isolation.SEALED else ""
     if closed and words[1] == "left":
         fault = fault or "the source ended the process within a step"
-    return {
-        "code": code,
-        "done": int(words[2]) if done and words[2].isdigit() else 0,
-        "fault": fault,
-        "log": text[-20_000:],
-        "isolation": level.value,
-    }
+    return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, text[-20_000:], level)
 
 
 def _ended(
@@ -99,37 +168,31 @@ def _ended(
         return code, left, said.decode("utf-8", "replace"), log.read(1 << 20).decode("utf-8", "replace")
 
 
-def asked(question: dict[str, Any]) -> dict[str, Any]:
+def answered(asked: Runs, question: Question) -> Answered:
     """The runs, each on a node of its own; and once more in the other order, by another process, of a build in which
     what nothing was written to holds other bytes: what comes of chance, of the clock, of such bytes, or of the runs
     before is no answer to a run."""
-    end = time.monotonic() + question["seconds"]
-    runs: list[list[str]] = question["runs"]
-    first, faults, program = _all(question, Path(question["program"]), runs, end)
+    end = time.monotonic() + question.seconds
+    first, faults, program = _all(asked.program, asked.runs, asked.crashes, question.root, end)
     silent = bool(program.silent)
     unsteady = None
-    if question["twin"] and not faults:
-        order = [k for k in reversed(range(len(first))) if not first[k]["crash"]]
-        again, faults, twin = _all(question, Path(question["twin"]), [runs[k] for k in order], end)
+    if asked.twin and not faults:
+        order = [k for k in reversed(range(len(first))) if not first[k].crash]
+        runs = [asked.runs[k] for k in order]
+        again, faults, twin = _all(asked.twin, runs, asked.crashes, question.root, end)
         silent = bool(twin.silent)
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
                 unsteady = k
-    return {
-        "runs": first,
-        "fault": faults,
-        "silent": silent,
-        "unsteady": unsteady,
-        "observed": to_json(program.observed()[1:]),  # no interpreter runs it
-        "isolation": program.isolation.value,
-    }
+    observed = program.observed()[1:]  # no interpreter runs it
+    return Answered(tuple(first), faults, silent, unsteady, observed, program.isolation)
 
 
 def _all(
-    question: dict[str, Any], path: Path, runs: list[list[str]], end: float
-) -> tuple[list[dict[str, Any]], str, Program]:
-    program = Program(path, SUBJECT_PATIENCE, Path(question["root"]))
-    found: list[dict[str, Any]] = []
+    path: str, runs: Sequence[tuple[str, ...]], most: int, root: str, end: float
+) -> tuple[list[Run], str, Program]:
+    program = Program(Path(path), SUBJECT_PATIENCE, Path(root))
+    found: list[Run] = []
     crashes = 0
     fault = ""
     try:
@@ -142,50 +205,58 @@ def _all(
             if failed is not None and (program.fault or not crash):
                 fault = str(failed)
                 break
-            found.append({"replies": [r for r in replies if not isinstance(r, SubjectFailed)], "crash": crash})
+            found.append(Run(tuple(r for r in replies if not isinstance(r, SubjectFailed)), crash))
             crashes += bool(crash)
-            if crashes >= question["crashes"]:
+            if crashes >= most:
                 break
     finally:
         fault = program.close() or fault
     return found, fault, program
 
 
-def shown(question: dict[str, Any]) -> dict[str, Any]:
-    """One run by the program with sanitizers: its answers as far as they go, and the report with which it ends."""
+def shown(asked: Show, question: Question) -> Shown:
     level = available()
-    program = Path(question["program"])
+    program = Path(asked.program)
     channel = judge.Channel()
     with tempfile.TemporaryFile() as lines:
-        for k, command in enumerate(("N", *question["runs"][0])):
-            lines.write(f"{k}|{command}\n".encode())
+        for k, line in enumerate(("N", *asked.commands)):
+            lines.write(f"{k}|{line}\n".encode())
         lines.flush()
         lines.seek(0)
         command = [str(program), str(lines.fileno()), str(channel.theirs), "/avow-unmarked", "alone"]
         if level is Isolation.SEALED:
-            command = sealed(command, (program.parent, Path(question["root"])), _SCRATCH)
-        code, _, said, text = _ended(command, Path(question["root"]), question["seconds"], channel, {}, lines.fileno())
+            command = sealed(command, (program.parent, Path(question.root)), _SCRATCH)
+        code, _, said, text = _ended(command, Path(question.root), question.seconds, channel, {}, lines.fileno())
     replies: list[Any] = []
     for line in said.splitlines():
         try:
-            message = json.loads(line)
-        except ValueError:
+            message = from_text(Message, line)
+        except Unreadable:
             break
-        if message.get("turn") == str(len(replies)):
-            replies.append(message["replies"][0]["value"])
-    return {"replies": replies, "code": code, "log": text[:20_000]}
+        if message.turn == str(len(replies)) and message.replies:
+            replies.append(message.replies[0]["value"])
+    return Shown(tuple(replies), code, text[:20_000])
 
 
-_QUESTIONS = {"campaign": campaign, "runs": asked, "shown": shown}
+def _answer(question: Question) -> Campaigned | Answered | Shown:
+    match question.ask:
+        case Campaign() as asked:
+            return campaign(asked, question)
+        case Runs() as asked:
+            return answered(asked, question)
+        case Show() as asked:
+            return shown(asked, question)
+        case _:
+            assert_never(question.ask)
 
 
 def main() -> None:
     channel = int(sys.argv[1])
     os.set_inheritable(channel, False)
     process.adopt_orphans()
-    question = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
+    question = from_text(Question, Path(sys.argv[2]).read_bytes())
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    judge.say(channel, _QUESTIONS[question["what"]](question))
+    judge.say(channel, to_json(_answer(question)))
 
 
 if __name__ == "__main__":

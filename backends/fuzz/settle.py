@@ -11,12 +11,12 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from avow.backend_kit.given import told
 from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.base.codec import from_json
+from avow.base.codec import canonical, to_json
 from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.plain import ALLOWS_MORE
@@ -33,11 +33,13 @@ from . import building
 from .building import NotBuilt
 from .drawn import Drawn, Step, command
 from .reading import Reading, load
+from .runner import Answered, Campaign, Campaigned, Question, Run, Runs, Show, Shown
 from .tables import drawable
 from .tuning import HANGS, LONGEST_RUN, MOST_CRASHES, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
 from .unseen import Unseen
 from .verdicts import Bench, Broken, Counts, Misused
 
+T = TypeVar("T")
 TOOL = "libfuzzer"
 
 
@@ -127,20 +129,20 @@ class Work:
         runs = _different([*shown, *self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
         answer = self._asked(built[1].program, runs, built[2].program)
         judged = 0
-        for run, reply in zip(runs, answer["runs"], strict=False):
+        for run, reply in zip(runs, answer.runs, strict=False):
             bench.judge(run, reply)
             judged += 1
             bench.kept = len(bench.compared) if judged <= len(shown) else bench.kept
         self._confirm(bench, built[1].program)
-        if answer["unsteady"] is not None and not bench.broken:
-            said = bench.words(runs[answer["unsteady"]])
+        if answer.unsteady is not None and not bench.broken:
+            said = bench.words(runs[answer.unsteady])
             why = "asked again, where what nothing was written to holds other bytes, it answers otherwise"
             raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({said})")
         fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
-        if not faults and campaign["done"] < reading.runs and not bench.crash:
+        if not faults and campaign.done < reading.runs and not bench.crash:
             raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
         apart = bench.apart(self._special(bench, built[1].program)) if judged else []
-        counts = Counts(campaign["done"], len(runs), judged, self.limits.seed)
+        counts = Counts(campaign.done, len(runs), judged, self.limits.seed)
         return tuple(_doubted(o, unseen) for o in bench.outcomes(counts, fault, bool(faults), tuple(apart)))
 
     # -- the steps of it ---------------------------------------------------------------------------------
@@ -148,11 +150,12 @@ class Work:
     def _left(self) -> float:
         return max(1.0, self._end - time.monotonic())
 
-    def _ask(self, question: dict[str, Any]) -> dict[str, Any]:
+    def _ask(self, kind: type[T], ask: Campaign | Runs | Show) -> T:
         place = self.folder / "question.json"
-        place.write_text(json.dumps({**question, "seconds": self._left()}), encoding="utf-8")
+        question = Question(ask, str(self.job.root.resolve()), self._left())
+        place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
-            dict[str, Any],
+            kind,
             str(Path(__file__).with_name("runner.py").resolve()),
             [str(place)],
             cwd=self.folder,
@@ -175,8 +178,8 @@ class Work:
             (corpus / sha256(seed.hex())[:40]).write_bytes(seed)
         return seeds
 
-    def _campaign(self, kept: Path) -> dict[str, Any]:
-        options = [
+    def _campaign(self, kept: Path) -> Campaigned:
+        options = (
             f"-runs={self.reading.runs}",
             f"-seed={self.limits.seed + 1}",  # 0 is chance
             f"-max_len={LONGEST_RUN}",
@@ -184,39 +187,32 @@ class Work:
             f"-rss_limit_mb={RESIDENT}",
             "-detect_leaks=0",
             "-verbosity=0",
-        ]
-        self.command = ("./fuzz", *options)
-        answer = self._ask(
-            {
-                "what": "campaign",
-                "folder": str(self.folder),
-                "kept": str(kept),
-                "root": str(self.job.root.resolve()),
-                "options": options,
-            }
         )
-        self._kept_apart(answer)
-        if answer["log"].strip():
-            self.logs["libfuzzer.log"] = answer["log"].replace(str(self.folder), ".")
-        if answer["fault"]:
-            raise Unanswered(Verdict.ERROR, answer["fault"])
-        if answer["code"] is None:
+        self.command = ("./fuzz", *options)
+        answer = self._ask(Campaigned, Campaign(str(self.folder), str(kept), options))
+        self._kept_apart(answer.isolation)
+        if answer.log.strip():
+            self.logs["libfuzzer.log"] = answer.log.replace(str(self.folder), ".")
+        if answer.fault:
+            raise Unanswered(Verdict.ERROR, answer.fault)
+        if answer.code is None:
             why = f"libFuzzer did not make its {self.reading.runs} runs in the time given; {ALLOWS_MORE}"
             raise Unanswered(Verdict.UNKNOWN, why)
         return answer
 
-    def _kept_apart(self, answer: dict[str, Any]) -> None:
-        self.isolation = min(self.isolation, Isolation(answer["isolation"]), key=lambda level: level.rank)
+    def _kept_apart(self, isolation: Isolation) -> None:
+        self.isolation = min(self.isolation, isolation, key=lambda level: level.rank)
 
-    def _asked(self, program: Path, runs: Sequence[list[Step]], twin: Path | None = None) -> dict[str, Any]:
-        words = [[command(self.reading.asked, step) for step in run] for run in runs]
-        root = str(self.job.root.resolve())
-        question = {"what": "runs", "program": str(program), "root": root, "runs": words, "twin": str(twin or "")}
-        answer = self._ask({**question, "crashes": MOST_CRASHES})
-        self._kept_apart(answer)
-        self.observed.update(dict.fromkeys(from_json(tuple[Observed, ...], answer["observed"])))
-        if answer["fault"]:
-            raise Unanswered(Verdict.UNKNOWN if answer["silent"] else Verdict.ERROR, answer["fault"])
+    def _words(self, run: Sequence[Step]) -> tuple[str, ...]:
+        return tuple(command(self.reading.asked, step) for step in run)
+
+    def _asked(self, program: Path, runs: Sequence[list[Step]], twin: Path | None = None) -> Answered:
+        ask = Runs(str(program), str(twin or ""), tuple(map(self._words, runs)), MOST_CRASHES)
+        answer = self._ask(Answered, ask)
+        self._kept_apart(answer.isolation)
+        self.observed.update(dict.fromkeys(answer.observed))
+        if answer.fault:
+            raise Unanswered(Verdict.UNKNOWN if answer.silent else Verdict.ERROR, answer.fault)
         return answer
 
     def _earlier(self) -> Iterator[list[Step]]:
@@ -226,7 +222,7 @@ class Work:
             for case in cases:
                 try:
                     run = [{name: plain(value) for name, value in step.items()} for step in case]
-                    _ = [command(self.reading.asked, step) for step in run]
+                    self._words(run)
                 except (ValueError, TypeError, KeyError, AttributeError):
                     continue
                 if all(set(step) == names for step in run):
@@ -241,7 +237,7 @@ class Work:
             while tries and tried < SHORTENED:
                 run = tries.pop(0)
                 tried += 1
-                found = bench.again(name, run, self._asked(program, [run])["runs"])
+                found = bench.again(name, run, self._asked(program, [run]).runs)
                 if found is not None and (best is None or len(found.run) < len(best.run)):
                     best = found
                     tries = [best.run[:k] + best.run[k + 1 :] for k in range(len(best.run) - 1)]
@@ -257,13 +253,11 @@ class Work:
             return None
         program = building.sanitized(self.reading, self.folder, self._outside, self._left()).program
         for run in runs:
-            words = [command(self.reading.asked, step) for step in run]
-            root = str(self.job.root.resolve())
-            answer = self._ask({"what": "shown", "program": str(program), "root": root, "runs": [words]})
-            self.logs["fault.log"] = answer["log"].replace(str(self.folder), ".")
-            found = Bench(self.reading).stopped(run, answer["replies"])
-            if found is not None and answer["code"] not in (0, None):
-                return replace(found, why=self._said(answer["log"]))
+            answer = self._ask(Shown, Show(str(program), self._words(run)))
+            self.logs["fault.log"] = answer.log.replace(str(self.folder), ".")
+            found = Bench(self.reading).stopped(run, answer.replies)
+            if found is not None and answer.code not in (0, None):
+                return replace(found, why=self._said(answer.log))
         return None
 
     def _said(self, log: str) -> str:
@@ -281,10 +275,10 @@ class Work:
             return f"{summary[1]}: {summary[2]}{at}"
         return "the program ends by a signal or an exception"
 
-    def _special(self, bench: Bench, program: Path) -> list[tuple[list[Step], str, str, Any]]:
+    def _special(self, bench: Bench, program: Path) -> list[tuple[list[Step], str, str, Run]]:
         """Each REAL input in its turn NaN and infinite, beside a few steps' others; with what came of it."""
         asked = bench.special()
-        replies = self._asked(program, [run for run, _, _ in asked])["runs"] if asked else []
+        replies = self._asked(program, [run for run, _, _ in asked]).runs if asked else ()
         return [(run, name, word, reply) for (run, name, word), reply in zip(asked, replies, strict=False)]
 
 

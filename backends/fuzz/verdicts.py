@@ -33,6 +33,7 @@ from avow.language.sorts import (
 
 from .drawn import Step
 from .reading import Reading
+from .runner import Run
 from .tables import Drawable
 from .tuning import APART
 
@@ -113,7 +114,7 @@ class Bench:
 
     # -- judging -----------------------------------------------------------------------------------------
 
-    def judge(self, run: list[Step], reply: Mapping[str, Any]) -> None:
+    def judge(self, run: list[Step], reply: Run) -> None:
         """Count a run's steps, and keep what it breaks."""
         if run and len(self.samples) < APART:
             self.samples.append(run)
@@ -136,20 +137,20 @@ class Bench:
                         run[: at + 1], step, f"{why}: there is no output"[:400] if step[-1].wrong else why
                     )
 
-    def again(self, name: str, run: list[Step], replies: Sequence[Mapping[str, Any]]) -> Broken | None:
+    def again(self, name: str, run: list[Step], replies: Sequence[Run]) -> Broken | None:
         """What a run breaks of a guarantee, asked anew; None where it breaks nothing."""
         other = Bench(self.reading)
         for reply in replies:
             other.judge(run, reply)
         return other.broken.get(name)
 
-    def _steps(self, run: list[Step], reply: Mapping[str, Any]) -> Iterator[tuple[int, tuple[Seen, ...]]]:
+    def _steps(self, run: list[Step], reply: Run) -> Iterator[tuple[int, tuple[Seen, ...]]]:
         """The steps that the assumptions allow, each with those before it, up to the first that they do not."""
         node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
-        answers = list(reply["replies"])
+        answers = reply.replies
         trace: tuple[Seen, ...] = ()
         if not answers:
-            self.crash = self.crash or Broken(run[:1], (Seen({}),), f"making the node ends with {reply['crash']}")
+            self.crash = self.crash or Broken(run[:1], (Seen({}),), f"making the node ends with {reply.crash}")
             return
         held = self._held(answers[0], "held")
         wrong = started(node, self.assumed, held, "the constructor")
@@ -158,7 +159,7 @@ class Bench:
             return
         for at, step in enumerate(run):
             answer = answers[at + 1] if at + 1 < len(answers) else None
-            if answer is None and not reply["crash"]:
+            if answer is None and not reply.crash:
                 return
             if answer is not None and "misuse" in answer:
                 raise Misused(f"the adapter does not fit the contract: {answer['why']}")
@@ -175,9 +176,7 @@ class Bench:
             if answer is not None and answer.get("skipped"):
                 continue
             if answer is None or "error" in answer:
-                why = (
-                    f"the program ends with {reply['crash']}" if answer is None else f"the step throws {answer['why']}"
-                )
+                why = f"the program ends with {reply.crash}" if answer is None else f"the step throws {answer['why']}"
                 values = {f"in.{name}": exact(value) for name, value in case.items()}
                 found = (*trace, Seen(values, why))
                 self.crash = self.crash or Broken(run[: at + 1], found, why)
@@ -193,8 +192,7 @@ class Bench:
     def stopped(self, run: list[Step], answers: Sequence[Mapping[str, Any]]) -> Broken | None:
         """The step at which a program stopped that answered so far; None where the assumptions do not allow it, or no
         step was under way."""
-        quiet: dict[str, Any] = {"replies": list(answers), "crash": "a fault"}
-        for _ in self._steps(run, quiet):
+        for _ in self._steps(run, Run(tuple(answers), "a fault")):
             pass
         return self.crash if self.begun is None else None
 
@@ -271,14 +269,14 @@ class Bench:
                     found.append(([{**run[0], port.name: [SPECIAL[word], *value[1:]]}], port.name, word))
         return found
 
-    def apart(self, asked: Sequence[tuple[list[Step], str, str, Any]]) -> list[Counterexample]:
+    def apart(self, asked: Sequence[tuple[list[Step], str, str, Run]]) -> list[Counterexample]:
         """What went wrong with inputs that are no REAL: no output, or one that is none, or a guarantee that does not
         hold as IEEE 754 compares."""
         node, memory = self.reading.node, dict.fromkeys(self.reading.memory, "")
         found: dict[str, Counterexample] = {}
         for run, name, word, reply in asked:
             zero = {k: _finite(v) for k, v in run[0].items()}
-            answers = reply["replies"]
+            answers = reply.replies
             answer = answers[1] if len(answers) > 1 else None
             if answer is not None and (answer.get("skipped") or "misuse" in answer):
                 continue
@@ -286,7 +284,7 @@ class Bench:
             if not self._allowed(case):
                 continue
             if answer is None:
-                step = Seen({f"in.{k}": exact(v) for k, v in case.items()}, f"the program ends with {reply['crash']}")
+                step = Seen({f"in.{k}": exact(v) for k, v in case.items()}, f"the program ends with {reply.crash}")
             else:
                 step = seen(node, memory, case, {"steps": [answer]})
             broken = [g.formula.name for g in self.guarded.values() if self._breaks(g, step, name, word)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import tempfile
@@ -11,26 +10,25 @@ from dataclasses import replace
 from fractions import Fraction
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.base.codec import document, from_json
+from avow.base.codec import canonical, document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
-from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict, bound
+from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.isolation import judge
 from avow.isolation.level import Unavailable, available
-from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Node
 from avow.solving.replay import opaque_sorts
 
 from . import callbacks, export, wire
+from .exchange import Answer, Tried
 from .judging import failure_bound
-from .machine import ANY
+from .machine import ANY, EXACT
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -74,8 +72,8 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         place = Path(scratch)
         for name, text in files(job).items():
             (place / name).write_text(text, encoding="utf-8")
-        kept = [case for cases in job.kept.values() for case in cases]
-        (place / export.KEPT).write_text(json.dumps(kept), encoding="utf-8")
+        kept = [case if isinstance(case, list) else [case] for cases in job.kept.values() for case in cases]
+        (place / export.KEPT).write_text(canonical(kept), encoding="utf-8")
         done, answer = _run(job, place, limits)
     command = (Path(sys.executable).name, *done.command[1:3]) if done else ()
     logs = {"hypothesis.log": done.stdout + done.stderr} if done and (done.stdout + done.stderr).strip() else {}
@@ -83,32 +81,26 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         why = _silence(done, limits)
         verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
-    try:
-        observed, isolation = (
-            from_json(tuple[Observed, ...], answer.pop("observed")),
-            Isolation(answer.pop("isolation")),
-        )
-        refuting = export.numbers(job) == ANY
-        exact = export.numbers(job) == "exact"
-        outcomes = tuple(
-            _counted(_outcome(o, answer, limits.seed, refuting, exact), job.clause(o), job.node)
-            for o in job.obligations
-        )
-    except (KeyError, ValueError, TypeError) as error:
-        return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
-    if "crash_trace" in answer:
+    if answer.guarantees.keys() != {o.name for o in job.obligations}:
+        return Report.alike(job, Verdict.ERROR, "the judge's answer is of other guarantees", "hypothesis", version)
+    refuting = export.numbers(job) == ANY
+    exact = export.numbers(job) == EXACT
+    outcomes = tuple(
+        _counted(_outcome(o, answer, limits.seed, refuting, exact), job.clause(o), job.node) for o in job.obligations
+    )
+    if answer.crash_trace is not None:
         numbers = "exact" if exact else "float64"
         outcomes = tuple(replace(o, of=Object.SOURCE, numbers=numbers) for o in outcomes)
-    logs["result.json"] = document(answer) + "\n"
-    return Report(outcomes, "hypothesis", version, command, logs, observed, isolation)
+    logs["result.json"] = document(replace(answer, observed=())) + "\n"
+    return Report(outcomes, "hypothesis", version, command, logs, answer.observed, answer.isolation)
 
 
-def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[str, Any] | None]:
+def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answer | None]:
     """The judge's answer, if it gave one."""
     seconds = max(1.0, limits.seconds * 0.8)
     try:
         return judge.ask(
-            dict[str, Any],
+            Answer,
             export.test_name(job),
             [str(seconds), str(limits.seed)],
             cwd=place,
@@ -134,52 +126,48 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 
 
-def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refuting: bool, exact: bool) -> Outcome:
-    own = answer["guarantees"][obligation.name]
-    valid, rejected, wanted = answer["valid"], answer["rejected"], answer["wanted"]
-    bound: dict[str, object] = {"cases": valid, "edge_cases": answer["edges"], "rejected": rejected, "seed": seed}
-    met = zip(own["triggers"], own["hits"], own["edge_hits"], strict=True)
-    triggers = [{"trigger": t, "met": n, "met_at_edges": m} for t, n, m in met]
+def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, exact: bool) -> Outcome:
+    own, valid = answer.guarantees[obligation.name], answer.valid
+    bound: dict[str, object] = {"cases": valid, "edge_cases": answer.edges, "rejected": answer.rejected, "seed": seed}
+    triggers = [{"trigger": t.trigger, "met": t.drawn, "met_at_edges": t.at_edges} for t in own.triggers]
     details: dict[str, object] = {"triggers": triggers}
-    if answer["left_out"]:
-        details["left out"] = answer["left_out"]
+    if answer.left_out:
+        details["left out"] = list(answer.left_out)
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
-    if own["failure"] is not None:
-        values = tuple((str(name), str(value)) for name, value in own["failure"])
-        told = f"guarantee {obligation.name} does not hold of these{_inexact(values) if exact else ''}"
-        trace = [tuple((str(n), str(v)) for n, v in step) for step in own.get("trace", ())]
-        shown = Counterexample(values, told, tuple(trace))
-        details[CASE] = own["case"]
+    if own.failure is not None:
+        told = f"guarantee {obligation.name} does not hold of these{_inexact(own.failure) if exact else ''}"
+        shown = Counterexample(own.failure, told, own.trace)
+        details[CASE] = own.case
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
-    if answer["silent"]:  # whatever else was found: it is of a subject that might have answered
-        why = f"{answer['silent']}: that says nothing of what it would answer, and the next run asks again"
+    if answer.silent:  # whatever else was found: it is of a subject that might have answered
+        why = f"{answer.silent}: that says nothing of what it would answer, and the next run asks again"
         return replace(outcome, verdict=Verdict.ERROR, summary=why, details={**details, RETRY: True})
-    if answer["crash"] is not None:
-        pairs, why = answer["crash"]
-        shown = Counterexample(tuple((str(n), str(v)) for n, v in pairs), str(why))
+    if answer.crash is not None:
+        shown = Counterexample(*answer.crash)
         # a class that raises has no output for inputs that the contract allows; a function may be no subject at all
-        verdict = Verdict.REFUTED if answer.get("crash_trace") else Verdict.ERROR
+        verdict = Verdict.REFUTED if answer.crash_trace else Verdict.ERROR
         return replace(outcome, verdict=verdict, summary=shown.text(), counterexample=shown)
-    if answer["fault"]:
-        return replace(outcome, verdict=Verdict.ERROR, summary=str(answer["fault"]))
-    apart = [Counterexample(tuple((str(n), str(v)) for n, v in case), str(why)) for case, why in answer["apart"]]
+    if answer.fault:
+        return replace(outcome, verdict=Verdict.ERROR, summary=answer.fault)
+    apart = [Counterexample(case, why) for case, why in answer.apart]
     if apart:
         details["no numbers"] = [one.text() for one in apart]
     if apart and refuting:
         return replace(outcome, verdict=Verdict.REFUTED, summary=apart[0].text(), counterexample=apart[0])
-    if answer["unsteady"] is not None:
-        case = ", ".join(f"{name} = {value}" for name, value in answer["unsteady"])
+    if answer.unsteady is not None:
+        case = ", ".join(f"{name} = {value}" for name, value in answer.unsteady)
         why = f"undeclared input: asked the same again from its start, another process answers otherwise ({case})"
         return replace(outcome, summary=why)
-    why = _doubt(answer, own, valid, rejected, wanted)
+    why = _doubt(answer, own)
     if why:
         return replace(outcome, summary=why)
-    unmet = [t["trigger"] for t in triggers if not (t["met"] or t["met_at_edges"])]
+    unmet = [t.trigger for t in own.triggers if not (t.drawn or t.at_edges)]
     if unmet:
-        why = f"in none of {valid + answer['edges']} cases was its condition met: {unmet[0]}"
+        why = f"in none of {valid + answer.edges} cases was its condition met: {unmet[0]}"
         return replace(outcome, summary=why, vacuous=True)
     # steps of one run hang together where the contract remembers: then runs are what is counted
-    drawn, hits = (answer["runs"], own["run_hits"]) if "runs" in answer else (valid, own["hits"])
+    drawn = valid if answer.runs is None else answer.runs
+    hits = [t.drawn if answer.runs is None else t.in_runs for t in own.triggers]
     least = min(hits, default=drawn)
     bound["confidence"] = CONFIDENCE
     bound["failure_probability_below"] = round(failure_bound(drawn), 6)
@@ -190,18 +178,18 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
         "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
         "below the bound; it is no probability about the robot's own inputs"
     )
-    edges = f" and {answer['edges']} at thresholds" if answer["edges"] else ""
-    if answer["replayed"]:
-        bound["replayed"] = answer["replayed"]
-        edges += f", {answer['replayed']} that refuted it or a neighbour before"
-    chance = f"95 %: below {failure_bound(least):.2g} of such {'runs' if 'runs' in answer else 'cases'} fail"
+    edges = f" and {answer.edges} at thresholds" if answer.edges else ""
+    if answer.replayed:
+        bound["replayed"] = answer.replayed
+        edges += f", {answer.replayed} that refuted it or a neighbour before"
+    chance = f"95 %: below {failure_bound(least):.2g} of such {'cases' if answer.runs is None else 'runs'} fail"
     cases = f"{valid} drawn cases"
-    if "runs" in answer:
+    if answer.runs is not None:
         bound["runs"] = drawn
         cases = f"{drawn} drawn run{'s'[: drawn != 1]} of {valid} steps"
     summary = f"{cases}{edges}, none breaks it (seed {seed}; {chance})"
-    if valid < wanted:
-        summary += f"; the generator has no more than these, of {wanted} wanted"
+    if valid < answer.wanted:
+        summary += f"; the generator has no more than these, of {answer.wanted} wanted"
     return replace(outcome, verdict=Verdict.TESTED, summary=summary)
 
 
@@ -216,18 +204,19 @@ def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
     return replace(outcome, rests_on=(*outcome.rests_on, made))
 
 
-def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, rejected: int, wanted: int) -> str:
+def _doubt(answer: Answer, own: Tried) -> str:
     """Why the cases do not count, if they do not."""
-    if answer["stopped"].startswith("no values"):
-        return f"inputs cannot be generated: {answer['stopped'].partition(': ')[2]}"
-    if valid == 0 or answer["stopped"] == "assumptions" or (valid < wanted and rejected > REJECTED_CASES * valid):
+    valid, rejected, wanted = answer.valid, answer.rejected, answer.wanted
+    if answer.stopped.startswith("no values"):
+        return f"inputs cannot be generated: {answer.stopped.partition(': ')[2]}"
+    if valid == 0 or answer.stopped == "assumptions" or (valid < wanted and rejected > REJECTED_CASES * valid):
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
-    if answer["stopped"] == "time":
+    if answer.stopped == "time":
         return f"only {valid} of {wanted} cases in the time given"
-    if own["undecided"]:
-        return f"{own['undecided']} of {valid + answer['edges']} cases could not be judged"
-    if answer["undecided"]:
-        return f"of {answer['undecided']} generated inputs it could not be told whether they meet the assumptions"
+    if own.undecided:
+        return f"{own.undecided} of {valid + answer.edges} cases could not be judged"
+    if answer.undecided:
+        return f"of {answer.undecided} generated inputs it could not be told whether they meet the assumptions"
     return ""
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from pathlib import Path
@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
-from avow.base.codec import to_json
+from avow.base.codec import from_text, to_json
 from avow.base.files import text_or_nothing
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
@@ -32,12 +32,12 @@ from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
-from avow.language.terms import Term
 from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire
 from .beside import kept_inputs, system_root, table_rows
 from .convention import Malformed, outputs, sent
+from .exchange import Answer, Met, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
@@ -52,7 +52,7 @@ if hasattr(providers, "is_local_module_file"):
 
 
 Case = tuple[Inputs, dict[str, Value]]
-Apart = tuple[list[tuple[str, str]], str]
+Apart = tuple[Pairs, str]
 """A case with an input that is no REAL, or the negative zero, in words, and what was wrong with the answer."""
 
 
@@ -63,28 +63,30 @@ class OutOfTime(BaseException):
 class Bench:
     """One node's contract, a subject, and the counts of what was tried."""
 
-    def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
-        self.data = data
-        self.node: str = data["node"]
-        self.cases: int = data["cases"]
-        self.seed: int = data["seed"]
-        self.doubles = data["numbers"] != EXACT
-        self.inputs_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["inputs"]}
-        self.output_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["outputs"]}
+    def __init__(self, asked: Question, folder: Path) -> None:
+        self.asked = asked
+        self.cases = asked.cases
+        self.seed = asked.seed
+        self.doubles = asked.numbers != EXACT
+        self.inputs_sorts: dict[str, Sort] = {p.name: wire.decode(p.sort) for p in asked.inputs}
+        self.output_sorts: dict[str, Sort] = {p.name: wire.decode(p.sort) for p in asked.outputs}
         records = Records()
-        self.assumptions = tuple(judged(*_clause(c), records) for c in data["assumptions"])
-        self.guarantees = {c["name"]: guarantee(*_clause(c), records) for c in data["guarantees"]}
+        self.formulas = [wire.decode(c.formula) for c in (*asked.assumptions, *asked.guarantees)]
+        assumed, promised = self.formulas[: len(asked.assumptions)], self.formulas[len(asked.assumptions) :]
+        self.assumptions = tuple(
+            judged(c.name, formula, c.text, records) for c, formula in zip(asked.assumptions, assumed, strict=True)
+        )
+        self.guarantees = {
+            c.name: guarantee(c.name, formula, c.text, records)
+            for c, formula in zip(asked.guarantees, promised, strict=True)
+        }
         self.keeper = Keeper(records.cells)
         self.remembers = bool(records.cells)
-        formulas = [wire.decode(c["formula"]) for c in (*data["assumptions"], *data["guarantees"])]
-        root = system_root(data, folder)
-        written = constants(text_or_nothing(root / data["subject"]["file"]))
-        self.generator = Generator(
-            self.inputs_sorts, pools(formulas, table_rows(data["scenario"], self.inputs_sorts), written)
-        )
-        self.subject = SubjectProcess(
-            root / data["subject"]["file"], data["subject"]["function"], SUBJECT_PATIENCE, root
-        )
+        root = system_root(asked, folder)
+        path = root / asked.subject.file
+        rows = table_rows(asked.scenario, self.inputs_sorts)
+        self.generator = Generator(self.inputs_sorts, pools(self.formulas, rows, constants(text_or_nothing(path))))
+        self.subject = SubjectProcess(path, asked.subject.function, SUBJECT_PATIENCE, root)
         self._aims = tuple(self._aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = kept_inputs(folder / KEPT, self.inputs_sorts)
         self.replayed = 0
@@ -99,8 +101,8 @@ class Bench:
 
     @classmethod
     def load(cls, path: Path) -> Bench:
-        """From the generated ``contract.json``."""
-        return cls(json.loads(path.read_text(encoding="utf-8")), path.parent)
+        """From the generated ``contract.json``. Raises Unreadable."""
+        return cls(from_text(Question, path.read_bytes()), path.parent)
 
     # -- for the generated test ----------------------------------------------------------------------------------------
 
@@ -168,7 +170,7 @@ class Bench:
                 self.apart = self._asked_apart() if self.doubles else []
         finally:
             fault = self.subject.close()
-        judge.say(channel, {**self._report(stopped, smaller), "fault": fault})
+        judge.say(channel, to_json(replace(self._report(stopped, smaller), fault=fault)))
         return 0
 
     def _told(self) -> int:
@@ -297,8 +299,7 @@ class Bench:
                     if isinstance(self.inputs_sorts[name], RealSort) and (self.end or inf) > time.monotonic():
                         asked = {**inputs, name: Fraction(0)}
                         why = self._wrong_apart(twin, asked, name, text) if self._assumed(asked) else ""
-                        case = [(n, word if n == f"in.{name}" else value) for n, value in _pairs(asked, {})]
-                        found.setdefault(why, (case, why))
+                        found.setdefault(why, (_with(asked, name, word), why))
         return [one for why, one in found.items() if why]
 
     def _wrong_apart(self, twin: SubjectProcess, asked: Inputs, name: str, text: str) -> str:
@@ -387,34 +388,32 @@ class Bench:
             one()
         return best[0]
 
-    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> dict[str, Any]:
-        return {
-            "valid": self.valid,
-            "edges": self.edges,
-            "replayed": self.replayed,
-            "rejected": self.rejected,
-            "undecided": self.undecided,
-            "wanted": self.cases,
-            "stopped": stopped,
-            "left_out": self.data.get("left_out", []),
-            "observed": to_json(self.subject.observed()),
-            "isolation": self.subject.isolation.value,
-            "apart": self.apart,
-            "unsteady": _pairs(self.unsteady, {}) if self.unsteady is not None else None,
-            "silent": self.silent or self.subject.silent,
-            "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
-            "guarantees": {
-                name: {
-                    "hits": each.hits,
-                    "edge_hits": each.edge_hits,
-                    "triggers": [t.whole.text for t in each.triggers],
-                    "undecided": each.undecided,
-                    "failure": _pairs(*smaller[name]) if name in smaller else None,
-                    "case": _sent(smaller[name][0]) if name in smaller else None,
-                }
-                for name, each in self.guarantees.items()
-            },
-        }
+    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> Answer:
+        return Answer(
+            valid=self.valid,
+            edges=self.edges,
+            replayed=self.replayed,
+            rejected=self.rejected,
+            undecided=self.undecided,
+            wanted=self.cases,
+            stopped=stopped,
+            left_out=self.asked.left_out,
+            observed=self.subject.observed(),
+            isolation=self.subject.isolation,
+            apart=tuple(self.apart),
+            unsteady=_pairs(self.unsteady, {}) if self.unsteady is not None else None,
+            silent=self.silent or self.subject.silent,
+            crash=(_pairs(self.crash[0], {}), self.crash[1]) if self.crash else None,
+            crash_trace=None,
+            runs=None,
+            guarantees={name: self._tried(name, smaller.get(name)) for name in self.guarantees},
+        )
+
+    def _tried(self, name: str, smaller: Case | None) -> Tried:
+        each = self.guarantees[name]
+        counts = zip(each.triggers, each.hits, each.edge_hits, each.run_hits, strict=True)
+        found = Tried(tuple(Met(t.whole.text, *met) for t, *met in counts), each.undecided)
+        return replace(found, failure=_pairs(*smaller), case=_sent(smaller[0])) if smaller is not None else found
 
     # -- assumptions ---------------------------------------------------------------------------------------------------
 
@@ -465,10 +464,6 @@ class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
     """The guarantee that is looked at fails."""
 
 
-def _clause(data: Mapping[str, Any]) -> tuple[str, Term, str]:
-    return data["name"], wire.decode(data["formula"]), data["text"]
-
-
 def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
     """Qualified names to values."""
     return {f"in.{n}": v for n, v in inputs.items()} | {f"out.{n}": v for n, v in found.items()}
@@ -478,8 +473,13 @@ def told(inputs: Inputs, found: Mapping[str, Value]) -> str:
     return ", ".join(f"{name} = {value}" for name, value in _pairs(inputs, found))
 
 
-def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> list[tuple[str, str]]:
-    return [(name, show(value)) for name, value in valuation(inputs, found).items()]
+def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> Pairs:
+    return tuple((name, show(value)) for name, value in valuation(inputs, found).items())
+
+
+def _with(inputs: Inputs, name: str, word: str) -> Pairs:
+    """The inputs, of which one is what the word says."""
+    return tuple((n, word if n == f"in.{name}" else value) for n, value in _pairs(inputs, {}))
 
 
 def _sent(inputs: Inputs) -> dict[str, Any]:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from avow.base.codec import from_text
 from avow.formulas.values import Value
 from avow.language.sorts import BoolSort, FunctionSort, Sort
 
 from .convention import Malformed, received
+from .exchange import Question
 from .generate import Inputs
 from .pools import parse_cell
 
@@ -26,11 +27,9 @@ def kept_inputs(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
     return tuple(found)
 
 
-def kept_runs(path: Path) -> list[list[dict[str, Any]]]:
+def kept_runs(path: Path) -> tuple[tuple[Any, ...], ...]:
     """The kept cases as data: each the inputs of the steps of a run; of a function that is asked one step, of one."""
-    if not path.is_file():
-        return []
-    return [case if isinstance(case, list) else [case] for case in json.loads(path.read_text(encoding="utf-8"))]
+    return from_text(tuple[tuple[Any, ...], ...], path.read_bytes()) if path.is_file() else ()
 
 
 def table_rows(
@@ -48,13 +47,13 @@ def table_rows(
     return found
 
 
-def system_root(data: Mapping[str, Any], folder: Path) -> Path:
+def system_root(asked: Question, folder: Path) -> Path:
     """The system's folder: known from the environment, or beside the artifacts."""
     root = os.environ.get("AVOW_SYSTEM_ROOT")
     if root:
         return Path(root)
     for parent in folder.resolve().parents:
-        candidate: Path = parent / "contracts" / str(data["folder"])
-        if (candidate / str(data["subject"]["file"])).is_file():
+        candidate = parent / "contracts" / asked.folder
+        if (candidate / asked.subject.file).is_file():
             return candidate
     return folder

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 from avow.backend_kit.protocol import Job
+from avow.base.codec import to_json
 from avow.base.plain import as_identifier
 from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
 
 from . import wire
+from .exchange import Question, Stated, Subject, Typed
 from .machine import EXACT
 from .subject import SubjectFile
 
@@ -109,46 +110,43 @@ def _module(job: Job, subject: SubjectFile) -> str:
 
 
 def _data(job: Job, subject: SubjectFile) -> str:
-    data = {
-        "system": job.system.name,
-        "folder": job.root.name,
-        "node": job.node.name,
-        "subject": {"file": subject.name, "function": subject.function},
-        "cases": cases(job),
-        "seed": job.seed,
-        "memory": list(subject.memory),
-        "source": subject.source,
-        "numbers": numbers(job),
-        "inputs": [_port(port) for port in job.node.inputs if port.variable.qualified not in subject.left_out],
-        "outputs": [_port(port) for port in job.node.outputs if port.variable.qualified not in subject.left_out],
-        **({"left_out": sorted(subject.left_out)} if subject.left_out else {}),
-        "assumptions": [_clause(clause) for clause in job.node.assumptions],
-        "guarantees": [_clause(job.clause(obligation)) for obligation in job.obligations],
-        "scenario": {n: rows for n, rows in _scenario(job).items() if f"in.{n}" not in subject.left_out},
-    }
-    return json.dumps(data, indent=1, ensure_ascii=True) + "\n"
+    node, left = job.node, subject.left_out
+    question = Question(
+        system=job.system.name,
+        folder=job.root.name,
+        node=node.name,
+        subject=Subject(subject.name, subject.function),
+        cases=cases(job),
+        seed=job.seed,
+        memory=subject.memory,
+        source=subject.source,
+        numbers=numbers(job),
+        inputs=tuple(_port(port) for port in node.inputs if port.variable.qualified not in left),
+        outputs=tuple(_port(port) for port in node.outputs if port.variable.qualified not in left),
+        left_out=tuple(sorted(left)),
+        assumptions=tuple(map(_clause, node.assumptions)),
+        guarantees=tuple(_clause(job.clause(obligation)) for obligation in job.obligations),
+        scenario={name: rows for name, rows in _scenario(job) if f"in.{name}" not in left},
+    )
+    return json.dumps(to_json(question), indent=1) + "\n"
 
 
-def _port(port: Port) -> dict[str, Any]:
-    return {"name": port.name, "type": show_sort(port.sort), "sort": wire.encode(port.sort)}
+def _port(port: Port) -> Typed:
+    return Typed(port.name, show_sort(port.sort), wire.encode(port.sort))
 
 
-def _clause(clause: Clause) -> dict[str, Any]:
+def _clause(clause: Clause) -> Stated:
     text = show_term(clause.formula, "unicode").replace("\n", " ")
-    return {"name": clause.name, "text": text, "formula": wire.encode(clause.formula)}
+    return Stated(clause.name, text, wire.encode(clause.formula))
 
 
-def _scenario(job: Job) -> dict[str, list[list[str]]]:
+def _scenario(job: Job) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
     """The rows of the plan's scenario for each input of the node that it interprets."""
     scenario = job.system.plan.scenario
-    found: dict[str, list[list[str]]] = {}
-    if scenario is None:
-        return found
     names = {port.name for port in job.node.inputs}
-    for key, (table_name, columns) in sorted(scenario.interpret.items()):
+    for key, (table_name, columns) in sorted(scenario.interpret.items()) if scenario is not None else ():
         owner, _, port = key.rpartition(".")
-        if port in names and owner in {"", "in", job.node.name}:
+        if scenario is not None and port in names and owner in {"", "in", job.node.name}:
             table = scenario.table(table_name)
             at = [table.columns.index(column) for column in columns if column in table.columns]
-            found[port] = [[row[k] for k in at] for row in table.rows]
-    return found
+            yield port, tuple(tuple(row[k] for k in at) for row in table.rows)

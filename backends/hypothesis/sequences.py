@@ -12,6 +12,7 @@ import math
 import random
 import time
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,10 @@ from avow.formulas.values import Data, Element, SequenceValue, Value
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
-from . import wire
-from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, told, valuation
+from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, _with, told, valuation
 from .beside import kept_runs
 from .convention import Malformed, outputs, received
+from .exchange import Answer, Question, Tried
 from .export import KEPT
 from .generate import Impossible, Inputs, Source
 from .machine import SPECIAL
@@ -50,10 +51,10 @@ WHOLE = tuple(s * 2**n + d for n in (7, 8, 15, 16, 31, 32, 63) for s in (1, -1) 
 class SequenceBench(Bench):
     """As `Bench`, of a class that is driven. `memory` are the inputs that the class holds itself."""
 
-    def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
-        super().__init__(data, folder)
-        self.memory: tuple[str, ...] = tuple(data["memory"])
-        self.unread = tuple(name.removeprefix("out.") for name in data.get("left_out", ()) if name.startswith("out."))
+    def __init__(self, asked: Question, folder: Path) -> None:
+        super().__init__(asked, folder)
+        self.memory = asked.memory
+        self.unread = tuple(name.removeprefix("out.") for name in asked.left_out if name.startswith("out."))
         self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
         self.traces: dict[str, Trace] = {}
         self._first: list[list[Inputs]] = []
@@ -61,9 +62,7 @@ class SequenceBench(Bench):
         self._edges_left: Iterator[Inputs] = iter(())
         self._swept = False
         self.runs = 0
-        written = data["assumptions"] + data["guarantees"]
-        limits = longest_limits(wire.decode(clause["formula"]) for clause in written)
-        self._steps = STEPS + min(2 * limits, LONGEST_RUN)
+        self._steps = STEPS + min(2 * longest_limits(self.formulas), LONGEST_RUN)
 
     # -- the class ---------------------------------------------------------------------------------------
 
@@ -258,7 +257,7 @@ class SequenceBench(Bench):
 
     # -- what was found ----------------------------------------------------------------------------------
 
-    def _replayed_run(self, steps: list[dict[str, Any]]) -> None:
+    def _replayed_run(self, steps: tuple[Any, ...]) -> None:
         """What refuted a guarantee once, as far as its inputs are still allowed."""
         trace: Trace = []
         memory = self.begin(self.subject)
@@ -377,9 +376,8 @@ class SequenceBench(Bench):
         for run in (r for r in self._first[:3] if r):
             for name, (word, text) in itertools.product(reals, SPECIAL.items()):
                 why = self._wrong_first(run[0], name, text)
-                case = [(n, word if n == f"in.{name}" else v) for n, v in _pairs(run[0], {})]
                 if why:
-                    found.setdefault(why, (case, why))
+                    found.setdefault(why, (_with(run[0], name, word), why))
         return list(found.values())
 
     def _wrong_first(self, inputs: Inputs, name: str, text: str) -> str:
@@ -394,19 +392,19 @@ class SequenceBench(Bench):
             return str(error)
         return ""
 
-    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> dict[str, Any]:
+    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> Answer:
         report = super()._report(stopped, smaller)
-        for name, own in report["guarantees"].items():
-            if name in smaller:
-                trace = self.traces[name]
-                own["trace"] = [_pairs(*step) for step in trace] if len(trace) > 1 else []
-                own["case"] = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
-            own["run_hits"] = self.guarantees[name].run_hits
-        if self.remembers:
-            report["runs"] = self.runs
-        if self.data["source"]:
-            report["crash_trace"] = [_pairs(*step) for step in self.traces.get("crash", [])]
-        return report
+        crash = tuple(_pairs(*step) for step in self.traces.get("crash", []))
+        runs = self.runs if self.remembers else None
+        return replace(report, runs=runs, crash_trace=crash if self.asked.source else None)
+
+    def _tried(self, name: str, smaller: Case | None) -> Tried:
+        found = super()._tried(name, smaller)
+        if smaller is None:
+            return found
+        trace = self.traces[name]
+        case = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
+        return replace(found, case=case, trace=tuple(_pairs(*step) for step in trace) if len(trace) > 1 else ())
 
 
 def _as_host(data: Any, but: Collection[str] = ()) -> Any:

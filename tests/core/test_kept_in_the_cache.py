@@ -145,7 +145,7 @@ def test_what_is_no_file_is_no_key_and_nobody_waits_for_it(tmp_path: Path, cache
         case _:  # a folder
             (cache / "notes.key").mkdir()
     write_note(tmp_path / "note.json", {"a": 1})
-    assert read_note(tmp_path / "note.json") == {"a": 1}
+    assert read_note(dict[str, int], tmp_path / "note.json") == {"a": 1}
 
 
 def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +160,7 @@ def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest
     assert str(tables.parse("a<=b").children[0]) == "<="
     assert not cache_folder().exists()
     write_note(tmp_path / "note.json", {"a": 1})
-    assert read_note(tmp_path / "note.json") == {"a": 1}
+    assert read_note(dict[str, int], tmp_path / "note.json") == {"a": 1}
 
 
 @pytest.mark.parametrize("bad", ["", "00", "no key"])
@@ -169,10 +169,10 @@ def test_what_is_no_whole_key_marks_nothing(tmp_path: Path, cache: Path, bad: st
     cache.mkdir(parents=True)
     (cache / "notes.key").write_text(bad)
     write_note(note, {"a": 1})
-    assert read_note(note) == {"a": 1}
+    assert read_note(dict[str, int], note) == {"a": 1}
     body = json.dumps([note.parts, {"a": 2}], sort_keys=True)
     key = bytes.fromhex(bad) if bad != "no key" else b""
     made_up = {"a": 2, "mark": hmac.new(key, body.encode(), hashlib.sha256).hexdigest()}
     note.write_text(json.dumps(made_up))
-    assert read_note(note) is None
+    assert read_note(dict[str, int], note) is None
     assert len(bytes.fromhex((cache / "notes.key").read_text())) == 32

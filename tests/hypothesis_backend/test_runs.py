@@ -3,7 +3,6 @@ definitions over all steps of a run."""
 
 from __future__ import annotations
 
-import json
 import random
 from collections.abc import Mapping
 from itertools import product
@@ -17,10 +16,12 @@ from oracle.values import breaks, keeps
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.backends.hypothesis import BACKEND, wire
+from avow.backends.hypothesis import BACKEND
 from avow.backends.hypothesis.backend import files
+from avow.backends.hypothesis.exchange import Question
 from avow.backends.hypothesis.functions import FunctionBench
 from avow.backends.hypothesis.generate import Inputs
+from avow.base.codec import from_text
 from avow.base.verdict import Outcome, Verdict
 from avow.formulas.formula import substitute
 from avow.formulas.values import Value
@@ -214,9 +215,9 @@ def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> N
     ports = "inputs( a : BOOL ) outputs( b : BOOL ) topics()"
     said = [show_term(t, "rcl") for t in (assumed, promised)]
     rcl = f"node n {{ {ports} assume m ( {said[0]} ) guarantee g ( {said[1]} ) }}"
-    data = json.loads(files(job(tmp_path, "def f(a): pass", rcl, "s.py:f", cases=400))["contract.json"])
-    clauses = [wire.decode(data[kind][0]["formula"]) for kind in ("assumptions", "guarantees")]
-    bench = Machine(data, tmp_path)
+    made = files(job(tmp_path, "def f(a): pass", rcl, "s.py:f", cases=400))["contract.json"]
+    bench = Machine(from_text(Question, made), tmp_path)
+    clauses = bench.formulas
     bench.table = table
     bench._sweep()
     each = bench.guarantees["g"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -15,7 +16,9 @@ from hoare.systems import make_job, sensor
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.backends.hypothesis import BACKEND
+from avow.backends.hypothesis.exchange import Answer, Met, Tried
 from avow.base import process
+from avow.base.codec import from_text, to_json
 from avow.base.verdict import Isolation, Verdict
 from avow.isolation import judge
 from avow.isolation.level import SANDBOX, seals
@@ -30,10 +33,21 @@ LEVELS = [
 WRONG = "return {'colour': 'green', 'done': set()}\n"
 """False for a reading of 120 or more."""
 
-FORGERY = (
-    '{"valid": 9, "edges": 9, "rejected": 0, "undecided": 0, "wanted": 9, "stopped": "", "observed": [], '
-    '"isolation": "sealed", "silent": "", "crash": null, "fault": "", "guarantees": {}}'
+GREEN = {name: Tried((Met("in.reading >= 0", 9, 9, 0),), 0) for name in ("low", "high")}
+FORGERY = json.dumps(
+    to_json(
+        Answer(
+            **dict.fromkeys(("valid", "edges", "wanted"), 9),
+            **dict.fromkeys(("replayed", "rejected", "undecided"), 0),
+            **dict.fromkeys(("stopped", "silent"), ""),
+            **dict.fromkeys(("left_out", "observed", "apart"), ()),
+            **dict.fromkeys(("unsteady", "crash", "crash_trace", "runs"), None),
+            isolation=Isolation.SEALED,
+            guarantees=GREEN,
+        )
+    )
 )
+"""A good answer, in the form that is read."""
 
 DAEMON = """
 import glob, os, time
@@ -353,3 +367,7 @@ def test_a_judge_whose_answer_is_another_has_given_none(tmp_path: Path) -> None:
     )
     done, said = judge.ask(dict[str, int], str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
     assert (done.code, said) == (0, None)
+
+
+def test_the_forgery_would_be_read() -> None:
+    assert from_text(Answer, FORGERY).guarantees == GREEN
