@@ -127,7 +127,8 @@ def from_json(kind: type[T], data: object) -> T:
     try:
         found: T = _reader(typing.cast(Any, kind))(data)
     except Unreadable as error:
-        raise Unreadable(*error.within(kind.__name__.lower())) from None
+        name = kind.__name__.strip("_").lower() if dataclasses.is_dataclass(kind) else "it"
+        raise Unreadable(*error.within(name)) from None
     return found
 
 

@@ -2,13 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import click
 
-from avow.base.codec import document
+from avow.base.codec import Foreign, Unreadable, document, from_json, parsed
+from avow.base.records import dataclass
 from avow.cli.options import ContractArgument, json_option
+from avow.kernel.certificate import Certificate, How
+
+
+@dataclass(frozen=True, slots=True)
+class _Kernel(Foreign):
+    certificates: Mapping[str, Certificate]
+
+
+@dataclass(frozen=True, slots=True)
+class _Report(Foreign):
+    """What of a report is of interest here."""
+
+    kernel: _Kernel
+
+
+@dataclass(frozen=True, slots=True)
+class Unfounded:
+    scope: str
+    claim: str
+    established: bool
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Founded:
+    """By so many solvers, on so many hypotheses."""
+
+    scope: str
+    claim: str
+    established: bool
+    solvers: int
+    hypotheses: int
+    vacuous: bool
+    key: str
 
 
 @click.command()
@@ -22,15 +57,13 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
     the claims under it; code 2 where there is nothing to establish.
     """
-    from avow.base.codec import from_text
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.files import read_regular
     from avow.base.workspace import system_folder
-    from avow.calculus.certificate_json import from_json
     from avow.calculus.certificates import scope_of
     from avow.calculus.invariants import with_lemmas
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
-    from avow.kernel.certificate import How
     from avow.kernel.check import Kernel, Refused
     from avow.kernel.statements import statements
     from avow.solving.apart import Both, versions
@@ -42,11 +75,10 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     known = statements(wired)
     names = {(s.node, s.digest): s.name for s in known.every}
     try:
-        kept = from_text(dict[str, Any], certificates.read_bytes())
-        if "kernel" in kept:
-            kept = kept["kernel"]["certificates"]
-        found = {scope: from_json(data) for scope, data in kept.items()}
-    except (ValueError, AttributeError, KeyError, TypeError) as error:
+        kept = parsed(read_regular(certificates))
+        whole = isinstance(kept, dict) and "kernel" in kept
+        found = from_json(_Report, kept).kernel.certificates if whole else from_json(dict[str, Certificate], kept)
+    except (OSError, Unreadable) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
     if not any(entry.how in claims for certificate in found.values() for entry in certificate.entries):
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: no claim is shown in it"))
@@ -54,10 +86,10 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     for claim in known.every:
         if (label := scope_of(claim)) is not None:
             scopes.setdefault(claim.digest, set()).add(label)
-    told: list[dict[str, object]] = []
+    told: list[Unfounded | Founded] = []
 
     def refuse(scope: str, claim: str, why: str) -> None:
-        told.append({"scope": scope, "claim": claim, "established": False, "why": why})
+        told.append(Unfounded(scope, claim, False, why))
         if not as_json:
             click.echo(f"refused      {scope}: {claim and claim + ': '}{why}")
 
@@ -82,10 +114,7 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
                     refuse(scope, called, str(why))
                     continue
                 rests_on = len(true.hypotheses)
-                told.append(
-                    {"scope": scope, "claim": called, "established": True, "solvers": true.solvers}
-                    | {"hypotheses": rests_on, "vacuous": true.vacuous, "key": true.key}
-                )
+                told.append(Founded(scope, called, True, true.solvers, rests_on, true.vacuous, true.key))
                 if as_json:
                     continue
                 rests = f"on {rests_on} hypotheses" + (", vacuous" if true.vacuous else "")
@@ -94,4 +123,4 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
         click.echo(document({"claims": told, "solvers": dict(versions())}))
     else:
         click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
-    return 0 if all(claim["established"] for claim in told) else 1
+    return 0 if all(claim.established for claim in told) else 1

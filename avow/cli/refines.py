@@ -133,7 +133,7 @@ def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
 
 
 def _data(result: Refinement) -> dict[str, object]:
-    from avow.calculus.certificate_json import to_json
+    from avow.base.codec import to_json
 
     return {
         "concrete": result.concrete,
@@ -153,7 +153,7 @@ def _data(result: Refinement) -> dict[str, object]:
             }
             for demand in result.demands
         ],
-        "certificates": [to_json(certificate) for certificate in result.certificates],
+        "certificates": to_json(result.certificates),
     }
 
 

@@ -21,12 +21,12 @@ import base64
 import json
 import os
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from avow.base.codec import LATER, canonical, from_json, to_json
+from avow.base.codec import LATER, Unreadable, canonical, from_text, to_json
 from avow.base.files import read_regular, sha256
 from avow.base.records import dataclass
 from avow.evidence.appending import append, locked
@@ -55,6 +55,15 @@ class Statement:
     """Who acknowledged, and why."""
     state: str = field(default="", metadata=LATER)
     """Digest of the damage that was acknowledged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line(Statement):
+    """As it is written: its number, the hash of the line before it, and its own, of all the rest."""
+
+    n: int = field(kw_only=True)
+    prev: str = field(kw_only=True)
+    hash: str = field(default="", kw_only=True, metadata=LATER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +108,15 @@ def read_index(path: Path) -> Index:
     previous = GENESIS
     *lines, torn = data.split(b"\n")
     for number, line in enumerate(lines):
-        read = _read(line)
-        if read is None:
+        said = _read(line)
+        if said is None:
             damage.append(f"line {number + 1} of the index of ledgers is not as it was written")
             continue
-        statement, place, mark, follows = read
-        if place != number or follows != previous:
+        if said.n != number or said.prev != previous:
             damage.append(f"line {number + 1} of the index of ledgers does not follow the line before it")
-        previous = mark
-        found.append(statement)
-        marks.append(mark)
+        previous = said.hash
+        found.append(said)
+        marks.append(said.hash)
     if torn and not torn.startswith(b'{"event":'):  # else a run was killed while writing it: the next one mends it
         damage.append("there is something behind the last line of the index of ledgers")
     return Index(tuple(found), tuple(marks), tuple(damage), True)
@@ -125,9 +133,9 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
         os.ftruncate(file, len(whole))  # what a killed run left half written
         lines = whole.splitlines()
         last = _read(lines[-1]) if lines else None
-        said = Statement(event, system, records, head, datetime.now(UTC).isoformat(timespec="seconds"), **more)
-        body = {**to_json(said), "n": len(lines), "prev": last[2] if last else GENESIS}
-        append(file, canonical({**body, "hash": sha256(canonical(body))}).encode() + b"\n")
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        follows = last.hash if last else GENESIS
+        append(file, _written(Line(event, system, records, head, now, **more, n=len(lines), prev=follows)) + b"\n")
 
 
 def _is_newest(index: Index, event: Event, system: str, records: int, head: str) -> bool:
@@ -135,17 +143,19 @@ def _is_newest(index: Index, event: Event, system: str, records: int, head: str)
     return bool(newest) and (newest[0].event, newest[0].records, newest[0].head) == (event, records, head)
 
 
-def _read(line: bytes) -> tuple[Statement, int, str, str] | None:
-    """(what it says, its number, its hash, what it follows); None for a line that is not as it was written."""
+def _written(said: Line) -> bytes:
+    """With its hash."""
+    mark = sha256(canonical(to_json(replace(said, hash=""))))
+    return canonical(to_json(replace(said, hash=mark))).encode()
+
+
+def _read(line: bytes) -> Line | None:
+    """None for a line that is not as it was written."""
     try:
-        body = json.loads(line)
-        mark = str(body.pop("hash"))
-        written = canonical({**body, "hash": sha256(canonical(body))}).encode()
-        place, follows = int(body.pop("n")), str(body.pop("prev"))
-        statement = from_json(Statement, body)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        said = from_text(Line, line)
+    except Unreadable:
         return None
-    return (statement, place, mark, follows) if written == line else None
+    return said if _written(said) == line else None
 
 
 # -- the head as other files state it -------------------------------------------------------------------------------

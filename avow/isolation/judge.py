@@ -6,7 +6,6 @@ it ended well and the pipe held its one line and nothing else.
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -16,9 +15,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from avow.base import process
-from avow.base.codec import Unreadable, from_json
+from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
+from avow.base.records import dataclass
 from avow.tuning.running import CHANNEL_PATIENCE
 from avow.tuning.sizes import CHANNEL_KEPT
 
@@ -77,32 +77,28 @@ def ask(
         process.end_orphans()
         os.close(channel.theirs)
         said = channel.close()
-    answer = _answer(said) if done.code == 0 and said is not None else None
-    if answer is not None and answer.pop(_ENDED, False):
-        process.ended_with(-signal.SIGKILL)
+    if done.code != 0 or said is None or said.count(b"\n") != 1 or not said.endswith(b"\n"):
+        return done, None
     try:
-        return done, None if answer is None else from_json(kind, answer)
+        word = from_text(_Word, said)
+        if word.ended:
+            process.ended_with(-signal.SIGKILL)
+        return done, from_json(kind, word.answer)
     except Unreadable:
         return done, None
 
 
-_ENDED = "ended by others"
-"""In a judge's word: its subject was ended by somebody else."""
+@dataclass(frozen=True, slots=True)
+class _Word:
+    """A judge's. `ended`: its subject was, by somebody else."""
+
+    answer: Any
+    ended: bool
 
 
-def _answer(data: bytes) -> dict[str, Any] | None:
-    if data.count(b"\n") != 1 or not data.endswith(b"\n"):
-        return None
-    try:
-        answer = json.loads(data)
-    except (ValueError, RecursionError):
-        return None
-    return answer if isinstance(answer, dict) else None
-
-
-def say(channel: int, answer: Mapping[str, Any]) -> None:
+def say(channel: int, answer: object) -> None:
     """The judge's one word to whoever started it."""
-    data = json.dumps({**answer, _ENDED: process.ended_by_others()}).encode() + b"\n"
+    data = canonical(to_json(_Word(answer, process.ended_by_others()))).encode() + b"\n"
     while data:
         data = data[os.write(channel, data) :]
     os.close(channel)

@@ -1,7 +1,6 @@
-"""Certificates as data (`avow.calculus.certificate_json` reads and writes them). An entry's place is its rank.
+"""Certificates as data. An entry's place is its rank; its hypotheses are computed (`avow.kernel.check`).
 
-Claims are named by digest and looked up in the system as it is now, with the certificate's lemmas: claims that nobody
-asked for, any formula, to be shown like others. Hypotheses are computed (`avow.kernel.check`).
+Claims are named by digest, and looked up in the system as it is now and among the lemmas: any formulas, to be shown.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from enum import StrEnum
 from avow.base import codec
 from avow.base.records import dataclass
 
-FORMAT = "avow/certificate/2"
+Format = StrEnum("Format", {"NOW": "avow/certificate/2"})
 
 
 class How(StrEnum):
@@ -74,6 +73,7 @@ class Entry:
 class Certificate:
     """`scope`: the derivation that it was made for, for people. `lemmas`: as `avow.calculus.invariants` writes them."""
 
+    format: Format = field(default=Format.NOW, kw_only=True)
     scope: str
     entries: tuple[Entry, ...]
     lemmas: tuple[tuple[str, ...], ...] = field(default=(), metadata=codec.LATER)

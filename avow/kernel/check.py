@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from avow.base.files import sha256
-from avow.kernel.certificate import FORMAT, Certificate, Entry, How, Question, Use
+from avow.kernel.certificate import Certificate, Entry, Format, How, Question, Use
 from avow.kernel.solvers import LOOK, Said, Solvers
 from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable, conjunction, symbol
@@ -87,7 +87,7 @@ class Kernel:
             raise Refused("a requirement rests on what only a derived contract may assume")
         answered = [answer for i in own for answer in answers[i]]
         needed |= {Needed(How.TOGETHER, "", sha256("\n".join(n)), n) for a in answered if (n := a.together)}
-        told = [FORMAT, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
+        told = [Format.NOW, entries[goal].digest, *map(astuple, sorted(needed)), sorted({a.digest for a in answered})]
         return Established(
             goal=entries[goal].digest,
             hypotheses=tuple(sorted(needed)),

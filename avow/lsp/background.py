@@ -8,15 +8,13 @@ nothing of the workspace: what a plan says (scenario, environment, providers) is
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
-from avow.base.codec import from_text, to_json
+from avow.base.codec import canonical, from_text, to_json
 from avow.base.process import die_with, kill_tree, unwatch, watch
 from avow.language.contract import Contract, Node
 from avow.language.load import check_in_part, sound_nodes
@@ -46,6 +44,14 @@ class Answer:
     def is_bad(self) -> bool:
         """Whether it is refuted or broken, and no mere consequence of another."""
         return self.verdict in ("refuted", "error") and not self.because
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What the process reads: files with their texts, and the keys of the nodes that are wanted."""
+
+    texts: tuple[tuple[str, str], ...]
+    nodes: tuple[str, ...]
 
 
 def askable(sources: Sequence[Source], contract: Contract) -> tuple[Node, ...]:
@@ -107,8 +113,8 @@ class Asked:
         try:
             assert process.stdin is not None
             assert process.stdout is not None
-            texts = [[s.file, s.text] for s in sources]
-            process.stdin.write(json.dumps({"texts": texts, "nodes": sorted(missing)}).encode())
+            wanted = _Wanted(tuple((s.file, s.text) for s in sources), tuple(sorted(missing)))
+            process.stdin.write(canonical(to_json(wanted)).encode())
             process.stdin.close()
             while line := await process.stdout.readline():
                 key, answers = from_text(tuple[str, tuple[Answer, ...]], line)
@@ -135,11 +141,11 @@ def main(parent: int) -> None:
     os.nice(10)  # whoever writes comes first
     from avow.sanity.analysis import analyse
 
-    asked: dict[str, Any] = json.load(sys.stdin)
-    contract, _ = check_in_part([Source(file, text) for file, text in asked["texts"]])
+    wanted = from_text(_Wanted, sys.stdin.read())
+    contract, _ = check_in_part([Source(file, text) for file, text in wanted.texts])
     for node in contract.nodes:
         key = _key(node)
-        if key not in asked["nodes"]:
+        if key not in wanted.nodes:
             continue
         answers = tuple(
             Answer(
@@ -154,7 +160,7 @@ def main(parent: int) -> None:
             )
             for result in analyse(node, contract)
         )
-        print(json.dumps(to_json((key, answers))), flush=True)
+        print(canonical(to_json((key, answers))), flush=True)
 
 
 if __name__ == "__main__":

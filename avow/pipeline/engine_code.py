@@ -70,7 +70,6 @@ TRUSTED = {
     "which claim an obligation is, and its certificate (avow/calculus)": (
         "calculus/obligations.py",
         "calculus/certificates.py",
-        "calculus/certificate_json.py",
         "pipeline/recheck.py",
     ),
     "solvers' processes (avow/solving)": ("solving/apart.py", "solving/question_process.py", "solving/cvc5_process.py"),

@@ -12,14 +12,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any
 
 from avow.assurance.certification import KernelRun
-from avow.base.codec import Unreadable, from_text
+from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
-from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
@@ -41,7 +39,7 @@ FILE = "certificates.json"
 
 def written(certificates: Certificates) -> str:
     """The certificates made, as the text that is kept beside the evidence."""
-    return json.dumps({scope: to_json(found) for scope, found in sorted(certificates.made.items())}, sort_keys=True)
+    return json.dumps(to_json(certificates.made), sort_keys=True)
 
 
 def still_counts(record: Evidence, root: Path, system: System, run: Run) -> bool:
@@ -154,6 +152,6 @@ def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablis
 def _read(text: str) -> dict[str, Certificate]:
     """What cannot be read is no certificate."""
     try:
-        return {scope: from_json(found) for scope, found in from_text(dict[str, Any], text).items()}
+        return from_text(dict[str, Certificate], text)
     except Unreadable:
         return {}

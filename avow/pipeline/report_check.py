@@ -20,16 +20,17 @@ from avow.assurance.codec import from_json, to_json
 from avow.assurance.history import history
 from avow.assurance.model import Case
 from avow.assurance.signed import KEYS
+from avow.base import codec
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, sha256
-from avow.calculus import certificate_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
 from avow.evidence.currency import as_of_now, changed, changed_since, not_established
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
+from avow.kernel.certificate import Certificate
 from avow.report import ATTESTATION, LeftOut, formats
 from avow.solving.apart import Both
 from avow.system.load import PLAN_FILE, load_system
@@ -192,7 +193,7 @@ def _kernel(case: Case, root: Path) -> Iterable[str]:
         if composition.frame.system.name != case.system:
             yield f"report.json: it names the contract of another system than {case.system}"
             return
-        kept = {scope: certificate_json.from_json(data) for scope, data in case.kernel.certificates.items()}
+        kept = codec.from_json(dict[str, Certificate], case.kernel.certificates)
     except (OSError, Rejected, Unreadable) as error:
         yield f"what the kernel established cannot be established again: {error}"
         return

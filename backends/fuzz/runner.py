@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, assert_never
 
 from avow.base import process
-from avow.base.codec import Unreadable, from_text, to_json
+from avow.base.codec import Unreadable, from_text
 from avow.base.verdict import Isolation
 from avow.isolation import judge
 from avow.isolation.level import available, sealed
@@ -256,7 +256,7 @@ def main() -> None:
     process.adopt_orphans()
     question = from_text(Question, Path(sys.argv[2]).read_bytes())
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    judge.say(channel, to_json(_answer(question)))
+    judge.say(channel, _answer(question))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
-from avow.base.codec import from_text, to_json
+from avow.base.codec import from_text
 from avow.base.files import text_or_nothing
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
@@ -170,7 +170,7 @@ class Bench:
                 self.apart = self._asked_apart() if self.doubles else []
         finally:
             fault = self.subject.close()
-        judge.say(channel, to_json(replace(self._report(stopped, smaller), fault=fault)))
+        judge.say(channel, replace(self._report(stopped, smaller), fault=fault))
         return 0
 
     def _told(self) -> int:

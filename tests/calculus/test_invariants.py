@@ -9,8 +9,8 @@ from random import Random
 
 import pytest
 
+from avow.base.codec import from_json, to_json
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
@@ -18,6 +18,7 @@ from avow.calculus.finder import Hint
 from avow.calculus.invariants import read, write
 from avow.calculus.variables import frame, system_variable
 from avow.calculus.wiring import wiring
+from avow.kernel.certificate import Certificate
 from avow.kernel.statements import Claimed
 from avow.language.sorts import INTEGER, REAL
 from avow.language.terms import Compare, Literal
@@ -161,7 +162,7 @@ def certified(folder: Path) -> Certificates:
 def test_a_certificate_has_the_invariant_as_a_claim_of_its_own(tmp_path: Path) -> None:
     found = certified(tmp_path)
     scope = requirement_scope("R")
-    kept = from_json(to_json(found.made[scope]))
+    kept = from_json(Certificate, to_json(found.made[scope]))
     assert kept == found.made[scope]
     assert kept.lemmas
     again = Certificates(found.composition, {scope: kept})

@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 from avow.assurance import codec as cases
 from avow.backend_kit.timeline import timelines
 from avow.base.codec import LATER, Unreadable, called, canonical, from_json, from_text, schema, to_json
-from avow.calculus import certificate_json
 from avow.calculus.kept_answers import KeptAnswers
 from avow.evidence.heads import read_index
 from avow.evidence.ledger import Ledger
 from avow.evidence.signing import Signed, signature_path, verify_signature
 from avow.isolation.observed import Observed
+from avow.kernel.certificate import Certificate
 from avow.kernel.solvers import Said
 
 
@@ -178,8 +178,8 @@ def test_what_was_stored_reads_back_and_is_written_the_same(tmp_path: Path) -> N
     assert found.statements[2].note == "A. Person: seen"
     assert found.marks == tuple(json.loads(line)["hash"] for line in stored["index"])
     assert canonical(cases.to_json(cases.from_json(json.loads(stored["case"])))) == stored["case"]
-    certificate = certificate_json.from_json(json.loads(stored["certificate"]))
-    assert canonical(certificate_json.to_json(certificate)) == stored["certificate"]
+    certificate = from_text(Certificate, stored["certificate"])
+    assert canonical(to_json(certificate)) == stored["certificate"]
 
 
 def test_a_stored_ledger_is_whole_and_would_be_written_the_same(tmp_path: Path) -> None:

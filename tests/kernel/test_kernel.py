@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 from calculus.make import make, node, outcomes
 
-from avow.base.codec import Unreadable, canonical
+from avow.base.codec import Unreadable, canonical, from_json, to_json
 from avow.base.verdict import Verdict
-from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
@@ -66,7 +65,7 @@ def test_hypotheses_are_computed(tmp_path: Path) -> None:
     assert {(How.GUARANTEE, "a"), (How.GUARANTEE, "b"), (How.GUARANTEE, "c"), (How.TOGETHER, "")} <= names
     assert any(kind is How.ENVIRONMENT for kind, _ in names)
     assert not found.vacuous
-    again = from_json(json.loads(canonical(to_json(certificate))))
+    again = from_json(Certificate, json.loads(canonical(to_json(certificate))))
     assert established(certificates, again) == found
 
 
@@ -182,12 +181,12 @@ def test_the_environment_is_what_no_node_provides(tmp_path: Path) -> None:
 )
 def test_what_is_no_certificate_is_refused(data: object) -> None:
     with pytest.raises(Unreadable):
-        from_json(data)
+        from_json(Certificate, data)
 
 
 def test_json_there_and_back(tmp_path: Path) -> None:
     _, certificate = made(tmp_path)
-    assert from_json(to_json(certificate)) == certificate
+    assert from_json(Certificate, to_json(certificate)) == certificate
 
 
 FORMULAS = (

@@ -9,9 +9,9 @@ import pytest
 from calculus.make import CONTRACTS, Limits, make
 from calculus.test_commands import invoke
 
+from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
-from avow.calculus.certificate_json import to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import composition_obligations, reestablished, settle_all

@@ -12,7 +12,7 @@ from calculus.make import make
 from kernel.test_kernel import LOOP, PLAN, made
 
 from avow.assurance.certification import KernelRun
-from avow.calculus.certificate_json import to_json
+from avow.base.codec import to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.obligations import reestablished
 from avow.evidence.claims import Reestablished

@@ -130,8 +130,7 @@ def main() -> None:
             replies += found
     finally:
         fault = process.close() or fault
-    told = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.silent))
-    judge.say(channel, to_json(told))
+    judge.say(channel, Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.silent)))
 
 
 if __name__ == "__main__":
