@@ -18,6 +18,9 @@ from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
 from .unseen import WATCHED, Line, Unseen, own, unseen
 
 _INSTALL = "sudo apt install clang"
+_INSTALL_RUN_TIME = "sudo apt install --install-recommends clang; a package of its own, libclang-rt-*-dev, has them"
+_RUN_TIME = re.compile(r"cannot find \S*libclang_rt\.")
+"""What the linker says where clang was installed without them."""
 LINK = "avow-adapter.hpp"
 """The adapter by another name: its own path may hold what no line of C++ can say."""
 _COMMON = (
@@ -149,6 +152,8 @@ def _build(
     watched = [f"-Wl,-y,{name}" for name in WATCHED]
     done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
     if done.code != 0 or not program.is_file():
+        if _RUN_TIME.search(done.stderr):
+            raise ToolMissing(f"clang's run-time libraries, which it links, are not here ({_INSTALL_RUN_TIME})")
         raise NotBuilt(_first(done, reading, folder))
     return Built(program, tuple(dict.fromkeys(read)), done.stdout + done.stderr)
 

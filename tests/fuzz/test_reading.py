@@ -26,6 +26,19 @@ def test_without_clang_it_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert all("sudo apt install clang" in o.summary for o in report.outcomes)
 
 
+def test_with_half_of_clang_it_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Installed without its run-time libraries, it compiles and does not link: no fault of the subject's."""
+    fake = tmp_path / "clang++"
+    missing = "/usr/bin/ld: cannot find /usr/lib/clang/lib/linux/libclang_rt.fuzzer-x86_64.a: No such file or directory"
+    compiles = 'for word; do [ "$before" = -o ] && : > "$word"; [ "$word" = -c ] && c=1; before=$word; done'
+    fake.write_text(f"#!/bin/sh\n{compiles}\n[ $c ] || {{ echo '{missing}' >&2; exit 1; }}\n")
+    fake.chmod(0o755)
+    monkeypatch.setattr(building, "clang", lambda: Tool("clang++", "1", str(fake), ""))
+    report = LIMITER.report(tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
+    assert all("run-time libraries" in o.summary for o in report.outcomes)
+
+
 def test_no_text_becomes_code(tmp_path: Path) -> None:
     """Whatever a parameter says: the tables are numbers, generated names, and texts escaped byte for byte."""
     odd = replace(LIMITER, params={"vmax": 1.5, 'x"; int main() {} //': '\\\n*/ ??/ \u00e9 "', "deep": {"R(": True}})
