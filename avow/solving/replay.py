@@ -51,7 +51,7 @@ def _is_seen(translator: Translator, formulas: Sequence[Term], values: Mapping[V
         return False
     put = [(translator.variable(v), translator.value(value, v.sort)) for v, value in values.items()]
     facts = [*translator.background(values), *map(translator.term, formulas)]
-    return all(z3.is_true(z3.simplify(z3.substitute(fact, *put))) for fact in facts)
+    return not facts or z3.is_true(z3.simplify(z3.substitute(z3.And(facts), *put)))
 
 
 def _replay(
