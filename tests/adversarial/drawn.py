@@ -4,6 +4,10 @@ A system has delays, circles, constants and other inputs from the environment wi
 topics with several publishers, clauses that speak of other steps, subsystems and derivations with named rules. A node
 keeps its guarantees as long as its assumptions have held; else it may put out anything. What follows here is a reading
 of its own of what all that means: nothing of Avow is used but its parser.
+
+Drawn without an aim, formulas contradict one another nearly always, and then nothing is said of the system. So there is
+a run that most clauses of a rich system allow: each output and each input from outside has a usual value, and what is
+assumed, promised and required says that it has it, mostly under some condition. The others are drawn without an aim.
 """
 
 from __future__ import annotations
@@ -56,14 +60,15 @@ def formula(random: Random, names: Sequence[str], depth: int = 2, *, remembers: 
     return Formula(Formulas(random, replace(PLAIN, past=remembers)).formula(depth, dict.fromkeys(names, BOOL)))
 
 
-def response(random: Random, names: Sequence[str]) -> Formula:
+def response(random: Random, names: Sequence[str], wanted: str = "") -> Formula:
     """A clause that demands something of later steps."""
-    return Formula(Formulas(random, PLAIN).response(1, dict.fromkeys(names, BOOL)))
+    return Formula(Formulas(random, PLAIN).response(1, dict.fromkeys(names, BOOL), wanted))
 
 
-def says(random: Random, name: str) -> Formula:
-    """That a value is so, or not."""
-    return Formula(f"({name} == {str(random.random() < 0.5).upper()})")
+def says(random: Random, name: str, usual: bool | None) -> Formula:
+    """That a value is so, or not; mostly the usual one, if there is one."""
+    value = random.random() < 0.5 if usual is None else usual == (random.random() < 0.95)
+    return Formula(f"({name} == {str(value).upper()})")
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,10 @@ class Wire:
     topic: bool = False
 
 
+AIMLESS = 0.05
+"""How often a clause of a rich system is drawn without an aim."""
+
+
 class System:
     """Nodes n0, n1, …, each with an output and some inputs. `rich`: with all that a system may have."""
 
@@ -84,6 +93,10 @@ class System:
         self.rich = rich
         self.nodes = [f"n{k}" for k in range(random.randint(2, 4 if rich else 3))]
         self.initial: dict[str, bool | str | None] = {n: random.choice([True, False, None]) for n in self.nodes}
+        self.usual = {name: random.random() < 0.5 for name in (*self.nodes, *ENVIRONMENT) if rich}
+        for name in self.nodes:
+            if rich and random.random() < 0.8:
+                self.initial[name] = self.usual[name]
         self.remembers = random.choice([0.0, 0.3]) if rich else 0.0
         several = rich and len(self.nodes) > 2 and random.random() < 0.3
         self.publishers = random.sample(self.nodes, 2) if several else []
@@ -94,22 +107,21 @@ class System:
             ports = [self.port(random, name, k) for k in range(random.randint(1, 2))]
             for port, wire in dict(ports).items():
                 self.wires[name, port] = wire
-            ins = [f"in.{port}" for port in dict(ports)]
-            number = random.randint(0, 2)
-            self.assumed[name] = [formula(random, ins, 1, remembers=self.remembers) for _ in range(number)]
+            self.assumed[name] = [self.assumption(random, name) for _ in range(random.randint(0, 2))]
             self.promised[name] = [self.promise(random, name) for _ in range(random.randint(1, 2))]
+            if rich and random.random() < 0.7:
+                self.promised[name][0] = says(random, f"out.o{name}", self.usual[name])
         for name in self.nodes:
             if (name, CONSTANT) in self.wires and random.random() < 0.4:
                 self.initial[name] = CONSTANT
         self.outside: dict[str, tuple[Formula | None, bool]] = {}
         for name in sorted({wire.outside for wire in self.wires.values() if rich} & set(ENVIRONMENT)):
-            assume = says(random, f"in.{name}") if random.random() < 0.4 else None
+            assume = says(random, f"in.{name}", self.usual[name]) if random.random() < 0.6 else None
             if self.remembers and name != CONSTANT and random.random() < 0.4:
-                assume = self.demand(random, [f"in.{name}"])
+                assume = self.demand(random, [f"in.{name}"], f"in.{name}", self.usual[name])
             if assume is not None or name == CONSTANT:
                 self.outside[name] = assume, name == CONSTANT
-        ports = [f"{n}.o{n}" for n in self.nodes]
-        self.required = [self.demand(random, ports) if self.remembers else formula(random, ports) for _ in range(2)]
+        self.required = [self.requirement(random) for _ in range(2)]
         self.names = ["g0", "g1"]
         self.text, self.plan = self.written(), self.planned(random)
 
@@ -123,13 +135,42 @@ class System:
         port = random.choice(ENVIRONMENT) if self.rich else f"i{k}{name}"
         return port, Wire(outside=port)
 
-    def promise(self, random: Random, name: str) -> Formula:
-        return self.demand(random, [f"in.{port}" for node, port in self.wires if node == name] + [f"out.o{name}"])
+    def inputs_of(self, name: str) -> list[str]:
+        return [f"in.{port}" for node, port in self.wires if node == name]
 
-    def demand(self, random: Random, names: Sequence[str]) -> Formula:
+    def assumption(self, random: Random, name: str) -> Formula:
+        """About a node's inputs; with an aim, about one whose usual value is known."""
+        ins = self.inputs_of(name)
+        usual = {f"in.{port}": w.node or w.outside for (n, port), w in self.wires.items() if n == name and not w.topic}
+        if not self.usual or not usual or random.random() < AIMLESS:
+            return formula(random, ins, 1, remembers=self.remembers)
+        port = random.choice(list(usual))
+        return self.aimed(random, ins, port, self.usual[usual[port]])
+
+    def promise(self, random: Random, name: str) -> Formula:
+        ins, mine = self.inputs_of(name), f"out.o{name}"
+        return self.demand(random, [*ins, mine], mine, self.usual.get(name))
+
+    def requirement(self, random: Random) -> Formula:
+        ports = [f"{n}.o{n}" for n in self.nodes]
+        if not self.rich:
+            return formula(random, ports)
+        name = random.choice(self.nodes)
+        return self.demand(random, ports, f"{name}.o{name}", self.usual[name])
+
+    def demand(self, random: Random, names: Sequence[str], aim: str, usual: bool | None) -> Formula:
+        """A clause over some names; with an aim, that one of them has its usual value, now or at later steps."""
+        aimed = usual is not None and random.random() >= AIMLESS
         if random.random() < self.remembers / 2:
-            return response(random, names)
-        return formula(random, names, remembers=self.remembers)
+            return response(random, names, says(random, aim, usual).text if aimed else "")
+        return self.aimed(random, names, aim, usual) if aimed else formula(random, names, remembers=self.remembers)
+
+    def aimed(self, random: Random, names: Sequence[str], aim: str, usual: bool | None) -> Formula:
+        """That a value is the usual one, mostly under some condition."""
+        said = says(random, aim, usual)
+        if random.random() < 0.6:
+            return said
+        return Formula(f"({formula(random, names, 1, remembers=self.remembers).text}) -> {said.text}")
 
     def written(self) -> str:
         text = ""
@@ -151,12 +192,11 @@ class System:
         """Another system, which has much of this one."""
         for _ in range(random.randint(1, 2)):
             name = random.choice(self.nodes)
-            ins = [f"in.{port}" for node, port in self.wires if node == name]
             match random.randrange(7):
                 case 0:
                     self.promised[name][0] = self.promise(random, name)
                 case 1:
-                    self.assumed[name] = [formula(random, ins, 1, remembers=self.remembers)]
+                    self.assumed[name] = [self.assumption(random, name)]
                 case 2:
                     self.initial[name] = random.choice([True, False, None])
                 case 3:

@@ -33,7 +33,7 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, catalogue, compose_work
 from avow.system.load import load_system
 
-from .drawn import Formula, System, formula
+from .drawn import Formula, System, formula, says
 
 REASONS = "persistence: {because: latched}, one_output: {because: one each}"
 
@@ -44,15 +44,27 @@ class Judged(System):
     def __init__(self, seed: int, *, rich: bool = False) -> None:
         self.chance = Random(seed)
         super().__init__(seed, rich=rich)
-        for n in self.nodes:  # most of what is random is broken: some of it is made likelier
-            if self.chance.random() < 0.6:
-                self.promised[n][0] = formula(self.chance, [f"out.o{n}"], 0)
+        if not rich:  # most of what is random is broken: some of it is made likelier
+            for n in self.nodes:
+                if self.chance.random() < 0.6:
+                    self.promised[n][0] = formula(self.chance, [f"out.o{n}"], 0)
         outputs = [f"{n}.o{n}" for n in self.nodes]
-        pairs = [(formula(self.chance, outputs, 1), formula(self.chance, outputs, 1)) for _ in self.required]
-        self.required = [Formula(f"({one.text}) or ({other.text})") for one, other in pairs]
+        self.required = [
+            Formula(f"({formula(self.chance, outputs, 1).text}) or ({self.most(outputs).text})") for _ in self.required
+        ]
         self.text, self.plan = self.written(), self.planned(self.chance)
-        self.refuted = {(n, k) for n in self.nodes for k in range(len(self.promised[n])) if self.chance.random() < 0.15}
+        often = 0.05 if rich else 0.15
+        self.refuted = {
+            (n, k) for n in self.nodes for k in range(len(self.promised[n])) if self.chance.random() < often
+        }
         self.told()
+
+    def most(self, outputs: Sequence[str]) -> Formula:
+        """Of this step alone, as all that is required here."""
+        if not self.usual:
+            return formula(self.chance, outputs, 1)
+        name = self.chance.choice(self.nodes)
+        return says(self.chance, f"{name}.o{name}", self.usual[name])
 
     def told(self) -> None:
         """The plan with reasons, another name for its derivation, and some refutations accepted."""
@@ -157,10 +169,13 @@ def told(folder: Path, seed: int, edits: int = 3, *, rich: bool = False) -> int:
 @pytest.mark.slow
 @pytest.mark.parametrize("rich", [False, True])
 def test_no_case_says_what_some_run_breaks(tmp_path: Path, rich: bool) -> None:
-    assert sum(told(tmp_path, seed, rich=rich) for seed in ((7,) if rich else range(5))) > 0
+    """Of rich systems most say something, so that the test is one."""
+    said = [told(tmp_path, seed, rich=rich) for seed in (range(100, 104) if rich else range(5))]
+    assert sum(map(bool, said)) >= (3 if rich else 1)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("rich", [False, True])
-def test_no_case_says_what_some_run_breaks_at_length(tmp_path: Path, rich: bool) -> None:
-    assert sum(told(tmp_path, seed, rich=rich) for seed in range(100, 250)) > 20
+@pytest.mark.parametrize("start", range(100, 250, 25))
+def test_no_case_says_what_some_run_breaks_at_length(tmp_path: Path, rich: bool, start: int) -> None:
+    assert sum(bool(told(tmp_path, seed, rich=rich)) for seed in range(start, start + 25)) >= (8 if rich else 1)

@@ -239,7 +239,7 @@ def states(clauses: str, rules: list[tuple[bool, int, int, int, bool]], count: i
         _, a, b, c, flips = next(rule for rule in rules if rule[0] is m)
         x, y, m = (
             a * x + b * y + c,
-            (y + 1 if "in.ly + 1" in clauses else x if "out.y == in.lx" in clauses else y),
+            (y + 1 if "out.y == in.ly + 1" in clauses else x if "out.y == in.lx" in clauses else y),
             m != flips,
         )
         found.append({"x": x, "y": y, "m": m})

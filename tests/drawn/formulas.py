@@ -397,10 +397,10 @@ class Formulas:
                 return f"{word}[{self.random.randrange(3)} steps]({inner()})"
         return f"({inner()}) since{perhaps(0.75, choice(ORDERS) + ' ')} ({inner()})"
 
-    def response(self, depth: int, names: Names) -> str:
-        """A trigger and what it demands of steps to come."""
+    def response(self, depth: int, names: Names, wanted: str = "") -> str:
+        """A trigger and what it demands of steps to come, of one's own choice or `wanted`."""
         unit, choice = "s" if self.knobs.seconds else "steps", self.random.choice
-        wanted, more = self.formula(depth, names), self.formula(depth, names)
+        wanted, more = wanted or self.formula(depth, names), self.formula(depth, names)
         limited = [f"{word}[{self.random.randrange(4)} {unit}]({wanted})" for word in ("within", "for")]
         forms = [*limited, f"(({wanted}) until ({more}))", *([] if self.knobs.seconds else [f"next({wanted})"])]
         return f"({self.formula(depth, names)}) -> {choice(forms)}"
