@@ -53,9 +53,8 @@ def _of_requirements(
     plan: Piece, contract: Contract, views: Sequence[ObligationView], off: frozenset[str]
 ) -> Iterator[OpenItem]:
     """What the sentences of requirements say otherwise than their formulas."""
-    listed = plan.at("requirements")
     elements = elements_of(contract.nodes)
-    for name, piece in (listed.entries or {}).items() if listed else ():
+    for name, _, piece in plan.keyed("requirements"):
         text, formula = piece.at("text"), piece.at("formula")
         if text is None or formula is None:
             continue

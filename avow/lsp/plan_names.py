@@ -100,10 +100,8 @@ class _Reader:
 
     def keys(self, piece: Piece | None) -> Iterator[tuple[str, int, Piece]]:
         """Each key of a mapping, with the place of its text."""
-        if piece is None or piece.entries is None:
-            return
-        for name, inner in piece.entries.items():
-            yield name, self.region(piece.key_span(name)).start, inner
+        for name, span, inner in piece.keyed() if piece is not None else ():
+            yield name, self.region(span).start, inner
 
     # -- meanings ------------------------------------------------------------------------------------------------------
 

@@ -41,8 +41,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_requirements(plan, root, nodes),
         *_goals(plan, root, nodes),
         *_nodes(plan, root, nodes),
-        *_model(root, nodes),
-        *_ros(root, nodes),
+        *_running(root, nodes),
         *_scenario(plan, root, contract, nodes),
         *_findings(root, nodes),
         *_suppositions(plan, root),
@@ -85,10 +84,8 @@ def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 
 def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     subsystems = {subsystem.name for subsystem in plan.subsystems}
-    piece = root.at("environment")
-    for name in (piece.entries or {}) if piece else ():
+    for name, span, _ in root.keyed("environment"):
         owner, _, port = name.partition(".")
-        span = piece.key_span(name) if piece else root.span
         if owner == "in":
             known = sorted({p.name for node in nodes.values() for p in node.inputs})
             if port not in known:
@@ -103,8 +100,7 @@ def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
-    piece = root.at("requirements")
-    for name, requirement in (piece.entries or {}).items() if piece else ():
+    for name, _, requirement in root.keyed("requirements"):
         for item in listed(requirement.at("supported_by")):
             owner, dot, clause = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
@@ -117,22 +113,17 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
 
 
 def _suppositions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
-    methods = sorted(
-        {"compose", "sanity"} | {"compose", "sanity", *(method.id for node in plan.nodes for method in node.methods)}
-    )
-    piece = root.at("suppositions")
-    for name in (piece.entries or {}) if piece else ():
+    methods = sorted({"compose", "sanity", *(method.id for node in plan.nodes for method in node.methods)})
+    for name, span, _ in root.keyed("suppositions"):
         method = name.partition(".")[0]
         if method not in methods:
-            span = piece.key_span(name) if piece else root.span
             message = f"suppositions.{name}: the plan has no method {method!r}"
             yield Diagnostic("PLAN106", message, span, hint=suggest(method, methods))
 
 
 def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     known = [*nodes, *(subsystem.name for subsystem in plan.subsystems)]
-    piece = root.at("compose")
-    for name, goal in (piece.entries or {}).items() if piece else ():
+    for name, _, goal in root.keyed("compose"):
         for item in listed(goal.at("select")):
             if item.text not in known:
                 yield _unknown(f"compose.{name}.select: node", item.text, known, item.span)
@@ -154,19 +145,12 @@ def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnost
                     yield _unknown(where, name, known, method.options.at("guarantees", index))
 
 
-def _model(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
-    for key in ("compound", "external"):
-        piece = root.at("model", key)
-        for name in (piece.entries or {}) if piece else ():
+def _running(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    """What the plan says of nodes as they run."""
+    for path in (("model", "compound"), ("model", "external"), ("ros", "nodes")):
+        for name, span, _ in root.keyed(*path):
             if name not in nodes:
-                yield _unknown(f"model.{key}: node", name, nodes, piece.key_span(name) if piece else root.span)
-
-
-def _ros(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
-    piece = root.at("ros", "nodes")
-    for name in (piece.entries or {}) if piece else ():
-        if name not in nodes:
-            yield _unknown("ros.nodes: node", name, nodes, piece.key_span(name) if piece else root.span)
+                yield _unknown(f"{'.'.join(path)}: node", name, nodes, span)
 
 
 def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node]) -> Iterator[Diagnostic]:

@@ -169,7 +169,7 @@ class _PlanReader:
 
     def pictures(self, scenario: Scenario | None) -> Iterator[Picture]:
         tables = {table.name: table for table in scenario.tables} if scenario else {}
-        for name, piece in self.entries("pictures"):
+        for name, _, piece in self.root.keyed("pictures"):
             source = piece.at("table") or piece
             table = tables.get(source.text)
             if table is None:
@@ -188,11 +188,6 @@ class _PlanReader:
     def text(self, *keys: str) -> str | None:
         piece = self.root.at(*keys)
         return None if piece is None or piece.value is None else piece.text
-
-    def entries(self, *keys: str) -> Iterator[tuple[str, Piece]]:
-        piece = self.root.at(*keys)
-        if piece is not None and piece.entries is not None:
-            yield from piece.entries.items()
 
     def items(self, *keys: str) -> list[Piece]:
         piece = self.root.at(*keys)
@@ -254,7 +249,7 @@ class _PlanReader:
                 )
 
     def environment(self) -> Iterator[EnvironmentInput]:
-        for port, piece in self.entries("environment"):
+        for port, _, piece in self.root.keyed("environment"):
             assume = piece.at("assume")
             because = piece.at("because")
             constant = piece.at("constant")
@@ -271,20 +266,20 @@ class _PlanReader:
         if self.root.at("scenario") is None:
             return None
         tables: dict[str, Table] = {}
-        for name, piece in self.entries("scenario"):
+        for name, _, piece in self.root.keyed("scenario"):
             if name not in RESERVED:
                 table = self.table(name, piece)
                 if table is not None:
                     tables[name] = table
         interpret: dict[str, tuple[str, tuple[str, ...]]] = {}
-        for port, piece in self.entries("scenario", "interpret"):
+        for port, _, piece in self.root.keyed("scenario", "interpret"):
             found = interpretation(piece.text, tables)
             if isinstance(found, str):
                 self.fault("PLAN109", f"scenario.interpret.{port}: {found}", piece.span)
             else:
                 interpret[port] = found
         domains: dict[str, tuple[str, ...]] = {}
-        for name, piece in self.entries("scenario", "domains"):
+        for name, _, piece in self.root.keyed("scenario", "domains"):
             values = domain(piece, tables)
             if isinstance(values, str):
                 self.fault("PLAN109", f"scenario.domains.{name}: {values}", piece.span)
@@ -316,7 +311,7 @@ class _PlanReader:
         return self.noted(read_csv(name, path, source.span))
 
     def requirements(self) -> Iterator[Requirement]:
-        for name, piece in self.entries("requirements"):
+        for name, _, piece in self.root.keyed("requirements"):
             formula, temporal, text = piece.at("formula"), piece.at("temporal"), piece.at("text")
             if formula is not None and temporal is not None:
                 self.fault("PLAN110", f"{name}: either formula or temporal, not both", temporal.span)
@@ -339,7 +334,7 @@ class _PlanReader:
         return Confirmation(**texts)
 
     def goals(self) -> Iterator[ComposeGoal]:
-        for name, piece in self.entries("compose"):
+        for name, _, piece in self.root.keyed("compose"):
             rule = piece.at("rule")
             select = tuple(_texts(piece.at("select")))
             for twice in [node for node, count in Counter(select).items() if count > 1]:
@@ -347,7 +342,7 @@ class _PlanReader:
             yield ComposeGoal(name, select, rule.text if rule else None, piece.located(), piece.span)
 
     def subsystems(self) -> Iterator[Subsystem]:
-        for name, piece in self.entries("subsystems"):
+        for name, span, piece in self.root.keyed("subsystems"):
             nodes, folder, rule = piece.at("nodes"), piece.at("system"), piece.at("rule")
             if nodes is None and folder is None:
                 self.fault("PLAN104", f"subsystems.{name}: either nodes or system is wanted", piece.span)
@@ -355,8 +350,6 @@ class _PlanReader:
                 self.fault("PLAN110", f"subsystems.{name}: either nodes or system, not both", folder.span)
             path = self.beside(folder) if folder is not None else None
             members = tuple(_texts(nodes))
-            place = self.root.at("subsystems")
-            span = place.key_span(name) if place is not None else piece.span
             yield Subsystem(name, members, rule.text if rule else None, piece.located(), path, span)
 
     def beside(self, piece: Piece) -> Path | None:
@@ -372,7 +365,7 @@ class _PlanReader:
         return path
 
     def nodes(self) -> Iterator[NodePlan]:
-        for name, piece in self.entries("nodes"):
+        for name, _, piece in self.root.keyed("nodes"):
             criticality, title = piece.at("criticality"), piece.at("title")
             methods = self.noted(read_methods(name, piece))
             level = criticality.text if criticality else "medium"

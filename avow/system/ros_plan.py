@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
 from avow.base.diagnostics import Diagnostic
 from avow.ros.names import Placed, Resolver, is_name
 from avow.system.plan import Ros
 from avow.system.strict_yaml import Piece
-
-Paths = Callable[..., Iterator[tuple[Piece, Path]]]
 
 
 def read_ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
@@ -20,10 +15,7 @@ def read_ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
     if piece is None:
         return Ros(), faults
     distro = piece.at("distro")
-    nodes = piece.at("nodes")
-    placed = tuple(
-        (node, _placed(node, entry, faults)) for node, entry in ((nodes.entries or {}) if nodes else {}).items()
-    )
+    placed = tuple((node, _placed(node, entry, faults)) for node, _, entry in piece.keyed("nodes"))
     return Ros(distro.text if distro is not None else None, Resolver(placed)), faults
 
 
@@ -32,12 +24,10 @@ def _placed(node: str, entry: Piece, faults: list[Diagnostic]) -> Placed:
     whole = f"/{name.text.lstrip('/')}" if name is not None else f"/{node}"
     if name is not None and not is_name(name.text):
         faults.append(_no_name(f"ros.nodes.{node}.name", name))
-    remap = entry.at("remap")
     remaps: list[tuple[str, str]] = []
-    for old, new in ((remap.entries or {}) if remap is not None else {}).items():
-        assert remap is not None
+    for old, span, new in entry.keyed("remap"):
         if not is_name(old):
-            faults.append(_no_name(f"ros.nodes.{node}.remap", Piece(remap.key_span(old), text=old)))
+            faults.append(_no_name(f"ros.nodes.{node}.remap", Piece(span, text=old)))
         elif not is_name(new.text):
             faults.append(_no_name(f"ros.nodes.{node}.remap.{old}", new))
         else:

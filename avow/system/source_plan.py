@@ -37,7 +37,7 @@ def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic
         message = f"nodes.{name}: memory is of a class with a method step, and kind is {texts['kind']}"
         faults.append(Diagnostic("PLAN110", message, memory.span))
     held: dict[str, str] = {}
-    for port, part in (memory.entries or {}).items() if memory is not None else ():
+    for port, _, part in node.keyed("memory"):
         attribute = part.text.removeprefix("self.")
         if attribute in held.values():
             message = f"nodes.{name}.memory: self.{attribute} stands there twice"

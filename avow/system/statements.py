@@ -73,27 +73,21 @@ def _own(statement: Statement, plan: Plan) -> bool:
 
 
 def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
-    for port, piece in _entries(root, "environment"):
+    for port, _, piece in root.keyed("environment"):
         if piece.at("assume") is not None or _is_true(piece.at("constant")):
             yield f"environment.{port}", piece
     for section in ("compose", "subsystems"):
-        for goal, piece in _entries(root, section):
+        for goal, _, piece in root.keyed(section):
             for key, name in _ARGUMENTS.items():
                 argument = piece.at(key)
                 if argument is not None:
                     yield f"{goal}.{name}", argument
-    for name, piece in _entries(root, "suppositions"):
+    for name, _, piece in root.keyed("suppositions"):
         yield f"suppositions.{name}", piece
-    for name, piece in _entries(root, "requirements"):
+    for name, _, piece in root.keyed("requirements"):
         amounts = piece.at("amounts")
         if amounts is not None:
             yield f"requirements.{name}.amounts", amounts
-
-
-def _entries(root: Piece, key: str) -> Iterator[tuple[str, Piece]]:
-    piece = root.at(key)
-    if piece is not None and piece.entries is not None:
-        yield from piece.entries.items()
 
 
 def _is_true(piece: Piece | None) -> bool:

@@ -69,6 +69,13 @@ class Piece:
                 piece = piece.entries.get(step) if piece.entries is not None else None
         return piece
 
+    def keyed(self, *path: str | int) -> Iterator[tuple[str, Span, Piece]]:
+        """Each key of the mapping at a path, with its place and what stands under it."""
+        piece = self.at(*path)
+        if piece is not None and piece.entries is not None:
+            for name, inner in piece.entries.items():
+                yield name, piece.key_span(name), inner
+
     def key_span(self, key: str) -> Span:
         """The place of a key of this mapping."""
         return self.keys.get(key, self.span)
