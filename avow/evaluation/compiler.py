@@ -141,7 +141,8 @@ class Compiler:
     free: dict[str, int] = field(default_factory=dict)
     bound: dict[str, int] = field(default_factory=dict)
     size: int = 0
-    known: dict[Term, Code] = field(default_factory=dict)
+    known: dict[int, tuple[Term, Code]] = field(default_factory=dict)
+    """By identity; a term is kept with its closure, so that no other has its place."""
 
     def slot(self, variable: Variable) -> int:
         """Where the environment holds the variable; a bound name that no quantifier binds is a free one."""
@@ -162,11 +163,12 @@ class Compiler:
         return self.size - 1
 
     def code(self, term: Term) -> Code:
-        """The closure for a term; equal terms share one (planning asks for the same part more than once)."""
-        found = self.known.get(term)
+        """The closure for a term, the same for the same object: planning asks for a part more than once, and clauses
+        with memory share parts. To compare what terms say would cost their whole size at each of their parts."""
+        found = self.known.get(id(term))
         if found is None:
-            found = self.known[term] = self._code(term)
-        return found
+            found = self.known[id(term)] = (term, self._code(term))
+        return found[1]
 
     def _code(self, term: Term) -> Code:
         match term:

@@ -361,13 +361,13 @@ def _shows_real(term: Term) -> bool:
             return False
         case Arithmetic(operator="/"):
             return True
-        case Arithmetic(left=left, right=right, sort=sort):
-            return sort == REAL and (_shows_real(left) or _shows_real(right))
+        case Arithmetic(left=left, right=right):
+            return _shows_real(left) or _shows_real(right)
         case Negative(term=inner):
             return _shows_real(inner)
         case Operation(arguments=terms) if term.sort == REAL:
             return any(map(_shows_real, terms))
-        case Conditional(then=then, otherwise=otherwise) if term.sort == REAL:
+        case Conditional(then=then, otherwise=otherwise):
             return _shows_real(then) or _shows_real(otherwise)
         case _:  # what is no number that was written down has its sort from its name
             return bool(term.sort == REAL)

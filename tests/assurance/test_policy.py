@@ -11,7 +11,7 @@ import pytest
 from assurance.sample import METHODS, SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.gap import independent
 from avow.assurance.model import Case, MethodInfo
-from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
+from avow.assurance.policy import Demand, costs, profile, profile_names, read_policy, techniques
 from avow.base.diagnostics import Rejected, Span
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind
@@ -168,6 +168,11 @@ def test_age_reviewers_links_hypotheses() -> None:
     assert "tie is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
     assert "rests on hypotheses" in gate(the_case(strict, replace(PROOF, hypotheses=("h",))))[1]
     assert TODAY.isoformat() == "2026-11-21"
+
+
+def test_what_is_asked_is_said_in_the_words_of_the_page() -> None:
+    asked = Demand(one_of=(Status.PROVED, Status.MONITORED, Status.LINKED))
+    assert asked.text() == "proved or observed or argued"
 
 
 def test_what_was_verified_and_in_which_numbers() -> None:

@@ -85,6 +85,14 @@ def test_a_record_that_claims_more_than_its_method_can(ledger: Ledger, tmp_path:
     assert (Fault.IMPOSSIBLE, record.obligation, True) in faults(ledger, tmp_path)
 
 
+@pytest.mark.parametrize("name", ["rover.jsonl", "rover.jsonl.head"])
+def test_a_link_in_the_place_of_the_ledger_or_its_head(ledger: Ledger, tmp_path: Path, name: str) -> None:
+    path = ledger.path.with_name(name)
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert faults(ledger, tmp_path) == [(Fault.REDIRECTED, name, True)]
+
+
 def test_a_record_of_another_system(ledger: Ledger, tmp_path: Path) -> None:
     ledger.append(evidence(guarantee("node", "a", of="other")))
     assert (Fault.MISPLACED, "other/node/guarantee/a", True) in faults(ledger, tmp_path, system="rover")

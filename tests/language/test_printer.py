@@ -63,6 +63,21 @@ def test_parentheses(text: str, shown: str) -> None:
     assert show_term(parse_formula(text, NODE, LOADED), "rcl") == shown
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("1 == in.r + in.i", "1 == in.i + in.r", "1.0 == 1.0 + in.i", "2 == 2.5 * in.i", "1 == in.i / 2"),
+        *("in.i < 1.0", "1.0 == -in.i", "-in.r < 2", "5 == -(5.5)", "1.0 == -(2.0)"),
+        *("1 == min(in.r, 1.0)", "1 == min(in.i, in.r)", "1.0 == min(in.i, 1.0)", "1.0 == min(in.i, 2)"),
+        *("1 == (if in.b then in.r else 1.0)", "1 == (if in.b then 1.0 else in.r)"),
+        *("1.0 == (if in.b then 1.0 else 2.0)", "1.0 == (if in.b then in.i else 2)"),
+        *("in.r > 1 > in.i", "in.r < 1 and 1 > in.i", "in.i < 2.5 < in.r", "in.b == out.b2 and out.b2 == in.b"),
+    ],
+)
+def test_a_point_is_written_where_nothing_else_shows_a_real(text: str) -> None:
+    assert show_term(parse_formula(text, NODE, LOADED), "rcl") == text
+
+
 def test_styles() -> None:
     term = parse_formula("forall(x' in REAL | in.m(x', 1) and st2 !in Q -> c == move(x', 0.5))", NODE, LOADED)
     assert show_term(term) == "∀ x' ∈ ℝ · in.m(x', 1) ∧ out.st2 ∉ {red, green} → out.c = move(x', 0.5)"

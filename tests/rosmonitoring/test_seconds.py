@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,13 @@ from oracle.seconds import InSeconds, Word
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup
+from avow.backends.rosmonitoring.pace import Leeway
+from avow.backends.rosmonitoring.silence import Silence
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.ages import ELAPSED, Side
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.subterms import histories, timed
@@ -55,6 +60,48 @@ def test_silence_breaks_a_response_at_its_deadline(make_system: Make) -> None:
     assert told(make_system, WITHIN, *events, {**OTHER, "time": 2.06}, OTHER) == [(Fault.GUARANTEE, "g", "2")]
     assert told(make_system, WITHIN, *events, at(2.04, b=True), OTHER) == []
     assert told(make_system, WITHIN, *events, at(3, b=True)) == [(Fault.GUARANTEE, "g", "2")]
+
+
+def test_the_time_before_which_nobody_need_look(make_system: Make) -> None:
+    """It is never after the deadline itself, which is a float seldom, and the first of all clauses' deadlines."""
+    short = "guarantee h ( rose(in.a) -> within[50 ms](out.b) )"
+    monitor = Monitor(found(made(make_system, WITHIN, short, "guarantee k ( fell(in.a) -> next(out.b) )")))
+    assert monitor.deadline == math.inf
+    for event in (at(0, a=False), at(0.01, b=False), at(0.05, a=True)):
+        monitor.step(event)
+    assert monitor.deadline == math.nextafter(0.1, 0)
+    assert Fraction(monitor.deadline) < Fraction(1, 10) < Fraction(0.1)
+    monitor.step(at(0.1, b=True))
+    assert monitor.deadline == math.inf
+
+
+@pytest.mark.parametrize(
+    ("moments", "at", "after", "broken"),
+    [  # when it may change; when it does not hold, at a time and right after it
+        ([3, 1, Fraction(2)], {2, 3}, set(), 2),
+        ([3, 1, Fraction(2)], set(), {1, 3}, 1),
+        ([3, 1, Fraction(2)], {1}, {0}, 0),
+        ([0, -1, Fraction(-1, 2)], {0, -1, Fraction(-1, 2)}, {-1}, None),  # of the step itself it was asked already
+        ([Fraction(1, 3), "x", None], {Fraction(1, 3)}, {1}, Fraction(1, 3)),
+        ([2], {1}, {1}, None),
+        ([], {1}, {1}, None),
+    ],
+)
+def test_when_silence_breaks_it(moments: list[Any], at: set[int], after: set[int], broken: Fraction | None) -> None:
+    never = {Side.AT: at, Side.AFTER: after}
+    holds = {s: (lambda memory, s=s: memory[ELAPSED.qualified] not in never[s]) for s in Side}
+    silence = Silence(holds, (lambda memory: iter(moments),), None, Leeway())
+    assert silence.broken({}) == broken
+
+
+@pytest.mark.parametrize(("after", "elapsed"), [(-3, 0), (0, 0), (98, 98), (99, 100), (101, 100), (102, 102)])
+def test_a_step_that_is_nearly_in_time_is_in_time(after: int, elapsed: int) -> None:
+    silence = Silence({}, (), Fraction(1), Leeway(jitter=Fraction(1, 100)))
+    silence.passed(Fraction(5))
+    assert silence.elapsed == 0  # nothing was before
+    silence.latest = Fraction(5)
+    silence.passed(5 + Fraction(after, 100))
+    assert silence.elapsed == Fraction(elapsed, 100)
 
 
 def test_times_that_go_back(make_system: Make) -> None:

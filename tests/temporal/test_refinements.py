@@ -91,3 +91,37 @@ def test_known_answers(concrete: tuple[str, str], abstract: tuple[str, str], ver
     assert ("vacuous" if found.vacuous else found.verdict.value) == verdict
     if verdict == "proved":
         assert found.certificates
+
+
+def test_a_demand_over_runs_is_told_with_its_node_and_what_it_needs() -> None:
+    mine = replace(_node("assume a ( once(in.x > 0) )", "guarantee p ( y > 0 )", "guarantee ( y > -7 )"), name="m")
+    found = refines(mine, _node("assume b ( in.x > 0 )", "guarantee q ( y > 0 )"))
+    told = [(demand.node, demand.clause.name, demand.needed, demand.vacuous) for demand in found.demands]
+    assert told == [("m", "a", ("environment 0 b",), False), ("n", "q", ("m.p",), False)]
+    assert found.holds
+
+
+def test_a_demand_that_nothing_meets_is_vacuous_over_runs() -> None:
+    nothing = "assume ( in.x > 0 ) assume ( once(in.x < 0) )"
+    found = refines(_node("", POSITIVE), _node(nothing, "guarantee( y > 1 )"))
+    assert [(demand.verdict, demand.vacuous) for demand in found.demands] == [(Verdict.PROVED, True)]
+    assert found.vacuous
+    assert not found.holds
+
+
+def test_a_refutation_over_runs_shows_ports_and_not_what_is_remembered() -> None:
+    found = refines(_node("", "guarantee( y == 0 )"), _node("", "guarantee( once(in.x > 0) -> y > 0 )"))
+    (shown,) = (demand.counterexample for demand in found.demands)
+    assert shown is not None
+    assert shown.values == (("in.x", "1"), ("n.y", "0"))
+
+
+@pytest.mark.parametrize("assumed", ["in.c == red", "once(in.c == red)"])
+def test_assumptions_are_asked_in_the_other_s_types(assumed: str) -> None:
+    nodes = []
+    for colour, what in (("Lamp", assumed), ("Colour", "in.c == red")):
+        text = f"context {{ {colour} : {{red, green}}; }} node n {{ inputs( c : {colour} ) outputs( y : BOOL ) topics()"
+        contract, diagnostics = check_text(f"{text} assume( {what} ) guarantee( y ) }}", "n.rcl")
+        assert contract is not None, diagnostics
+        nodes.append(contract.nodes[0])
+    assert refines(*nodes).holds
