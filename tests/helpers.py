@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import functools
 import io
 import os
 import subprocess
@@ -24,6 +26,18 @@ def edit(path: Path, *pairs: tuple[str, str]) -> None:
         assert old in text, old
         text = text.replace(old, new)
     path.write_text(text, encoding="utf-8")
+
+
+@functools.cache
+def parsed(source: str) -> ast.Module:
+    """A Python source's tree. Several tests look through all of Avow's own, which takes a second to read."""
+    return ast.parse(source)
+
+
+@functools.cache
+def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
+    """All that a tree is made of."""
+    return tuple(ast.walk(tree))
 
 
 def avow(*words: str, cwd: Path, stdin: str = "") -> subprocess.CompletedProcess[str]:

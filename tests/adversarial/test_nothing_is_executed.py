@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import z3
-from helpers import some
+from helpers import avow, some
 
 AVOW = str(Path(sys.executable).with_name("avow"))
 RCL = "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }\n"
@@ -142,19 +142,25 @@ def test_a_repository_with_programs_among_its_settings(tmp_path: Path) -> None:
     (folder / "s.rcl").write_text(RCL)
     (folder / "plan.yaml").write_text("system: s\nrequirements: {}\nnodes: {n: {criticality: low, methods: []}}\n")
 
-    def git(*words: str) -> None:
+    def git(*words: str) -> bytes:
         person = ("-c", "user.name=n", "-c", "user.email=e")
-        subprocess.run(["git", "-C", str(root), *person, *words], check=True, capture_output=True)
+        return subprocess.run(["git", "-C", str(root), *person, *words], check=True, capture_output=True).stdout
 
     git("init", "-q")
     git("add", "-A")
     git("commit", "-qm", "first")
     program = f"sh -c 'echo $0 >> {root / 'executed'}; cat'"
-    settings = ("filter.evil.smudge", "filter.evil.clean", "filter.evil.process", "core.fsmonitor", "core.pager")
-    for setting in (*settings, "diff.evil.textconv", "core.sshCommand", "core.editor"):
-        git("config", setting, program)
+    settings = {
+        'filter "evil"': ("smudge", "clean", "process"),
+        "core": ("fsmonitor", "pager", "sshCommand", "editor"),
+        'diff "evil"': ("textconv",),
+    }
+    with (root / ".git" / "config").open("a") as file:
+        for part, names in settings.items():
+            file.write("\n".join([f"[{part}]", *(f'{name} = "{program}"' for name in names), ""]))
+    assert git("config", "filter.evil.clean") == f"{program}\n".encode()
     (root / ".git" / "info" / "attributes").write_text("* filter=evil diff=evil\n")
     (folder / "s.rcl").write_text(RCL.replace("<= 1", "<= 2"))
-    said = run(root, "diff", "HEAD")
-    assert "s/n/guarantee/g" in said, said
-    run(root, "report")
+    told = [avow(*words, cwd=root).stdout for words in (("diff", "HEAD"), ("report",))]
+    assert "s/n/guarantee/g" in told[0], told
+    assert not (root / "executed").exists()

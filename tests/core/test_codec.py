@@ -92,14 +92,21 @@ ONE = Outer(
 )
 
 
+DEFINITIONS: dict[str, Any] = {}
+WHOLE = {**schema(Outer, DEFINITIONS), "$defs": DEFINITIONS}
+SCHEMA = jsonschema.validators.validator_for(WHOLE)(WHOLE)
+
+
+def test_the_schema_is_one() -> None:
+    SCHEMA.check_schema(WHOLE)
+
+
 @given(outer)
 def test_there_and_back(value: Outer) -> None:
     text = canonical(to_json(value))
     assert from_json(Outer, json.loads(text)) == value
     assert canonical(to_json(from_json(Outer, json.loads(text)))) == text
-    definitions: dict[str, Any] = {}
-    whole = {**schema(Outer, definitions), "$defs": definitions}
-    jsonschema.validate(json.loads(text), whole)
+    SCHEMA.validate(json.loads(text))
 
 
 def test_what_was_added_later_may_be_missing_and_is_not_written_empty() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+from helpers import nodes, parsed
 
 from avow.backend_kit.registry import backend, names
 from avow.base.codes import CODES, Code, declare, register
@@ -31,13 +32,13 @@ Every diagnostic has a code. It keeps its meaning from version to version: searc
 """
 
 
-def parsed() -> Iterator[tuple[Path, ast.Module]]:
+def modules() -> Iterator[tuple[Path, ast.Module]]:
     """The modules that speak of codes, but for those that declare them."""
     for folder in ("avow", "backends"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             text = path.read_text("utf-8")
             if not path.name.startswith("codes") and FORM.search(text):
-                yield path, ast.parse(text)
+                yield path, parsed(text)
 
 
 def code_of(node: ast.AST) -> str | None:
@@ -51,7 +52,7 @@ def used(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, set[str]]:
     """Code → the folders in which it stands as a string."""
     found: dict[str, set[str]] = {}
     for path, module in modules:
-        for node in ast.walk(module):
+        for node in nodes(module):
             code = code_of(node)
             if code is not None:
                 found.setdefault(code, set()).add(
@@ -64,7 +65,7 @@ def severities(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, int]:
     """Code → the greatest severity with which a `Diagnostic(…)` names it; those made by way of helpers are not here."""
     found: dict[str, int] = {}
     for _, module in modules:
-        for node in ast.walk(module):
+        for node in nodes(module):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Diagnostic":
                 parts = [*node.args, *(k.value for k in node.keywords)]
                 code = code_of(parts[0]) if parts else None
@@ -84,7 +85,12 @@ def declared() -> dict[str, Code]:
 
 @pytest.fixture(scope="module")
 def sources() -> list[tuple[Path, ast.Module]]:
-    return list(parsed())
+    return list(modules())
+
+
+@pytest.fixture(scope="module")
+def where(sources: list[tuple[Path, ast.Module]]) -> dict[str, set[str]]:
+    return used(sources)
 
 
 def test_codes_are_found_where_they_stand() -> None:
@@ -94,12 +100,12 @@ def test_codes_are_found_where_they_stand() -> None:
     assert severities(sown) == {"NEW003": 1, "NEW004": 2}
 
 
-def test_every_code_used_is_declared(sources: list[tuple[Path, ast.Module]]) -> None:
-    assert sorted(set(used(sources)) - set(declared())) == []
+def test_every_code_used_is_declared(where: dict[str, set[str]]) -> None:
+    assert sorted(set(where) - set(declared())) == []
 
 
-def test_every_code_declared_is_used(sources: list[tuple[Path, ast.Module]]) -> None:
-    assert sorted(set(declared()) - set(used(sources))) == []
+def test_every_code_declared_is_used(where: dict[str, set[str]]) -> None:
+    assert sorted(set(declared()) - set(where)) == []
 
 
 def test_no_code_is_declared_twice() -> None:
@@ -109,9 +115,8 @@ def test_no_code_is_declared_twice() -> None:
     assert len(declared()) == len(CORE_CODES) + sum(map(len, backends().values()))
 
 
-def test_backends_declare_their_own(sources: list[tuple[Path, ast.Module]]) -> None:
+def test_backends_declare_their_own(where: dict[str, set[str]]) -> None:
     """A backend uses only its own codes; of the core, only the commands that are its own may use them."""
-    where = used(sources)
     for name, codes in backends().items():
         assert codes, name
         for code in codes:

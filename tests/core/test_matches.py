@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+from helpers import nodes, parsed
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -16,7 +18,7 @@ def files() -> list[Path]:
 def silent(source: str) -> Iterator[int]:
     """The lines of those that swallow whatever they were not written for."""
     lines = source.splitlines()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(parsed(source)):
         if not isinstance(node, ast.Match):
             continue
         for case in node.cases:

@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from helpers import keys_of
+from helpers import keys_of, nodes, parsed
 
 import avow.backends
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
@@ -115,7 +115,7 @@ def test_nothing_private_of_a_library_is_used_without_a_reason() -> None:
         text = path.read_text(encoding="utf-8")
         if not any(library in text for library in PUBLIC):
             continue
-        for node in ast.walk(ast.parse(text)):
+        for node in nodes(parsed(text)):
             match node:
                 case ast.ImportFrom(module=str(name), level=0):
                     names = [name]

@@ -7,10 +7,11 @@ import functools
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+from helpers import nodes, parsed
 
 ROOT = Path(__file__).parents[2]
 LINES = 500
@@ -72,7 +73,7 @@ CACHES = {"by_identity", "cache", "lru_cache"}
 
 @functools.cache
 def product() -> dict[Path, ast.Module]:
-    return {p: ast.parse(p.read_text("utf-8")) for room in ("avow", "backends") for p in (ROOT / room).rglob("*.py")}
+    return {p: parsed(p.read_text("utf-8")) for room in ("avow", "backends") for p in (ROOT / room).rglob("*.py")}
 
 
 def test_the_map_shows_the_floors() -> None:
@@ -91,7 +92,7 @@ def test_the_map_shows_the_floors() -> None:
 def test_a_room_says_what_it_is_for() -> None:
     doors = [path for name in ("avow", "backends") for path in (ROOT / name).glob("*/__init__.py")]
     assert len(doors) > 30
-    said = {path: ast.get_docstring(ast.parse(path.read_text())) or "" for path in doors}
+    said = {path: ast.get_docstring(parsed(path.read_text())) or "" for path in doors}
     rooms = {path: text for path, text in said.items() if path.parent.parent.name == "avow"}
     assert [path for path, text in said.items() if not text] == []
     assert [path for path, text in rooms.items() if len(text.splitlines()) < 3] == []
@@ -116,7 +117,7 @@ def test_no_class_is_imported_by_another_name() -> None:
     assert [
         f"{path.relative_to(ROOT)}: {name.name} as {name.asname}"
         for path, tree in product().items()
-        for node in ast.walk(tree)
+        for node in nodes(tree)
         if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").startswith("avow"))
         for name in node.names
         if name.asname not in (None, name.name) and name.name.lstrip("_")[0].isupper()
@@ -133,7 +134,7 @@ def state(tree: ast.Module) -> set[str]:
     """The names at the top of a module whose value can change while it runs: variables and containers that are not
     written as constants, constants that something changes, functions without arguments that keep what they
     answer, names of other modules."""
-    nodes = list(ast.walk(tree))
+    found = nodes(tree)
     values = {
         target.id: node.value
         for node in tree.body
@@ -143,13 +144,13 @@ def state(tree: ast.Module) -> set[str]:
     }
     modules = {
         (a.asname or a.name).partition(".")[0]
-        for node in nodes
+        for node in found
         if isinstance(node, ast.Import | ast.ImportFrom)
         for a in node.names
         if isinstance(node, ast.Import) or a.name.islower()
     }
     holders = {name for name, value in values.items() if _holds(name, value)}
-    return holders | (set(_changed(nodes)) & set(values)) | set(_of_others(nodes, modules)) | set(_keeping(tree))
+    return holders | (set(_changed(found)) & set(values)) | set(_of_others(found, modules)) | set(_keeping(tree))
 
 
 def _holds(name: str, value: ast.expr | None) -> bool:
@@ -158,8 +159,8 @@ def _holds(name: str, value: ast.expr | None) -> bool:
     return not (isinstance(value, ast.Call) and _called(value) in FUNCTIONS)
 
 
-def _changed(nodes: list[ast.AST]) -> Iterator[str]:
-    for node in nodes:
+def _changed(found: Iterable[ast.AST]) -> Iterator[str]:
+    for node in found:
         if isinstance(node, ast.Global):
             yield from node.names
         elif (
@@ -175,8 +176,8 @@ def _changed(nodes: list[ast.AST]) -> Iterator[str]:
             yield node.func.value.id
 
 
-def _of_others(nodes: list[ast.AST], modules: set[str]) -> Iterator[str]:
-    for node in nodes:
+def _of_others(found: Iterable[ast.AST], modules: set[str]) -> Iterator[str]:
+    for node in found:
         if not (isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)):
             continue
         if isinstance(node.value, ast.Name) and node.value.id in modules:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers import parsed
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "limits.md"
@@ -65,7 +66,7 @@ def numeric(node: ast.expr | None) -> bool:
 
 def numbers(source: str) -> Iterator[tuple[str, str, str]]:
     """Name, value and reason of each constant of a module that is a number."""
-    body = ast.parse(source).body
+    body = parsed(source).body
     for at, node in enumerate(body):
         match node:
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
@@ -100,7 +101,7 @@ def page() -> str:
     parts = [HEAD]
     for path, title in pages().items():
         source = path.read_text("utf-8")
-        about = " ".join((ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0].split())
+        about = " ".join((ast.get_docstring(parsed(source)) or "").split("\n\n")[0].split())
         rows = "".join(f"| `{name}` | {value} | {why} |\n" for name, value, why in numbers(source))
         intro = "" if title.startswith("Backend") else f"{about}\n\n"
         parts.append(f"## {title}\n\n{intro}| number | value | reason |\n|---|---|---|\n{rows}")

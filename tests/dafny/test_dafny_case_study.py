@@ -55,6 +55,7 @@ def test_the_agent_is_proved_for_its_map(make_job: MakeJob) -> None:
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_the_papers_listing_is_not_accepted(make_job: MakeJob) -> None:
     job = job_for(make_job, "remote_inspection_published", "agent", "models/agent_paper.dfy")
     outcomes = settle(job)

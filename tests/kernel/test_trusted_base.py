@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+from helpers import nodes, parsed
+
 import avow
 from avow.pipeline.engine_code import TRUSTED, trusted_parts
 
@@ -15,7 +17,7 @@ NUMBERS = "tuning"
 
 def imported(file: Path) -> set[Path]:
     found = set[str]()
-    for part in ast.walk(ast.parse(file.read_text("utf-8"))):
+    for part in nodes(parsed(file.read_text("utf-8"))):
         match part:
             case ast.ImportFrom(module=str(module), names=names):
                 found |= {module, *(f"{module}.{one.name}" for one in names)}

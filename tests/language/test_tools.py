@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from drawn.contracts import CONTRACT
+from helpers import avow
+from lark import Lark
 
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_text
@@ -18,14 +21,16 @@ from avow.language.source import Reports, Source
 # --- the grammar -----------------------------------------------------------------------------------------------------
 
 
+@functools.cache
+def grammar() -> Lark:
+    text = (Path(__file__).parents[2] / "avow" / "language" / "grammar.lark").read_text("utf-8")
+    return Lark(text, parser="lalr", lexer="basic", start="start")
+
+
 def test_the_grammar_is_unambiguous_and_covers_whole_files(root: Path) -> None:
     """LALR(1) tables exist without conflict for `start`, the file as a whole, and accept what the parts accept."""
-    from lark import Lark
-
-    grammar = (root / "avow" / "language" / "grammar.lark").read_text("utf-8")
-    lark = Lark(grammar, parser="lalr", lexer="basic", start="start")
     for path in sorted(root.glob("contracts/*/*.rcl")):
-        machine = lark.parse_interactive("")
+        machine = grammar().parse_interactive("")
         for token in tokens(Reports(Source("f", path.read_text("utf-8")))):
             machine.feed_token(token)
         machine.feed_token(Token("$END", "", 0, 0))
@@ -33,25 +38,15 @@ def test_the_grammar_is_unambiguous_and_covers_whole_files(root: Path) -> None:
 
 def test_the_grammars_terminals_are_the_lexers() -> None:
     """Lark's own lexer, on the terminals as the grammar writes them, finds the same tokens as ours."""
-    from lark import Lark
-
-    grammar = (Path(__file__).parents[2] / "avow" / "language" / "grammar.lark").read_text("utf-8")
-    lark = Lark(grammar, parser="lalr", lexer="basic", start="start")
     text = CONTRACT.replace(
         "TRUE", 'forall(x\', y in REAL | <1 upto k> == ns -> x\' !in {0.5} <=> "a\\"b" != s or <> == sq)'
     )
-    theirs = [(t.type, str(t)) for t in lark.lex(text)]
+    theirs = [(t.type, str(t)) for t in grammar().lex(text)]
     ours = [(t.type, t.text) for t in tokens(Reports(Source("f", text)))]
     assert ours == theirs
 
 
 # --- the command line ------------------------------------------------------------------------------------------------
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "avow", *arguments], capture_output=True, text=True, timeout=60, check=False
-    )
 
 
 @pytest.fixture
@@ -62,8 +57,12 @@ def files(tmp_path: Path) -> dict[str, str]:
     return {"good": str(tmp_path / "good.rcl"), "bad": str(tmp_path / "sub" / "bad.rcl")}
 
 
-def test_check(files: dict[str, str]) -> None:
-    done = run("check", files["good"])
+def test_check(files: dict[str, str], tmp_path: Path) -> None:
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return avow(*arguments, cwd=tmp_path)
+
+    command = [sys.executable, "-m", "avow", "check", files["good"]]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert "1 file: " in done.stdout
     done = run("check", files["good"], files["bad"])

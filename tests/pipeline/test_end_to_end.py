@@ -79,7 +79,6 @@ def edit(folder: Path, old: str, new: str, name: str = "system.rcl") -> None:
     path.write_text(text.replace(old, new, 1))
 
 
-@pytest.mark.slow
 def test_the_new_workspace_verifies(made: Path) -> None:
     verdicts = {(e["obligation"], e["method"]): e["verdict"] for e in ledger(made)}
     assert verdicts["thermostat/thermostat/guarantee/warms", "hoare"] == "proved"

@@ -85,6 +85,7 @@ def _program(path: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_launcher_counts_with_all_that_it_launches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     engine = _program(tmp_path / "lib" / "made" / "engine.exe", "1")
