@@ -9,23 +9,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
 from avow.base.records import dataclass
 from avow.ros.listing import is_info, parse_info
+from avow.system.dot import Malformed, parse
 from avow.system.graph import Graph
 from avow.system.plan import System
 from avow.system.schema import suggest
-from avow.tuning.sizes import ROS_GRAPH_BYTES
+from avow.tuning.sizes import ROS_GRAPH_ARCS, ROS_GRAPH_BYTES
 
-_TOKEN = re.compile(
-    r'\s+|//[^\n]*|\#[^\n]*|/\*.*?\*/|(?P<string>"(?:[^"\\]|\\.)*")|(?P<arrow>->|--)'
-    r"|(?P<word>[A-Za-z0-9_.\u0080-\uffff-]+)|(?P<sign>[\[\]{}=;,:])|(?P<html><[^>]*>)|(?P<other>.)",
-    re.DOTALL,
-)
+_DOT = re.compile(r"(?>\s|(?://|#)[^\n]*|/\*.*?\*/)*+(?:strict\s+)?(?:di)?graph\b[^{>]*\{", re.DOTALL | re.IGNORECASE)
 _LINE = re.compile(r"\s*(/?[\w/.-]+)\s*->\s*(/?[\w/.-]+)\s*(?::\s*(\S+))?\s*\Z")
 
 
@@ -53,12 +49,12 @@ def read_ros_graph(path: Path) -> RosGraph:
     """Raises Rejected, located, for a file that is none of the known forms."""
     try:
         data = read_regular(path)[: ROS_GRAPH_BYTES + 1]
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(_fault(path, 1, f"the ROS graph cannot be read: {error}")) from None
     if len(data) > ROS_GRAPH_BYTES:
         raise Rejected(_fault(path, 1, f"the ROS graph has more than {ROS_GRAPH_BYTES} bytes"))
-    if re.search(r"\b(di)?graph\b[^{\n]*\{", text):
+    if _DOT.match(text):
         return _from_dot(text, path)
     if is_info(text):
         return _from_info(text)
@@ -132,65 +128,31 @@ def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -
 
 
 def _from_dot(text: str, path: Path) -> RosGraph:
-    labels: dict[str, str] = {}
-    boxes: set[str] = set()
-    links: list[tuple[str, str, str]] = []
-    tokens = list(_dot_tokens(text, path))
-    at = 0
-    while at < len(tokens):
-        names = [tokens[at]] if tokens[at][0] == "name" else []
-        at += 1
-        while names and at + 1 < len(tokens) and tokens[at][1] == "->" and tokens[at + 1][0] == "name":
-            names.append(tokens[at + 1])
-            at += 2
-        if not names or (at < len(tokens) and tokens[at][1] in ("=", "{")):
-            continue
-        attributes: dict[str, str] = {}
-        if at < len(tokens) and tokens[at][1] == "[":
-            at += 1
-            while at < len(tokens) and tokens[at][1] != "]":
-                if at + 2 < len(tokens) and tokens[at + 1][1] == "=":
-                    attributes[tokens[at][1]] = tokens[at + 2][1]
-                    at += 2
-                at += 1
-        ids = [name for _, name in names]
-        if len(ids) > 1:
-            links += [(a, b, attributes.get("label", "")) for a, b in pairwise(ids)]
-        elif ids[0] not in ("graph", "node", "edge", "digraph", "strict", "subgraph"):
-            labels[ids[0]] = attributes.get("label", ids[0]).replace("\\N", ids[0])
-            if attributes.get("shape") == "box":
-                boxes.add(ids[0])
-    for a, b, _ in links:
-        for name in (a, b):
-            labels.setdefault(name, name)
-    topics = {name for name in labels if name in boxes or name.startswith("t_")}
+    """Boxes, and nodes that are called as rqt_graph calls topics, are topics."""
+    try:
+        graph = parse(text)
+    except Malformed as error:
+        raise Rejected(_fault(path, error.line, str(error), error.column)) from None
+    topics = {name for name, given in graph.nodes.items() if given.get("shape") == "box" or name.startswith("t_")}
+    called = {name: _shown(given.get("label", "\\N"), name) for name, given in graph.nodes.items()}
+    bare = {name: label.lstrip("/") for name, label in called.items()}
+    heard: dict[str, list[str]] = {}
+    for tail, head, _ in graph.arcs:
+        if tail in topics and head not in topics:
+            heard.setdefault(tail, []).append(head)
     arcs: dict[tuple[str, str, str], None] = {}
-    bare = {name: label.lstrip("/") for name, label in labels.items()}
-    for a, b, label in links:
-        if a not in topics and b not in topics:
-            arcs[(bare[a], bare[b], label)] = None
-        elif b in topics:
-            for c, d, _ in links:
-                if c == b and d not in topics:
-                    arcs[(bare[a], bare[d], labels[b])] = None
-    return RosGraph(tuple(dict.fromkeys(bare[n] for n in labels if n not in topics)), tuple(arcs))
+    for tail, head, label in graph.arcs:
+        if tail not in topics:
+            ends = heard.get(head, ()) if head in topics else (head,)
+            arcs |= dict.fromkeys((bare[tail], bare[e], called[head] if head in topics else label) for e in ends)
+        if len(arcs) > ROS_GRAPH_ARCS:
+            raise Rejected(_fault(path, 1, f"the ROS graph has more than {ROS_GRAPH_ARCS} arcs"))
+    return RosGraph(tuple(dict.fromkeys(bare[name] for name in graph.nodes if name not in topics)), tuple(arcs))
 
 
-def _dot_tokens(text: str, path: Path) -> Iterator[tuple[str, str]]:
-    for found in _TOKEN.finditer(text):
-        if found["string"] is not None:
-            yield "name", re.sub(r"\\(.)", r"\1", found["string"][1:-1]) if "\\N" not in found[0] else found[0][1:-1]
-        elif found["word"] is not None:
-            yield "name", found["word"]
-        elif found["arrow"] is not None:
-            yield "sign", "->"
-        elif found["sign"] is not None:
-            yield "sign", found["sign"]
-        elif found["html"] is not None:
-            yield "name", found["html"]
-        elif found["other"] is not None:
-            line = text.count("\n", 0, found.start()) + 1
-            raise Rejected(_fault(path, line, f"{found['other']!r} does not belong in a DOT graph"))
+def _shown(label: str, name: str) -> str:
+    """A label with its escapes, of which `\\N` is the node's name."""
+    return re.sub(r"\\(.)", lambda found: name if found[1] == "N" else found[1], label)
 
 
 def _from_info(text: str) -> RosGraph:
@@ -224,5 +186,5 @@ def _from_lines(text: str, path: Path) -> RosGraph:
     return RosGraph(tuple(nodes), tuple(arcs))
 
 
-def _fault(path: Path, line: int, message: str) -> Diagnostic:
-    return Diagnostic("PLAN127", message, Span(str(path), line, 1, line, 2))
+def _fault(path: Path, line: int, message: str, column: int = 1) -> Diagnostic:
+    return Diagnostic("PLAN127", message, Span(str(path), line, column, line, column + 1))

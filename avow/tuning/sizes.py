@@ -58,8 +58,11 @@ INCLUDED_NODES = 5_000
 SYSTEMS_WITHIN = 30
 """Systems within systems: each level reads a plan, and a circle that links hide must end."""
 
-ROS_GRAPH_BYTES = 5_000_000
-"""A larger file is no graph of one robot."""
+ROS_GRAPH_BYTES = 1_000_000
+"""A larger file is no graph of one robot: a node with ten topics takes two thousand."""
+
+ROS_GRAPH_ARCS = 100_000
+"""Between nodes; few words of DOT can say more of them than any memory holds."""
 
 DEFINITION_BYTES = 2_000_000
 """Of one file that defines message types: the largest package's definitions together are a tenth of it."""
