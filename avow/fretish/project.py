@@ -12,8 +12,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, assert_never
+from typing import assert_never
 
+from avow.base import codec
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.format import format_text
 from avow.language.lexer import KEYWORDS, quote
@@ -87,26 +88,41 @@ def read(path: Path) -> Project:
     if not text.lstrip().startswith(("{", "[")):
         return Project(tuple(_lines(text, str(path))))
     try:
-        found = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise Rejected(Diagnostic("FRET001", f"{path} is no JSON: {error}")) from None
-    listed = found.get("requirements") if isinstance(found, dict) else found
-    if not isinstance(listed, list) or not all(
-        isinstance(r, dict) and isinstance(r.get("fulltext"), str) for r in listed
-    ):
-        message = f"{path} is not what FRET exports: a list of requirements, each with its `fulltext`"
-        raise Rejected(Diagnostic("FRET001", message))
-    requirements = [
-        Requirement(
-            str(r.get("reqid") or f"R{k}"),
-            r["fulltext"],
-            _place(text, r["fulltext"], str(path)),
-            str(r.get("project") or ""),
-        )
-        for k, r in enumerate(listed, start=1)
-    ]
-    variables = found.get("variables") if isinstance(found, dict) else None
-    return Project(tuple(requirements), _given(variables if isinstance(variables, list) else []))
+        told = codec.parsed(text)
+        found = codec.from_json(_Export, told if isinstance(told, dict) else {"requirements": told})
+    except codec.Unreadable as error:
+        raise Rejected(*(Diagnostic("FRET001", f"{path} is no export of FRET's: {w}") for w in error.faults)) from None
+    requirements = (
+        Requirement(r.reqid or f"R{k}", r.fulltext, _place(text, r.fulltext, str(path)), r.project or "")
+        for k, r in enumerate(found.requirements, start=1)
+    )
+    return Project(tuple(requirements), tuple(_given(v) for v in found.variables if v.idType))
+
+
+@dataclass(frozen=True, slots=True)
+class _Requirement(codec.Foreign):
+    fulltext: str
+    reqid: str | None = None
+    project: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Variable(codec.Foreign):
+    variable_name: str
+    component_name: str
+    project: str | None = None
+    idType: str | None = None  # noqa: N815 - FRET's own names
+    dataType: str | None = None  # noqa: N815
+    assignment: str | None = None
+    modeRequirement: str | None = None  # noqa: N815
+
+
+@dataclass(frozen=True, slots=True)
+class _Export(codec.Foreign):
+    """What FRET exports; of some versions the requirements alone."""
+
+    requirements: tuple[_Requirement, ...]
+    variables: tuple[_Variable, ...] = ()
 
 
 def _lines(text: str, file: str) -> Iterable[Requirement]:
@@ -130,16 +146,10 @@ def _place(text: str, sentence: str, file: str) -> Span:
     return Span(file, line, column, line, column + len(sentence))
 
 
-def _given(variables: list[Any]) -> tuple[tuple[tuple[str, str, str], Given], ...]:
-    found = []
-    for v in variables:
-        if not isinstance(v, dict) or not isinstance(v.get("variable_name"), str) or not v.get("idType"):
-            continue
-        means = v.get("modeRequirement") if v["idType"] == "Mode" else v.get("assignment")
-        kind = _TYPES.get(str(v.get("dataType")), "")
-        key = (str(v.get("project") or ""), str(v.get("component_name")), v["variable_name"])
-        found.append((key, Given(str(v["idType"]), kind, means if isinstance(means, str) else "")))
-    return tuple(found)
+def _given(v: _Variable) -> tuple[tuple[str, str, str], Given]:
+    means = v.modeRequirement if v.idType == "Mode" else v.assignment
+    kind = _TYPES.get(v.dataType or "", "")
+    return (v.project or "", v.component_name, v.variable_name), Given(v.idType or "", kind, means or "")
 
 
 _TYPES = {

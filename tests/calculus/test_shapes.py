@@ -175,7 +175,7 @@ def test_a_ros_graph_of_fifty_nodes(tmp_path: Path) -> None:
         contract += node(f"n{k}", f"x{k - 1} : INTEGER", f"x{k} : INTEGER", f"A: in.x{k - 1} >= 0", f"G: out.x{k} >= 0")
     contract += node("tail", "x45 : INTEGER", "x47 : INTEGER", "A: in.x45 >= 0")
     tmp_path.mkdir(exist_ok=True)
-    (tmp_path / "ros.dot").write_text("digraph graph {\n" + "\n".join(lines) + "\n}\n")
+    (tmp_path / "ros.dot").write_text("digraph graphname {\n" + "\n".join(lines) + "\n}\n")
     plan = "model: {graph: ros.dot, compound: {tail: [n46, n47]}, dropped: {n48: log%s}}"
     system = make(tmp_path, contract, plan % ", n49: screen")
     found = account(system, dataflow(system))
