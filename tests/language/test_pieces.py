@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers import some
 
 from avow.base.notes import cache_folder, sealed
 from avow.base.remembered import Shelf, by_identity
@@ -125,7 +126,7 @@ def texts(draw: random.Random) -> Iterator[list[Source]]:
             nodes, context = list(NODES), CONTEXT
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some(range(4), 2, slow=2))
 def test_it_is_the_contract_read_whole(seed: int, tmp_path: Path) -> None:
     draw, read = random.Random(seed), 0
     off = frozenset({"RCL404"}) if seed % 2 else frozenset[str]()

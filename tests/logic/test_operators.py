@@ -269,7 +269,7 @@ def wherever_defined(term: Term, values: dict[str, Any]) -> bool | None:
     return None if enumeration.strayed else held
 
 
-@pytest.mark.parametrize("seed", some(range(150), 20, slow=30))
+@pytest.mark.parametrize("seed", some(range(150), 10, slow=40))
 def test_evaluation_normal_forms_and_lifting_keep_the_meaning(seed: int) -> None:
     term = made(seed)
     forms = [term, push_negations(term), normalise(term)]
@@ -304,7 +304,7 @@ def fixed(values: dict[str, Any], term: Term) -> list[Term]:
     return [Compare("==", v, Literal(values[v.name], v.sort)) for v in free_variables(term)]
 
 
-@pytest.mark.parametrize("seed", some(range(40), 20))
+@pytest.mark.parametrize("seed", some(range(40), 10, slow=10))
 def test_z3_agrees_with_enumeration(seed: int) -> None:
     term = made(seed)
     for values in random.Random(seed).sample(GRID, 3):
