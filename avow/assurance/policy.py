@@ -175,31 +175,9 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
     )
     faults += wrong
     reader = _PolicyReader(located, faults)
-    policy = replace(base, name=f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name)
-    for key in data:
-        if key in ("sanity", "composition", "requirements", "programs"):
-            good = reader.statuses(data[key], (key,))
-            match key:
-                case "sanity":
-                    policy = replace(policy, sanity=good)
-                case "composition":
-                    policy = replace(policy, composition=good)
-                case "requirements":
-                    policy = replace(policy, requirements=good)
-                case "programs":
-                    policy = replace(policy, programs=good)
-    if "reviewers" in data:
-        policy = replace(policy, reviewers=reader.texts(data["reviewers"], ("reviewers",)))
-    if "certified" in data:
-        policy = replace(policy, certified=reader.flag(data["certified"], ("certified",)))
-    if "proved" in data:
-        word = data["proved"]
-        if word != "certified":
-            reader.fault(f"'{word}' is not what may be asked: certified", ("proved",))
-        policy = replace(policy, proved=True)
-    if "guarantees" in data:
-        policy = replace(policy, guarantees=_demands(policy, data["guarantees"], reader))
-    return policy, faults
+    rules = {key: reader.rule(key, value, base) for key, value in data.items() if key in _KEYS and key != "profile"}
+    name = f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name
+    return replace(base, name=name, **rules), faults
 
 
 def _demands(base: Policy, data: object, reader: _PolicyReader) -> tuple[tuple[str, Demand], ...]:
@@ -224,6 +202,22 @@ class _PolicyReader:
     def fault(self, message: str, path: tuple[str | int, ...], hint: str | None = None) -> None:
         where = ".".join(map(str, ("policy", *path)))
         self.faults.append(Diagnostic("POLICY002", f"{where}: {message}", self.located.at(*path), hint=hint))
+
+    def rule(self, key: str, data: object, base: Policy) -> Any:
+        """What the plan says under a key of the policy, as `Policy` has it."""
+        match key:
+            case "guarantees":
+                return _demands(base, data, self)
+            case "reviewers":
+                return self.texts(data, (key,))
+            case "certified":
+                return self.flag(data, (key,))
+            case "proved":
+                if data != "certified":
+                    self.fault(f"'{data}' is not what may be asked: certified", (key,))
+                return True
+            case _:  # the others name statuses
+                return self.statuses(data, (key,))
 
     def demand(self, data: object, path: tuple[str | int, ...]) -> Demand:
         if not isinstance(data, Mapping):

@@ -7,11 +7,12 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin, get_type_hints
 
 from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
@@ -297,30 +298,10 @@ class Backend(ABC):
         raise NotImplementedError(notation)
 
 
-_REQUIRED: Mapping[str, type | tuple[type, ...]] = {
-    "name": str,
-    "title": str,
-    "version": str,
-    "strength": Verdict,
-    "link": Link,
-    "options_schema": Mapping,
-    "green_means": str,
-    "uses_scenario": bool,
-    "uses_steps": bool,
-    "uses_wiring": bool,
-    "uses_upstream": bool,
-    "remembers": bool,
-    "uses_source": bool,
-    "claims": tuple,
-    "runs_models": bool,
-    "not_run": str,
-    "records": bool,
-    "judges_runs": bool,
-    "of": Object,
-    "portable": bool,
-    "codes": Mapping,
-    "translations": Mapping,
-}
+@functools.cache
+def _required() -> Mapping[str, type]:
+    """What a backend says of itself, each with its type: what stands above, annotated."""
+    return {name: get_origin(kind) or kind for name, kind in get_type_hints(Backend).items()}
 
 
 def wired(tool: Backend, source: Source | None) -> bool:
@@ -333,8 +314,8 @@ def lacks(found: object) -> str:
     """Why an object is no backend, in words; empty where it is one."""
     if not isinstance(found, Backend):
         return "it is no instance of avow.backend_kit.protocol.Backend"
-    missing = [name for name in _REQUIRED if not hasattr(found, name)]
+    missing = [name for name in _required() if not hasattr(found, name)]
     if missing:
         return f"it lacks {', '.join(missing)}"
-    wrong = [name for name, kind in _REQUIRED.items() if not isinstance(getattr(found, name), kind)]
+    wrong = [name for name, kind in _required().items() if not isinstance(getattr(found, name), kind)]
     return f"it has a wrong type in {', '.join(wrong)}" if wrong else ""
