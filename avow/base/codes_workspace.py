@@ -246,14 +246,20 @@ WORKSPACE_CODES = register(
     declare(
         "CLUSTER004",
         "no workers",
-        "The cluster has no workers: nothing would ever be done.",
-        "Start one with `avow worker --on …`.",
+        "The cluster has no workers, or none with this Avow and this Z3: nothing would ever be done.",
+        "Start one with `avow worker --on …`, of the same version.",
     ),
     declare(
         "CLUSTER005",
         "certificate not accepted",
         "A certificate has expired, is not of the authority that AVOW_TLS_CA names, or cannot be read: whose, it says.",
         "Have the authority issue a new one.",
+    ),
+    declare(
+        "CLUSTER006",
+        "worker left the cluster",
+        "A worker that can do no works any more (its disk is full, or its Avow was upgraded) leaves: others do them.",
+        "Mend what it names, and start it again.",
     ),
     declare(
         "DRIVE100",

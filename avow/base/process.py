@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from avow.tuning.running import FORK_LOOK
 from avow.tuning.sizes import OUTPUT_KEPT
 
 _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGXFSZ})
@@ -71,8 +72,10 @@ def run(
     env: Mapping[str, str] | None = None,
     stdin: str | None = None,
     pass_fds: Sequence[int] = (),
+    stopped: Callable[[], bool] | None = None,
 ) -> Completed:
-    """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception.
+    """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception. It ends
+    soon after `stopped` says so, as if its time were up.
 
     It gets the variables `bare` and `env`, and no others: what stands in somebody's environment or home is no part of
     any question."""
@@ -100,15 +103,24 @@ def run(
         watch(process.pid)
         code: int | None
         try:
-            code = process.wait(timeout=seconds)
-        except subprocess.TimeoutExpired:
-            code = None
+            code = _wait(process, start + seconds, stopped)
         finally:
             kill_tree(process.pid)
             process.wait()
             unwatch(process.pid)
         ended_with(code)
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
+
+
+def _wait(process: subprocess.Popen[bytes], end: float, stopped: Callable[[], bool] | None) -> int | None:
+    """Its code; None where its time is up, or nobody waits for it any more."""
+    while True:
+        left = end - time.monotonic()
+        try:
+            return process.wait(timeout=max(0.0, left if stopped is None else min(left, FORK_LOOK)))
+        except subprocess.TimeoutExpired:
+            if left <= 0 or (stopped is not None and stopped()):
+                return None
 
 
 def bare(home: str) -> dict[str, str]:

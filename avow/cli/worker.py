@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 
 import click
 
@@ -16,12 +17,9 @@ def command(address: str, slots: int | None) -> int:
     What is offered are the backends that are installed here and the tools that they find. TLS needs the files that
     AVOW_TLS_CA, AVOW_TLS_CERT and AVOW_TLS_KEY name.
     """
-    from avow.backend_kit.registry import backend, names
-    from avow.pipeline.cluster import Address, serve
-    from avow.pipeline.work import is_portable, tool_identities
+    from avow.pipeline.cluster import Address
+    from avow.pipeline.cluster_worker import serve
 
-    tools = dict.fromkeys(
-        identity for name in names() if is_portable(tool := backend(name)) for identity in tool_identities(tool)
-    )
-    serve(Address.read(address), slots or os.cpu_count() or 1, tuple(tools))
+    serve(Address.read(address), slots or os.cpu_count() or 1)
+    print(f"the cluster at {address} has ended, or let this worker go", file=sys.stderr)
     return 0

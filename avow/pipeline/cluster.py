@@ -1,34 +1,39 @@
 """Works on other machines, by Dask.distributed (the extra ``avow[cluster]``).
 
 The scheduler and its connections are Dask's; what travels is bytes, both ways: nothing that a worker says is unpickled
-here. A worker runs each work in a fork of its own (`avow.pipeline.forks`), which ends with its tools when it is done,
-out of time, cancelled, or when the worker dies. Who reaches a scheduler can run code on its workers, so that
-connections to other machines are by TLS with certificates on both sides.
+here, and nothing that it prints is shown. What a worker does is in `avow.pipeline.cluster_worker`. Who reaches a
+scheduler can run code on its workers, so that connections to other machines are by TLS with certificates on both sides.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import ipaddress
 import json
+import logging
 import os
 import queue
 import socket
 import ssl
-import tempfile
+import sys
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping
+import time
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.pipeline.engine_code import code_mark
-from avow.pipeline.executors import Asked, Came, answered
-from avow.pipeline.forks import Forks
-from avow.pipeline.requests import Tools
-from avow.tuning.running import CLUSTER_CONNECT, CLUSTER_RETRIES, WORKER_GRACE
+from avow.pipeline.cluster_worker import needs, own_code, perform, tools_of
+from avow.pipeline.executors import Asked, Came
+from avow.tuning.running import (
+    CLUSTER_ANSWER,
+    CLUSTER_CONNECT,
+    CLUSTER_LOOK,
+    CLUSTER_PATIENCE,
+    CLUSTER_RETRIES,
+    WORKER_GRACE,
+)
 
 _TLS = {"ca": "AVOW_TLS_CA", "cert": "AVOW_TLS_CERT", "key": "AVOW_TLS_KEY"}
 """Environment: files of the certificate authority, of this side's certificate and of its key."""
@@ -102,41 +107,6 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-_BEGAN = "avow began"
-"""On a worker: of which code it is. Its forks have that in memory, and would answer for what lies there now."""
-
-
-def perform(data: bytes, key: str, seconds: float) -> bytes:
-    """Runs on a worker: the work in a fork; the answer's bytes, or why there is none as JSON."""
-    from distributed import get_worker
-
-    extensions = get_worker().extensions
-    if extensions.get(_BEGAN) != code_mark():
-        return (
-            b"-" + json.dumps([f"Avow is another on {socket.gethostname()} since its worker began", False, ""]).encode()
-        )
-    forks = extensions.setdefault("avow forks", Forks())
-    # one folder for all works of this process: a fork server is of one
-    came = answered(forks, data, key, seconds, Path(tempfile.gettempdir()), _cancelled())
-    if isinstance(came.data, bytes):
-        return b"+" + came.data
-    return b"-" + json.dumps([came.failure, came.timed_out, came.log]).encode()
-
-
-def _cancelled() -> Callable[[], bool]:
-    """Whether nobody waits for the task any more that this thread is running."""
-    from distributed import get_worker
-
-    worker = get_worker()
-    task = worker.get_current_task()
-
-    def cancelled() -> bool:
-        found = worker.state.tasks.get(task)
-        return found is None or found.state in ("cancelled", "released", "forgotten") or worker.status.name == "closed"
-
-    return cancelled
-
-
 class Cluster:
     """An executor (`avow.pipeline.executors.Executor`)."""
 
@@ -145,10 +115,12 @@ class Cluster:
         try:
             from distributed import Client
         except ImportError as error:
-            message = "other machines are reached by Dask, which is not installed"
-            raise Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'")) from error
+            raise not_installed() from error
         security = address.security()
         address.greet()
+        _unpickle_nothing()
+        _say_nothing()
+        _open.add(self)
         try:
             self._client = Client(
                 address.url,
@@ -159,69 +131,144 @@ class Cluster:
                 name="avow",
             )
         except (OSError, TimeoutError, ValueError) as error:
+            _open.discard(self)
             raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
-        self._futures: dict[str, Any] = {}
+        for topic in ("print", "warn"):  # else a worker writes on our terminal, and into our answer
+            self._client.unsubscribe_topic(topic)
+        self._url = address.url
+        self._under_way: dict[str, tuple[Asked, Any]] = {}
+        self._tries: dict[str, int] = {}
+        self._wanted: set[frozenset[str]] = set()
         self._lock = threading.Lock()
+        self._closed = threading.Event()
         self._came: queue.SimpleQueue[Came | None] = queue.SimpleQueue()
+        threading.Thread(target=self._watch, daemon=True).start()
 
     def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
-        workers = self._client.scheduler_info(n_workers=-1)["workers"]
-        return {
-            str(name): frozenset(tuple(json.loads(r[5:])) for r in info["resources"] if r.startswith("tool:"))
-            for name, info in workers.items()
-        }
+        """Raises Rejected (``CLUSTER004``) where there are workers, but none that could answer us."""
+        workers = self._workers()
+        fit = {name: offered for name, offered in workers.items() if own_code() in offered}
+        if workers and not fit:
+            found = sorted({name[5:] for offered in workers.values() for name in offered if name.startswith("avow:")})
+            message = f"the cluster's workers have another Avow or Z3: {', '.join(found) or 'none that says so'}"
+            hint = f"{own_code()[5:]} is here; install the same there, and start the workers again"
+            raise Rejected(Diagnostic("CLUSTER004", message, hint=hint))
+        if len(fit) < len(workers):
+            print(
+                f"warning: {len(workers) - len(fit)} of the cluster's {len(workers)} workers have another Avow or Z3 "
+                "and get no work",
+                file=sys.stderr,
+            )
+        return {name: tools_of(offered) for name, offered in fit.items()}
 
     @property
     def slots(self) -> int:
         """How many works it does at once."""
-        return sum(info["nthreads"] for info in self._client.scheduler_info(n_workers=-1)["workers"].values())
+        return sum(offered[own_code()] for offered in self._workers().values() if own_code() in offered)
 
     def submit(self, asked: Asked) -> None:
-        seconds = asked.request.seconds + WORKER_GRACE
+        wanted = needs(asked.request)
         with self._lock:
-            if asked.key in self._futures:
+            if asked.key in self._under_way:
                 return
-            future = self._client.submit(
-                perform,
-                asked.data,
-                asked.key,
-                seconds,
-                key=f"avow-{asked.key}",
-                pure=False,
-                retries=CLUSTER_RETRIES,
-                resources={resource(tool): 1 for tool in asked.request.wanted},
-            )
-            self._futures[asked.key] = future
-        future.add_done_callback(lambda done: self._came.put(_fetched(asked, done)))
+            self._wanted.add(frozenset(wanted))
+            try:
+                future = self._client.submit(
+                    perform,
+                    asked.data,
+                    asked.key,
+                    asked.request.seconds + WORKER_GRACE,
+                    key=f"avow-{asked.key}",
+                    pure=False,
+                    resources=dict.fromkeys(wanted, 1),
+                )
+            except Exception as error:  # of a client that lost its cluster, whatever it is
+                self._came.put(Came(asked.key, failure=f"{_GONE} ({type(error).__name__})"))
+                return
+            self._under_way[asked.key] = asked, future
+        # Dask has one thread for what is to be done at the end of all works, and an answer may take a while to come
+        future.add_done_callback(
+            lambda done: threading.Thread(target=self._fetch, args=(asked, done), daemon=True).start()
+        )
 
     def results(self) -> Iterator[Came]:
         while (came := self._came.get()) is not None:
-            with self._lock:
-                future = self._futures.pop(came.key, None)
-            if future is not None:
-                future.release()
-                yield came
+            yield came
 
     def cancel(self, keys: Collection[str]) -> None:
         with self._lock:
-            futures = [found for key in keys if (found := self._futures.pop(key, None)) is not None]
-        self._client.cancel(futures, force=True)
+            futures = [found[1] for key in keys if (found := self._under_way.pop(key, None)) is not None]
+        with contextlib.suppress(Exception):  # who lost its cluster has nothing there to cancel
+            self._client.cancel(futures, force=True)
 
     def close(self) -> None:
-        self.cancel(tuple(self._futures))
+        self._closed.set()
+        self.cancel(tuple(self._under_way))
         self._came.put(None)
-        with contextlib.suppress(OSError, TimeoutError):
+        with contextlib.suppress(Exception):  # as above; also what its reader failed of
             self._client.close(timeout=5)
+        _open.discard(self)
+
+    # -- inside ------------------------------------------------------------------------------------------
+
+    def _fetch(self, asked: Asked, future: Any) -> None:
+        came = _fetched(asked, future)
+        with self._lock:
+            known = self._under_way.get(asked.key)
+            if known is None or known[1] is not future:  # cancelled, or given up
+                return
+            del self._under_way[asked.key]
+            tries = self._tries[asked.key] = self._tries.get(asked.key, 0) + 1
+        future.release()
+        if came is None and tries <= CLUSTER_RETRIES:  # the scheduler was lost, and may come again
+            self.submit(asked)
+        else:
+            self._came.put(came or Came(asked.key, failure=_GONE))
+
+    def _workers(self, seconds: float = CLUSTER_CONNECT) -> dict[str, Mapping[str, int]]:
+        """What each worker offers. Raises whatever a client raises that has no cluster any more."""
+        if (reader := self._client._handle_report_task) is not None and reader.done():
+            raise OSError("it hears nothing any more")  # Dask does not notice: a message could not be read
+        found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=seconds)
+        return {str(name): info["resources"] for name, info in found["workers"].items() if info["status"] == "running"}
+
+    def _watch(self) -> None:
+        """What nobody can do any more is not waited for: Dask would, for ever."""
+        alone: dict[frozenset[str], float] = {}
+        while not self._closed.wait(CLUSTER_LOOK):
+            try:
+                workers, why = self._workers(CLUSTER_ANSWER), "no worker of the cluster is left that could do it"
+            except Exception:  # of whatever kind: there is no answer
+                workers, why = {}, _GONE
+            now, was = time.monotonic(), bool(alone)
+            lacking = [w for w in self._wanted if not any(w <= offered.keys() for offered in workers.values())]
+            alone = {wanted: alone.get(wanted, now) for wanted in lacking}
+            with self._lock:
+                under_way = [asked for asked, _ in self._under_way.values()]
+            waiting = [asked for asked in under_way if frozenset(needs(asked.request)) in alone]
+            if waiting and not was and not self._closed.is_set():
+                print(f"warning: {why}; waited for, {CLUSTER_PATIENCE:.0f} s", file=sys.stderr)
+            late = [a for a in waiting if now - alone[frozenset(needs(a.request))] > CLUSTER_PATIENCE]
+            self.cancel([asked.key for asked in late])
+            for asked in late:
+                self._came.put(Came(asked.key, failure=why))
 
 
-def _fetched(asked: Asked, future: Any) -> Came:
-    """At once: an answer that was not fetched dies with its worker."""
-    if future.status != "finished":
-        return Came(asked.key, failure="the workers that had it were lost, or did not take it on")
+_GONE = "the cluster's scheduler does not answer any more"
+
+
+def _fetched(asked: Asked, future: Any) -> Came | None:
+    """At once: an answer that was not fetched dies with its worker, and is waited for once more. None: whoever had the
+    work lost us, or we them."""
+    if future.status in ("cancelled", "lost"):
+        return None
+    if future.status == "error":
+        return Came(asked.key, failure="worker after worker was lost over it, or could not begin it")
     try:
-        said = future.result(timeout=CLUSTER_CONNECT)
+        said = future.result(timeout=asked.request.seconds + WORKER_GRACE)
     except Exception as error:  # what cannot be read is no answer, whatever it is
-        return Came(asked.key, failure=f"the answer cannot be read: {type(error).__name__}"[:200])
+        lost = future.status in ("cancelled", "lost")
+        return None if lost else Came(asked.key, failure=f"the answer cannot be read: {type(error).__name__}"[:200])
     if not isinstance(said, bytes) or said[:1] not in (b"+", b"-"):
         return Came(asked.key, failure="the answer is none")
     if said[:1] == b"+":
@@ -229,41 +276,40 @@ def _fetched(asked: Asked, future: Any) -> Came:
     try:
         failure, timed_out, log = json.loads(said[1:])
         return Came(asked.key, failure=str(failure)[:500], timed_out=timed_out is True, log=str(log))
-    except ValueError:
+    except (ValueError, TypeError, RecursionError):
         return Came(asked.key, failure="the answer is none")
 
 
-def resource(tool: tuple[str, ...]) -> str:
-    """A tool as a resource of Dask's."""
-    return f"tool:{json.dumps(list(tool))}"
+def not_installed() -> Rejected:
+    """``CLUSTER003``."""
+    message = "other machines are reached by Dask, which is not installed"
+    return Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'"))
 
 
-def serve(address: Address, slots: int, tools: Tools) -> None:
-    """Be a worker of that cluster, until it ends or this process is told to end. Raises Rejected (``CLUSTER003``)."""
-    try:
-        from distributed import Worker
-    except ImportError as error:
-        message = "other machines are reached by Dask, which is not installed"
-        raise Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'")) from error
+# -- what comes from a cluster is data -----------------------------------------------------------------------------
 
-    security, began = address.security(), code_mark()
-    address.greet()
+_open: set[Cluster] = set()
 
-    async def work() -> None:
-        worker = Worker(
-            address.url,
-            nthreads=slots,
-            security=security,
-            resources={resource(tool): slots for tool in tools if tool[1]},
-            host="127.0.0.1" if not address.secure else None,
-            dashboard=False,
-            death_timeout=CLUSTER_CONNECT,
-        )
-        worker.extensions[_BEGAN] = began
-        async with worker:
-            await worker.finished()
 
-    try:
-        asyncio.run(work())
-    except (OSError, TimeoutError) as error:
-        raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
+def _unpickle_nothing() -> None:
+    """Answers are bytes, but Dask also unpickles errors, warnings and parts of its own messages, which a worker can
+    make, and a pickle can run anything. While a cluster is open, this process finds nothing for one to run: only the
+    name of the type of bytes, which Dask writes so."""
+    if not _guarded:
+        sys.addaudithook(_refuse)  # it cannot be taken away again
+        _guarded.append(True)
+
+
+_guarded: list[bool] = []
+
+
+def _refuse(event: str, arguments: tuple[object, ...]) -> None:
+    if event == "pickle.find_class" and _open and arguments != ("builtins", "bytes"):
+        raise TypeError("what comes from a cluster is not unpickled")
+
+
+def _say_nothing() -> None:
+    """What Dask logs here is of no use to who reads our terminal: what matters is said as an answer's failure."""
+    for name in ("asyncio", "tornado", *logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("asyncio", "tornado", "distributed"):
+            logging.getLogger(name).disabled = True

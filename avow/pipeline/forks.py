@@ -70,14 +70,14 @@ class Forks:
     def run(
         self, arguments: Sequence[str], *, cwd: Path, seconds: float, stopped: Callable[[], bool] | None = None
     ) -> Completed:
-        """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept. A
-        fork ends soon after `stopped` says so, as if its time were up."""
+        """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept. It
+        ends soon after `stopped` says so, as if its time were up."""
         server = self._at(cwd)
         done = server.run(arguments, seconds, stopped) if server else None
         if done is not None:
             return done
         command = [sys.executable, "-P", "-m", WORKER, *arguments]
-        return process.run(command, cwd=cwd, seconds=seconds, env={**os.environ, **_python()})
+        return process.run(command, cwd=cwd, seconds=seconds, env={**os.environ, **_python()}, stopped=stopped)
 
     def _at(self, cwd: Path, own: bool = False) -> _Server | None:
         """The server for this folder and environment; None where there can be none."""

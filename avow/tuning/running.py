@@ -19,7 +19,16 @@ CLUSTER_CONNECT = 30.0
 """Seconds to reach a cluster's scheduler, which may just be starting."""
 
 CLUSTER_RETRIES = 2
-"""How often a work whose worker died is given to another: more often, and the work is what kills them."""
+"""How often a work is sent again after the connection to the scheduler was lost."""
+
+CLUSTER_LOOK = 2.0
+"""Seconds between two looks whether a cluster still has workers for what is under way."""
+
+CLUSTER_ANSWER = 15.0
+"""Seconds that a scheduler may take to say which workers it has, on a loaded machine."""
+
+CLUSTER_PATIENCE = 60.0
+"""Seconds that a work waits for a worker when there is none for it: one that is started again takes some five."""
 
 WORKER_GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to translate and write."""

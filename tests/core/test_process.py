@@ -19,6 +19,14 @@ def test_output_and_code_are_the_tools() -> None:
     assert (done.code, done.stdout, done.stderr) == (7, "out\n", "err\n")
 
 
+def test_a_tool_ends_when_nobody_waits_for_it_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "FORK_LOOK", 0.01)
+    looks = iter([False, False, True])
+    assert process.run(["sleep", "60"], seconds=60, stopped=lambda: next(looks)).timed_out
+    assert not list(looks)
+    assert process.run(["sleep", "0.1"], seconds=60, stopped=lambda: False).code == 0
+
+
 def test_a_missing_tool_is_named() -> None:
     with pytest.raises(process.ToolMissing, match="no-such-tool"):
         process.run(["no-such-tool"])

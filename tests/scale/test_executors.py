@@ -241,7 +241,9 @@ class Machines:
     def worker(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
         marked = {**os.environ, "AVOW_TEST_CLUSTER": self.url}
-        self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, env=marked))
+        self.processes.append(
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=marked)
+        )
         return self.processes[-1]
 
     @property
@@ -275,7 +277,7 @@ def machines() -> Iterator[Machines]:
     found.close()
 
 
-@pytest.mark.nightly
+@pytest.mark.slow
 def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspace, machines: Machines) -> None:
     from avow.pipeline.cluster import Address, Cluster
 
@@ -343,8 +345,8 @@ case "$*" in *version*) echo 4.9.1;; *) exec sleep {seconds};; esac
 """
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("how", ["cancelled", "out of time", "its worker is killed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("how", some(["cancelled", "its worker is killed", "out of time"], 2))
 def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
     place: Workspace, machines: Machines, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
@@ -401,48 +403,137 @@ def _command(pid: str) -> bytes:
         return b""
 
 
-@pytest.mark.nightly
-def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_what_a_worker_pickles_is_not_read(
+    machines: Machines, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Neither as an answer nor as an error, and what it says is not shown."""
     from avow.pipeline.cluster import Address, Cluster, _fetched
 
     machines.worker()
     cluster = Cluster(Address.read(machines.url))
+    here = os.getpid()
+
+    def evil(raised: bool) -> object:
+        import cloudpickle
+        import distributed
+
+        class EvilError(Exception):  # made there, so that it travels by value
+            def __reduce__(self) -> object:
+                code = f"import os\nif os.getpid() == {here}: os.mkdir({str(tmp_path / 'ran')!r})"
+                return exec, (code,)
+
+        distributed.print("all is proved")
+        distributed.get_worker().log_event("warn", {"message": cloudpickle.dumps(EvilError())})
+        if raised:
+            raise EvilError
+        return EvilError()
+
     try:
         until(cluster.offers)
-        ran = str(tmp_path / "ran")
-
-        def evil() -> object:
-            class Evil:  # made there, so that it travels by value
-                def __reduce__(self) -> object:
-                    return os.mkdir, (ran,)
-
-            return Evil()
-
-        future = cluster._client.submit(evil, pure=False)
-        until(lambda: future.status in ("finished", "error"))
-        assert future.status == "finished"
-        request = Request("", "", "", "", {}, Limits(), b"", "")
-        assert _fetched(Asked.of(request), future).data is None
+        request = Request("", "", "", "sanity", {}, Limits(), b"", "")
+        for raised, status in ((False, "finished"), (True, "error")):
+            future = cluster._client.submit(evil, raised, pure=False)
+            until(lambda: future.status in ("finished", "error"))  # noqa: B023
+            assert future.status == status
+            came = _fetched(Asked.of(request), future)
+            assert came is not None
+            assert came.data is None
+            assert came.failure
         assert not (tmp_path / "ran").exists()
+        assert cluster.offers(), "it still hears what is said"
     finally:
         cluster.close()
+    assert "proved" not in "".join(capfd.readouterr())
 
 
-def test_a_worker_whose_code_was_exchanged_refuses(place: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_what_nobody_can_do_any_more_is_not_waited_for(
+    place: Workspace, machines: Machines, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """All workers go, or the scheduler itself: each work is an error that the next run asks again, and nothing hangs.
+    To a worker that comes back in time the works go."""
+    from avow.pipeline import cluster as there
+    from avow.pipeline.cluster import Address, Cluster
+
+    monkeypatch.setattr(there, "CLUSTER_LOOK", 0.1)
+    worker = machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+    found = cluster.results()
+    try:
+        until(cluster.offers)
+        _, asked = one(place, "sanity")
+        worker.send_signal(signal.SIGKILL)
+        worker.wait()
+        cluster.submit(asked)
+        until(lambda: "no worker of the cluster is left" in capfd.readouterr().err)
+        machines.worker()
+        assert next(found).data is not None
+        monkeypatch.setattr(there, "CLUSTER_PATIENCE", 0.5)
+        for gone in (machines.processes[-1], machines.processes[0]):
+            gone.send_signal(signal.SIGKILL)
+            gone.wait()
+            cluster.submit(asked)
+            came = next(found)
+            assert came.data is None
+            assert ("no worker" if gone is not machines.processes[0] else "scheduler") in came.failure
+    finally:
+        cluster.close()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_only_a_worker_of_the_same_code_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    from avow.base.diagnostics import Rejected
+    from avow.pipeline.cluster import Cluster
+    from avow.pipeline.cluster_worker import offered, own_code, tools_of
+
+    def workers(*offers: tuple[str, ...]) -> Cluster:
+        found = object.__new__(Cluster)
+        resources = {f"w{k}": dict.fromkeys(names, 1) for k, names in enumerate(offers)}
+        monkeypatch.setattr(Cluster, "_workers", lambda self: resources)
+        return found
+
+    here = offered()
+    assert own_code() in here
+    other = ("avow:9.9 (0123) with Z3 1.0", *here[1:])
+    assert list(workers(other, here).offers()) == ["w1"]
+    assert workers(other, here).slots == 1
+    with pytest.raises(Rejected, match=r"9\.9 \(0123\).*CLUSTER004"):
+        workers(other).offers()
+    odd = ('tool:["dafny"]', "tool:{", 'tool:["a", "b", 3]', "tool:" + "[" * 10**5, 'tool:["a", "b", "c"]', "GPU")
+    assert tools_of(odd) == {("a", "b", "c")}
+
+
+@pytest.mark.parametrize("why", ["its code was exchanged", "its disk is full"])
+def test_a_worker_that_can_do_no_works_leaves_and_takes_none_with_it(
+    place: Workspace, monkeypatch: pytest.MonkeyPatch, why: str
+) -> None:
     distributed = pytest.importorskip("distributed")
-    from avow.pipeline import cluster, engine_code
+    from avow.pipeline import cluster_worker, engine_code
 
     package = place.root / "package"
     (package / "base").mkdir(parents=True)
     (package / "base/some.py").write_text("A = 1")
     monkeypatch.setattr(engine_code, "_PACKAGE", package)
-    here = SimpleNamespace(extensions={cluster._BEGAN: engine_code.code_mark()})
-    monkeypatch.setattr(distributed, "get_worker", lambda: here)
-    monkeypatch.setattr(cluster, "_cancelled", lambda: None)
-    monkeypatch.setattr(cluster, "answered", lambda forks, data, key, *more: Came(key, b"it"))
-    assert cluster.perform(b"", "k", 1) == b"+it"
-    (package / "base/some.py").write_text("A = 10")
-    assert b"since its worker began" in cluster.perform(b"", "k", 1)
+    own, left = cluster_worker._Own(engine_code.code_mark()), list[object]()
+    worker = SimpleNamespace(extensions={"avow": own}, close="close", loop=SimpleNamespace(add_callback=left.append))
+    monkeypatch.setattr(distributed, "get_worker", lambda: worker)
+    monkeypatch.setattr(cluster_worker, "_cancelled", lambda worker: None)
+    monkeypatch.setattr(cluster_worker, "answered", lambda forks, data, key, *more: Came(key, b"it"))
+    assert cluster_worker.perform(b"", "k", 1) == b"+it"
+
+    def full(*asked: object) -> Came:
+        raise OSError(28, "No space left on device")
+
+    if why == "its disk is full":
+        monkeypatch.setattr(cluster_worker, "answered", full)
+    else:
+        (package / "base/some.py").write_text("A = 10")
+    with pytest.raises(distributed.Reschedule):
+        cluster_worker.perform(b"", "k", 1)
+    assert left == ["close"]
+    assert ("No space" if "full" in why else "since this worker began") in own.unfit
 
 
 @pytest.mark.parametrize(
@@ -468,7 +559,6 @@ def test_addresses_that_are_refused(text: str) -> None:
         Address.read(text)
 
 
-@pytest.mark.nightly
 def test_without_certificates_there_is_no_tls(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from avow.base.diagnostics import Rejected
