@@ -52,6 +52,17 @@ def test_json_meets_the_published_schema(rendered: tuple[Case, dict[str, Any]]) 
     assert data["exit_code"] == found.exit_code
 
 
+def test_what_is_below_a_requirement_may_be_no_obligation() -> None:
+    """A supposition without a reason, a derivation, a requirement: every format is made."""
+    found = rover_case()
+    below = ("supposition:system/supposition/together(a,b):0123456789ab", "derivation:D", "requirement:R9")
+    requirements = tuple(replace(r, below=below, weakest=below[0], failing=below) for r in found.requirements)
+    derivations = tuple(replace(d, below=below, weakest=below[0]) for d in found.derivations)
+    texts = dict(formats(replace(found, requirements=requirements, derivations=derivations)))
+    assert texts.keys() == dict(formats(found)).keys()
+    assert "system/supposition/together(a,b)" in texts["claims.html"]
+
+
 def test_junit_is_read_by_junitparser(rendered: tuple[Case, dict[str, Any]], tmp_path: Path) -> None:
     found, texts = rendered
     (tmp_path / "junit.xml").write_text(texts["junit.xml"], encoding="utf-8")
