@@ -280,10 +280,11 @@ class System:
             for last in product(*choices):
                 yield fixed, dict(zip(self.nodes, last, strict=True))
 
-    def steps(self, *, granted: bool = False) -> Iterator[tuple[Values, Values, Values]]:
+    def steps(self, *, granted: bool = False, argued: bool = False) -> Iterator[tuple[Values, Values, Values]]:
         """Every step that some run takes: the outputs at it, whether each assumption (``n0.a0``) and requirement
         (``R0``) holds, and what the environment gives. What the plan assumes of the environment holds. `granted`: and
-        what nodes assume of the environment alone, up to that step. Raises OverflowError where there are too many."""
+        what nodes assume of the environment alone, up to that step; `argued`: of inputs that the plan has a reason for.
+        Raises OverflowError where there are too many."""
         free = sorted({wire.outside for wire in self.wires.values() if wire.outside})
         clauses = [(n, each) for n in self.nodes for each in self.kept_of(n)]
         given = [(port, each) for port, (each, _) in self.outside.items() if each is not None]
@@ -314,8 +315,8 @@ class System:
                         for n in self.nodes
                     }
                     met = {n: held[n][: len(self.assumed[n])] for n in self.nodes}
-                    if granted and any(
-                        self.outer(n, each) and not good
+                    if (granted or argued) and any(
+                        self.outer(n, each, argued=argued) and not good
                         for n in self.nodes
                         for each, good in zip(self.assumed[n], met[n], strict=True)
                     ):
@@ -336,6 +337,7 @@ class System:
                             if len(seen) > MOST_STATES:
                                 raise OverflowError
 
-    def outer(self, name: str, clause: Formula) -> bool:
-        """Whether a clause speaks of the environment alone."""
-        return all(self.wires[name, each.removeprefix("in.")].outside for each in clause.names)
+    def outer(self, name: str, clause: Formula, *, argued: bool = False) -> bool:
+        """Whether a clause speaks of the environment alone; `argued`: and the plan says why that may be believed."""
+        wires = [self.wires[name, each.removeprefix("in.")] for each in clause.names]
+        return all(wire.outside and (wire.outside in self.outside or not argued) for wire in wires)

@@ -2,7 +2,8 @@
 requirement is supported that some run breaks, and none by what was kept that is not supported afresh.
 
 The methods of the nodes are taken at their word: some guarantees are refuted (and the plan may accept that), all others
-proved. A node keeps what is proved of it, as long as its assumptions have held.
+proved. A node keeps what is proved of it, as long as its assumptions have held. What nodes assume of an input that the
+plan has a reason for is supposed, and the case says so.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ def told(folder: Path, seed: int, edits: int = 3, *, rich: bool = False) -> int:
         assert good <= {r.id for r in fresh.requirements if r.status.supports}, (seed, edit)
         count += len(good)
         if good:
-            for now, _, _ in made.kept_word().steps():
+            for now, _, _ in made.kept_word().steps(argued=True):
                 for k, holds in enumerate(made.required):
                     values = {f"{n}.o{n}": value for n, value in now.items()}
                     assert f"R{k}" not in good or holds(values), (seed, edit, k, now)

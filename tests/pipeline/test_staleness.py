@@ -449,7 +449,7 @@ FILES: dict[str, tuple[str, str]] = {
     "models/radiation_sensor_impl.dfy": ("radiationSensor", "dafny"),
     "models/simulate_navigation.py": ("", ""),
     "robot/nodes/radiation_sensor.hpp": ("radiationSensor", "fuzz"),
-    "robot/nodes/radiation_sensor.yaml": ("radiationSensor", "fuzz"),
+    "robot/nodes/radiation_sensor.yaml": ("radiationSensor", "fuzz driven"),
     "reviews/localisation.yaml": ("localisation", "review"),
     "traces/nominal.jsonl": ("agent localisation navigation radiationSensor", "rosmonitoring"),
 }
