@@ -55,15 +55,23 @@ def program_files(path: str) -> tuple[Path, ...]:
     """The program; of a script, what it names by its whole path, with what lies beside that where it has a folder of
     its own; of a binary, the libraries that it is linked with; of a folder, what is in its `bin` and `lib`."""
     found: dict[Path, None] = {}
+    binaries: list[Path] = []
     waiting = [Path(path)]
     while waiting and len(found) < PROGRAM_FILES:
         file = Path(os.path.realpath(waiting.pop()))
         if file not in found and file.is_file():
             found[file] = None
-            waiting += _named(file)
+            begin = _begin(file)
+            waiting += _named(begin)
+            if begin[:4] == b"\x7fELF":
+                binaries.append(file)
         else:
             found |= dict.fromkeys(p for folder in program_folders(str(file)) for p in folder.rglob("*") if p.is_file())
-    return tuple(sorted(found))
+    linked: set[Path] = set()
+    for binary in binaries:
+        if binary not in linked:
+            linked |= _linked(binary)
+    return tuple(sorted({*found, *linked}))
 
 
 def program_folders(path: str) -> tuple[Path, ...]:
@@ -74,23 +82,33 @@ def program_folders(path: str) -> tuple[Path, ...]:
     return tuple(folder for name in ("bin", "lib") if (folder := place / name).is_dir()) or (place,)
 
 
-def _named(file: Path) -> Iterator[Path]:
+def _begin(file: Path) -> bytes:
     try:
         with file.open("rb") as opened:
-            begin = opened.read(SCRIPT_BYTES)
+            return opened.read(SCRIPT_BYTES)
     except OSError:
+        return b""
+
+
+def _named(script: bytes) -> Iterator[Path]:
+    if script[:2] != b"#!":
         return
-    if begin[:2] == b"#!":
-        for name in re.findall(rb"(?<![\w$}])/[\w./+@-]+", begin):
-            named = Path(os.fsdecode(name))
-            if named.is_file():
-                yield named
-                if named.parent.name not in _SHARED:
-                    yield from sorted(named.parent.iterdir())
-    elif begin[:4] == b"\x7fELF":
-        with contextlib.suppress(process.ToolMissing):
-            listed = process.run(["ldd", str(file)], seconds=VERSION_SECONDS).stdout
-            yield from (Path(name) for name in re.findall(r"(?:=>|^)\s*(/\S+)", listed, re.MULTILINE))
+    for name in re.findall(rb"(?<![\w$}])/[\w./+@-]+", script):
+        named = Path(os.fsdecode(name))
+        if named.is_file():
+            yield named
+            if named.parent.name not in _SHARED:
+                yield from sorted(named.parent.iterdir())
+
+
+def _linked(binary: Path) -> frozenset[Path]:
+    """The libraries that it is loaded with, those of its libraries among them."""
+    try:
+        listed = process.run(["ldd", str(binary)], seconds=VERSION_SECONDS, tied=False).stdout
+    except process.ToolMissing:
+        return frozenset()
+    named = re.findall(r"^\t(?:.* => )?(/.+) \(0x[0-9a-f]+\)$", listed, re.MULTILINE)
+    return frozenset(Path(os.path.realpath(name)) for name in named)
 
 
 def _mark(file: Path) -> tuple[int | str, ...]:

@@ -16,7 +16,7 @@ def version() -> str | None:
     if shutil.which("gcc") is None:
         return None
     try:
-        said = run(["spin", "-V"], seconds=VERSION_SECONDS)
+        said = run(["spin", "-V"], seconds=VERSION_SECONDS, tied=False)
     except ToolMissing:
         return None
     found = re.search(r"Spin Version (\S+)", said.stdout + said.stderr)

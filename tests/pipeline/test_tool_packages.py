@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from avow.base import programs, tools
+from avow.base import process, programs, tools
 from avow.base.notes import cache_folder
 from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
@@ -112,6 +113,21 @@ def test_a_binary_counts_with_its_libraries() -> None:
     if not Path("/usr/bin/ldd").exists():
         pytest.skip("no ldd")
     assert any(p.name.startswith("libc.") for p in files)
+
+
+def test_a_binarys_libraries_are_asked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    run = process.run
+
+    def counted(command: Sequence[str], **given: Any) -> process.Completed:
+        asked.extend(command[1:])
+        return run(command, **given)
+
+    monkeypatch.setattr(process, "run", counted)
+    program = os.path.realpath("/bin/sh")
+    programs.program_files.cache_clear()
+    assert len(programs.program_files(program)) > 1 or not Path("/usr/bin/ldd").exists()
+    assert asked == [program], "what ldd lists has the libraries of libraries in it"
 
 
 def test_where_a_tools_library_is_another_there_is_something_to_do(tmp_path: Path) -> None:
