@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from avow.base.file_systems import keeps_changes
-from avow.tuning.running import READER_SECONDS
+from avow.tuning.running import READER_SECONDS, SETTLED_NS
 
 PART = ".part"
 """How the name of a file ends that is still being written; one that stays was left by a killed process."""
@@ -73,9 +73,11 @@ def digest_once(path: Path) -> str:
 
 def identity(info: os.stat_result, path: str | Path) -> tuple[int | str, ...]:
     """What tells that a file is as it was a moment ago: its place on the disk, size in bytes, times in nanoseconds, the
-    time of its last change at the end. That time cannot be set back; where it can, or counts whole seconds only, the
-    content itself is looked at. Raises OSError."""
-    true = info.st_ctime_ns % 1_000_000_000 and keeps_changes(os.fspath(path), info.st_dev)
+    time of its last change at the end. That time cannot be set back; where it can, or counts whole seconds only and was
+    a moment ago, the content itself is looked at. Raises OSError."""
+    # once whole seconds are over, no later change has the same time: so lies what an image was unpacked from
+    told = info.st_ctime_ns % 1_000_000_000 or time.time_ns() - info.st_ctime_ns > SETTLED_NS
+    true = told and keeps_changes(os.fspath(path), info.st_dev)
     content = "" if true else _content(os.fspath(path), info.st_mode)
     return info.st_dev, info.st_ino, info.st_size, content, info.st_mtime_ns, info.st_ctime_ns
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import time
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +13,9 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence, guarantee
 
-from avow.base import file_systems
+from avow.base import file_systems, files
 from avow.base.codec import to_json
+from avow.base.files import sha256
 from avow.base.tools import package_digest
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
@@ -95,6 +97,7 @@ def test_where_times_of_change_can_be_set_back_the_bytes_count(
     if times == "set back":
         monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
     monkeypatch.setattr(file_systems, "_known", {})
+    monkeypatch.setattr(files, "SETTLED_NS", 10**12)  # however long this test takes, it is the same moment
     Restoring(monkeypatch, times)
     workspace = Workspace(tmp_path / "w")
     package = tmp_path / "lib" / "z3"
@@ -128,6 +131,24 @@ def test_where_times_of_change_can_be_set_back_the_bytes_count(
     assert settled() == (RESULT,)
     places[what].write_text("tExt")
     assert settled() is None
+
+
+def test_a_whole_second_that_is_over_tells_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of all that an image of a machine brought along: of a tool's libraries there are a hundred megabytes."""
+    path = tmp_path / "library"
+    path.write_text("text")
+
+    def looked_at(seconds_ago: int) -> bool:
+        when = (time.time_ns() // 10**9 - seconds_ago) * 10**9
+        info = os.stat_result(tuple(path.stat()), {"st_mtime_ns": when, "st_ctime_ns": when})
+        return sha256("text") in files.identity(info, path)
+
+    assert looked_at(0)
+    assert looked_at(-100), "from the future: the clock was set back"
+    assert not looked_at(100)
+    monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
+    monkeypatch.setattr(file_systems, "_known", {})
+    assert looked_at(100)
 
 
 def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
