@@ -22,7 +22,7 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import asking
 from avow.pipeline.answers_file import earlier
-from avow.pipeline.export import folder
+from avow.pipeline.export import folder, generated
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
@@ -66,9 +66,11 @@ def _is_settled(
 
 def prepare(state: State) -> None:
     """Where works are open: have what they are forked from made now, while the run has one thread."""
-    works = (w for a in state.assessments for w in a.surveyed.catalogue.works if w.engine != LANGUAGE)
+    works = [w for a in state.assessments for w in a.surveyed.catalogue.works if w.engine != LANGUAGE]
     with contextlib.suppress(OSError):  # the stage says so
         if any(open_obligations(state.workspace, work, state.run) for work in works):
+            methods = {work.name: work for work in works if not work.is_engine}
+            state.run.beside.prepare(state.workspace.root, lambda name: generated(methods[name]))
             state.run.forks.prepare(state.workspace.root)
 
 

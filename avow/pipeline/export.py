@@ -18,6 +18,7 @@ from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
+from avow.pipeline.beside import Beside
 from avow.pipeline.slices import MethodSlice, whole_node
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
 from avow.tuning.running import SETTLED_NS
@@ -105,9 +106,11 @@ def generated(work: Work) -> Mapping[str, str]:
     return one_step.export(tool, method_job(cut.system, cut.system.contract.node(cut.node), method))
 
 
-def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
+def export(workspace: Workspace, work: Work, key: str, beside: Beside | None = None) -> tuple[str, ...]:
     """Write what the backend generates and remove what it generated before and no more; the files' names."""
-    files = generated(work)
+    files = beside.ask(work.name) if beside is not None else None
+    if files is None:
+        files = generated(work)
     place = folder(workspace, work)
     for name in files:
         _inside(name, work)

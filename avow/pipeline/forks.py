@@ -49,6 +49,15 @@ def _python() -> dict[str, str]:
     return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": absolute_only()}
 
 
+def may_fork() -> bool:
+    """Whether a fork of this process would be as good as a new Python."""
+    return _has_forks() and not is_led_here() and len(list(Path("/proc/self/task").glob("*"))) == 1
+
+
+def _has_forks() -> bool:
+    return not os.environ.get(PLAIN) and sys.platform == "linux" and hasattr(os, "pidfd_open")
+
+
 _Place = tuple[int, str, tuple[tuple[str, str], ...]]
 
 
@@ -64,7 +73,7 @@ class Forks:
     def prepare(self, cwd: Path) -> None:
         """Let the server be a fork of this process: what both need is imported once. Without effect where a fork would
         not be as good as a new Python: with several threads, or modules found in the current folder."""
-        if not is_led_here() and len(list(Path("/proc/self/task").glob("*"))) == 1:
+        if may_fork():
             self._at(cwd, own=True)
 
     def run(
@@ -81,7 +90,7 @@ class Forks:
 
     def _at(self, cwd: Path, own: bool = False) -> _Server | None:
         """The server for this folder and environment; None where there can be none."""
-        if os.environ.get(PLAIN) or sys.platform != "linux" or not hasattr(os, "pidfd_open"):
+        if not _has_forks():
             return None
         place = (os.getpid(), str(cwd.resolve()), tuple(sorted(os.environ.items())))
         with self._lock:
@@ -119,7 +128,7 @@ class _Server:
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             # Not bound to our life by a signal, as that is bound to the starting *thread*: it ends as `control` closes.
-            self._process = _Own(theirs, cwd) if own else _new_python(theirs, cwd)
+            self._process = OwnFork(theirs, cwd, _forks) if own else _new_python(theirs, cwd)
         process.watch(self._process.pid)
 
     @property
@@ -187,16 +196,16 @@ def _new_python(theirs: socket.socket, cwd: Path) -> subprocess.Popen[bytes]:
     )
 
 
-class _Own:
-    """A server that is a fork of this process, asked after as a `subprocess.Popen` is."""
+class OwnFork:
+    """A fork of this process that serves, asked after as a `subprocess.Popen` is."""
 
-    def __init__(self, theirs: socket.socket, cwd: Path) -> None:
-        """Raises OSError."""
+    def __init__(self, theirs: socket.socket, cwd: Path, serve: Callable[[socket.socket], int]) -> None:
+        """`serve` is all that it does, with its end of the connection; its exit code. Raises OSError."""
         sys.stdout.flush()
         sys.stderr.flush()
         self.pid = os.fork()
         if self.pid == 0:
-            _serve(theirs, cwd)
+            _alone(theirs, cwd, serve)
         self._handle = os.pidfd_open(self.pid)
         self._lock = threading.Lock()
         self._ended = False
@@ -232,7 +241,13 @@ class _Own:
             self.poll()
 
 
-def _serve(control: socket.socket, cwd: Path) -> NoReturn:
+def _forks(control: socket.socket) -> int:
+    from avow.pipeline import fork_server
+
+    return fork_server.serve(control)
+
+
+def _alone(control: socket.socket, cwd: Path, serve: Callable[[socket.socket], int]) -> NoReturn:
     """In the fork, from here to its end: nothing of the process that it comes from stays open."""
     code = 1
     try:
@@ -250,9 +265,7 @@ def _serve(control: socket.socket, cwd: Path) -> NoReturn:
         process.forget_orphans()
         gc.freeze()  # what it comes with is never looked through, here or in its forks
         gc.set_threshold(COLLECTED_IN_WORKS)
-        from avow.pipeline import fork_server
-
-        code = fork_server.serve(control)
+        code = serve(control)
     finally:
         os._exit(code)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from avow.base.records import dataclass
 from avow.isolation.level import SANDBOX
+from avow.pipeline.beside import Beside
 from avow.pipeline.forks import Forks
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ class Run:
     """Where it sends works; none: it does all on this machine."""
     forks: Forks = field(default_factory=Forks, compare=False, repr=False)
     """Where it does works on this machine."""
+    beside: Beside = field(default_factory=Beside, compare=False, repr=False)
+    """Where it generates methods' files."""
     checked: dict[Path, Checked] = field(default_factory=dict, compare=False, repr=False)
     """System's folder → what the kernel established again of it."""
 

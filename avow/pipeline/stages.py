@@ -116,7 +116,7 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                 yield {
                     "basename": "export",
                     "name": title,
-                    "actions": [partial(_act, partial(exporting.export, workspace, work, key))],
+                    "actions": [partial(_act, partial(exporting.export, workspace, work, key, state.run.beside))],
                     "task_dep": [check],
                     "uptodate": [
                         _Asked(
