@@ -451,7 +451,7 @@ FILES: dict[str, tuple[str, str]] = {
     "robot/nodes/radiation_sensor.hpp": ("radiationSensor", "fuzz"),
     "robot/nodes/radiation_sensor.yaml": ("radiationSensor", "fuzz driven"),
     "reviews/localisation.yaml": ("localisation", "review"),
-    "traces/nominal.jsonl": ("agent localisation navigation radiationSensor", "rosmonitoring"),
+    "traces/nominal.jsonl": ("agent localisation navigation radiationSensor", "rosmonitoring fuzz"),
 }
 
 
