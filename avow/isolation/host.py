@@ -144,8 +144,13 @@ def driving(function: str) -> Any:
 class _FromSource(importlib.machinery.SourceFileLoader):
     """Never believes a compiled file: it may be of another source than the one that is recorded."""
 
+    eyes: Any = None
+    """What compiles in its place, where the subject is only looked at (`sights`)."""
+
     def get_code(self, fullname: str) -> Any:
         path = self.get_filename(fullname)
+        if self.eyes is not None:
+            return self.eyes.compiled(self.get_data(path), path)
         return self.source_to_code(self.get_data(path), path)
 
 
@@ -342,6 +347,7 @@ def _told(error: BaseException) -> str:
 def main() -> None:
     path, function, root, level = sys.argv[1:5]
     source, sink, mark = int(sys.argv[5]), int(sys.argv[6]), sys.argv[7]
+    eyes = _FromSource.eyes = _beside("sights.py").Eyes(json.loads(sys.argv[8])) if sys.argv[8:] else None
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
@@ -370,6 +376,13 @@ def main() -> None:
         say(ready)
         if "error" in ready:
             return
+        if eyes is not None:
+            held = eyes.loaded(sys.modules.copy().values)
+            for line in requests:
+                said = [answer(subject, known, r) | {"sights": eyes.told()} for r in json.loads(line)]
+                said[0]["sights"] += held
+                held = []
+                say({"replies": said})
         for line in requests:
             say({"replies": [answer(subject, known, request) for request in json.loads(line)]})
         drawn()

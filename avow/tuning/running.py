@@ -12,6 +12,10 @@ CONFORMANCE_PATIENCE = 60.0
 SUBJECT_PATIENCE = 10.0
 """Seconds that a subject may take for one answer: a robot's step takes milliseconds, its first import seconds."""
 
+SIGHTS = {"sights": 600, "times": 68, "items": 64, "text": 200, "bits": 1100, "constants": 400}
+"""Of a subject that is looked at: comparisons that one question tells, and of one place in its program; items of a
+container, characters of a text, bits of a number (all of a double's) and constants of its modules that are told."""
+
 CHANNEL_PATIENCE = 5.0
 """Seconds that the last of a channel may take once its writer has ended; after that, somebody else holds it."""
 

@@ -136,6 +136,8 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, 
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
     if own.failure is not None:
         told = f"guarantee {obligation.name} does not hold of these{_inexact(own.failure) if exact else ''}"
+        if own.asked:
+            told += f"; not of a process that is asked this alone, but of one that was asked the same {own.asked} times"
         shown = Counterexample(own.failure, told, own.trace)
         details[CASE] = own.case
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
@@ -182,6 +184,9 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, 
     if answer.replayed:
         bound["replayed"] = answer.replayed
         edges += f", {answer.replayed} that refuted it or a neighbour before"
+    if answer.repeated:
+        bound["repeated"] = answer.repeated
+        edges += f", {answer.repeated} times the same"
     chance = f"95 %: below {failure_bound(least):.2g} of such {'cases' if answer.runs is None else 'runs'} fail"
     cases = f"{valid} drawn cases"
     if answer.runs is not None:
@@ -213,6 +218,8 @@ def _doubt(answer: Answer, own: Tried) -> str:
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
     if answer.stopped == "time":
         return f"only {valid} of {wanted} cases in the time given"
+    if answer.stopped == "again":
+        return "the time ended before the subject was asked again whether another process answers the same"
     if own.undecided:
         return f"{own.undecided} of {valid + answer.edges} cases could not be judged"
     if answer.undecided:

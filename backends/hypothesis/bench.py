@@ -11,16 +11,16 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, Phase, assume, given, seed, settings
+from hypothesis import Phase, assume, given, seed
 from hypothesis import strategies as st
-from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
+from hypothesis.errors import FailedHealthCheck, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
 from avow.base.codec import from_text
@@ -28,36 +28,40 @@ from avow.base.files import text_or_nothing
 from avow.base.process import adopt_orphans
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
-from avow.formulas.values import Value, show
+from avow.formulas.values import Value
 from avow.isolation import judge
+from avow.isolation.scout import Scout, Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
 from avow.tuning.running import SUBJECT_PATIENCE
 
-from . import wire
+from . import seek, wire
 from .beside import kept_inputs, system_root, table_rows
-from .convention import Malformed, outputs, sent
+from .cases import Case, asked_with, pairs, sent_inputs, told, valuation
+from .convention import Malformed, outputs
 from .exchange import Answer, Met, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .machine import EXACT, SPECIAL, as_double, rounded
 from .pools import constants, pools
-from .tuning import APART, ASKED_AGAIN, BATCH, CASE_BYTES, SHRINKING_SECONDS
+from .shrink import OutOfTime, configuration, smallest
+from .tuning import (
+    AFTER_COUNTING,
+    APART,
+    ASKED_AGAIN,
+    BATCH,
+    CASE_BYTES,
+    COUNTED,
+    EDGES,
+    SCOUT_PATIENCE,
+    TRIED,
+)
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
 if hasattr(providers, "is_local_module_file"):
     providers.is_local_module_file = lambda path: False
-
-
-Case = tuple[Inputs, dict[str, Value]]
-Apart = tuple[Pairs, str]
-"""A case with an input that is no REAL, or the negative zero, in words, and what was wrong with the answer."""
-
-
-class OutOfTime(BaseException):
-    """The time for the whole is over; Hypothesis passes this through."""
 
 
 class Bench:
@@ -84,8 +88,8 @@ class Bench:
         self.remembers = bool(records.cells)
         root = system_root(asked, folder)
         path = root / asked.subject.file
-        rows = table_rows(asked.scenario, self.inputs_sorts)
-        self.generator = Generator(self.inputs_sorts, pools(self.formulas, rows, constants(text_or_nothing(path))))
+        self._written = constants(text_or_nothing(path))
+        self.generator = self.generating(frozenset(), frozenset())
         self.subject = SubjectProcess(path, asked.subject.function, SUBJECT_PATIENCE, root)
         self._aims = tuple(self._aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = kept_inputs(folder / KEPT, self.inputs_sorts)
@@ -96,13 +100,27 @@ class Bench:
         """Why a second process of the subject's gave no answer, where that says nothing of the subject."""
         self.end: float | None = None
         self._said: list[tuple[Inputs, Any]] = []
+        self.tried: list[Inputs] = []
+        """Some of the cases that were tried, for others to be steered from."""
+        self.repeated = 0
+        self.counted = COUNTED
+        self.only_after: dict[str, int] = {}
+        self.turned: Mapping[str, Sort] = self.inputs_sorts
+        """The inputs that may be turned."""
+        self.scout = Scout(self.subject.path, self.subject.function, SCOUT_PATIENCE, root)
         self.unsteady: Inputs | None = None
-        self.apart: list[Apart] = []
+        self.apart: list[tuple[Pairs, str]] = []
 
     @classmethod
     def load(cls, path: Path) -> Bench:
         """From the generated ``contract.json``. Raises Unreadable."""
         return cls(from_text(Question, path.read_bytes()), path.parent)
+
+    def generating(self, numbers: frozenset[Fraction], texts: frozenset[str]) -> Generator:
+        """What makes inputs from the constants of contract, scenario and subject, these among them."""
+        known = (self._written[0] | numbers, self._written[1] | texts)
+        rows = table_rows(self.asked.scenario, self.inputs_sorts)
+        return Generator(self.inputs_sorts, pools(self.formulas, rows, known))
 
     # -- for the generated test ----------------------------------------------------------------------------------------
 
@@ -111,23 +129,23 @@ class Bench:
         """Inputs that meet the assumptions, mostly: `check` rejects the others."""
 
         text = st.binary(min_size=CASE_BYTES, max_size=CASE_BYTES)
-        return text.map(lambda data: self._given(self.generator.case(Source(data), self._blamed, self._aims)))
+        return text.map(lambda data: self.as_given(self.generator.case(Source(data), self.blamed, self._aims)))
 
-    def _given(self, inputs: Inputs) -> Inputs:
+    def as_given(self, inputs: Inputs) -> Inputs:
         return {name: rounded(value) for name, value in inputs.items()} if self.doubles else inputs
 
-    def _sent(self, inputs: Inputs) -> dict[str, Any]:
-        return as_double(_sent(inputs)) if self.doubles else _sent(inputs)
+    def sent(self, inputs: Inputs) -> dict[str, Any]:
+        return as_double(sent_inputs(inputs)) if self.doubles else sent_inputs(inputs)
 
     def configured(self, test: Callable[..., None]) -> Callable[..., None]:
         """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""
-        return seed(self.seed)(self._configuration(tuple(Phase))(test))
+        return seed(self.seed)(configuration(self, tuple(Phase))(test))
 
     def check(self, name: str, inputs: Inputs) -> None:
         """The guarantee holds of what the subject makes of the inputs. Raises AssertionError, in contract words."""
-        assume(self._assumed(inputs))
+        assume(self.assumed(inputs))
         found = self.run(inputs)
-        held = self.guarantees[name].judged.holds(self._values(inputs, found))
+        held = self.guarantees[name].judged.holds(self.values_of(inputs, found))
         if held is None:
             raise AssertionError(f"{name} cannot be judged of {told(inputs, found)}")
         if not held:
@@ -135,9 +153,9 @@ class Bench:
 
     def run(self, inputs: Inputs) -> dict[str, Value]:
         """The subject's outputs. Raises SubjectFailed."""
-        return self._outputs(self.subject.ask(self._sent(inputs)))
+        return self.outputs_of(self.subject.ask(self.sent(inputs)))
 
-    def _outputs(self, reply: Any) -> dict[str, Value]:
+    def outputs_of(self, reply: Any) -> dict[str, Value]:
         if isinstance(reply, SubjectFailed):
             raise reply
         try:
@@ -161,12 +179,17 @@ class Bench:
         self.subject.patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
         try:
             stopped = self._sweep()
+            self.scout.close()
             failed = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
             smaller = {name: case for name, case in failed.items() if case is not None}
+            self.only_after = seek.only_after(self, smaller)
             if self.crash is not None and not self.subject.fault:
                 self.crash = self._shrunk_crash()
             elif not self.subject.fault:
-                self.unsteady = self.unsteady or self._asked_again()
+                try:
+                    self.unsteady = self.unsteady or self._asked_again()
+                except OutOfTime:  # whether it answers the same is not known
+                    stopped = stopped or "again"
                 self.apart = self._asked_apart() if self.doubles else []
         finally:
             fault = self.subject.close()
@@ -202,14 +225,16 @@ class Bench:
         queue: list[Inputs] = []
 
         @seed(self.seed)
-        @self._configuration((Phase.generate,))
+        @configuration(self, (Phase.generate,))
         @given(self.inputs)
         def every(inputs: Inputs) -> None:
             self._in_time()
-            if not self._assumed(inputs):
+            if not self.assumed(inputs):
                 self.rejected += 1
                 assume(False)
             queue.append(inputs)
+            if len(self.tried) < AFTER_COUNTING:
+                self.tried.append(inputs)
             if len(queue) == BATCH:
                 cases = queue[:]
                 queue.clear()
@@ -217,10 +242,12 @@ class Bench:
 
         try:
             self._replay()
+            seek.learn(self)
             self._edges()
             every()
             if queue:
                 self._try(queue)
+            seek.steer(self)
         except OutOfTime:
             return "time"
         except _Enough:
@@ -233,46 +260,82 @@ class Bench:
 
     def _replay(self) -> None:
         """What refuted a guarantee once, before all else, however few cases are wanted."""
-        cases = [inputs for inputs in map(self._given, self._kept) if self._assumed(inputs)]
+        cases = [inputs for inputs in map(self.as_given, self._kept) if self.assumed(inputs)]
         self.replayed = len(cases)
         for case in cases:
             self._try([case], edge=True)
         self.edges -= len(cases)
 
     def _edges(self) -> None:
-        """The cases at thresholds, before any is drawn; no more than twice as many."""
-        made = map(self._given, self.generator.edges(self._blamed))
-        cases = [inputs for inputs in made if self._assumed(inputs)]
-        most = min(len(cases), 2 * self.cases)
+        """The cases at thresholds, before any is drawn."""
+        made = map(self.as_given, self.generator.edges(self.blamed))
+        cases = [inputs for inputs in made if self.assumed(inputs)]
+        self.tried += cases[:: max(1, len(cases) // TRIED)][:TRIED]
+        most = min(len(cases), max(2 * self.cases, EDGES))
+        third = time.monotonic() + (self.end - time.monotonic()) / 3 if self.end is not None else inf
         for at in range(0, most, BATCH):
-            self._try(cases[at : min(at + BATCH, most)], edge=True)
+            if at < 2 * self.cases or time.monotonic() < third:  # where judging is slow, cases are still to be drawn
+                self._try(cases[at : min(at + BATCH, most)], edge=True)
 
     def _try(self, cases: list[Inputs], edge: bool = False) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
-        for inputs, reply in zip(cases, self.subject.ask_all([*map(self._sent, cases)]), strict=False):
+        for inputs, reply in zip(cases, self.subject.ask_all([*map(self.sent, cases)]), strict=False):
             if len(self._said) < ASKED_AGAIN:
                 self._said.append((inputs, reply))
             self._in_time()
-            try:
-                found = self._outputs(reply)
-            except SubjectFailed as error:
-                self.crash = (inputs, str(error))
-                raise _Enough from error
             self.valid += not edge
             self.edges += edge
-            self._judge(inputs, found, edge)
-            if all(g.failure is not None for g in self.guarantees.values()):
-                raise _Enough
+            self._answered(inputs, reply, edge)
+
+    def _answered(self, inputs: Inputs, reply: Any, edge: bool) -> None:
+        try:
+            found = self.outputs_of(reply)
+        except SubjectFailed as error:
+            self.crash = (inputs, str(error))
+            raise _Enough from error
+        self._judge(inputs, found, edge)
+        if all(g.failure is not None for g in self.guarantees.values()):
+            raise _Enough
+
+    # -- looked at -----------------------------------------------------------------------------------------------------
+
+    def starts(self) -> list[list[Inputs]]:
+        """What is asked before the cases that are steered to; of a function nothing."""
+        return [[]]
+
+    def allowed(self, inputs: Inputs) -> bool:
+        """Whether a case that is steered to may be tried."""
+        return self.meets(inputs) is True
+
+    def looked(self, start: list[Inputs], cases: Sequence[Inputs], *, on: bool = False) -> list[tuple[Sight, ...]]:
+        """What the subject compares of each of some cases, which come after `start`; with `on` one after the other."""
+        self._in_time()
+        return self.scout.sights([self.sent(inputs) for inputs in cases])
+
+    def tried_at(self, start: list[Inputs], cases: list[Inputs]) -> None:
+        for at in range(0, len(cases), BATCH):
+            self._try(cases[at : at + BATCH], edge=True)
+
+    def repeat(self, start: list[Inputs], inputs: Inputs, times: int) -> None:
+        """The same again and again; judged where the answer changes. Then others, once more."""
+        before: Any = None
+        for _ in range(0, times, BATCH):
+            self._in_time()
+            for reply in self.subject.ask_all([self.sent(inputs)] * BATCH):
+                self.repeated += 1
+                if reply != before:
+                    self._answered(inputs, reply, edge=True)
+                before = reply
+        self.tried_at(start, self.tried[:AFTER_COUNTING])
 
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process, asked the same from its start, gives another answer: what comes of
         clock, chance or place in memory is no function of what was recorded. The first cases only."""
-        with self._twin() as twin:
+        with self.twin() as twin:
             for at in range(0, len(self._said), BATCH):
-                if self.end is not None and time.monotonic() > self.end:
-                    break
+                self._in_time()
                 before = self._said[at : at + BATCH]
-                again = twin.ask_all([self._sent(inputs) for inputs, _ in before])
+                again = twin.ask_all([self.sent(inputs) for inputs, _ in before])
                 for (inputs, reply), other in zip(before, again, strict=False):
                     if other != reply and self._differ(reply, other):
                         return inputs
@@ -281,7 +344,7 @@ class Bench:
         return None
 
     @contextlib.contextmanager
-    def _twin(self) -> Iterator[SubjectProcess]:
+    def twin(self) -> Iterator[SubjectProcess]:
         """Another process of the subject's."""
         twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
         try:
@@ -290,22 +353,22 @@ class Bench:
             twin.close()
             self.silent = self.silent or twin.silent
 
-    def _asked_apart(self) -> list[Apart]:
+    def _asked_apart(self) -> list[tuple[Pairs, str]]:
         """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
-        found: dict[str, Apart] = {}
-        with self._twin() as twin:
+        found: dict[str, tuple[Pairs, str]] = {}
+        with self.twin() as twin:
             for inputs, _ in self._said[:: max(1, len(self._said) // APART)][:APART]:
                 for name, (word, text) in itertools.product(inputs, SPECIAL.items()):
                     if isinstance(self.inputs_sorts[name], RealSort) and (self.end or inf) > time.monotonic():
                         asked = {**inputs, name: Fraction(0)}
-                        why = self._wrong_apart(twin, asked, name, text) if self._assumed(asked) else ""
-                        found.setdefault(why, (_with(asked, name, word), why))
+                        why = self._wrong_apart(twin, asked, name, text) if self.assumed(asked) else ""
+                        found.setdefault(why, (asked_with(asked, name, word), why))
         return [one for why, one in found.items() if why]
 
     def _wrong_apart(self, twin: SubjectProcess, asked: Inputs, name: str, text: str) -> str:
         """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
         try:
-            values = self._values(asked, self._outputs(twin.ask({**self._sent(asked), name: {"r": text}})))
+            values = self.values_of(asked, self.outputs_of(twin.ask({**self.sent(asked), name: {"r": text}})))
         except SubjectFailed as error:
             return str(error)
         zero = text == SPECIAL["-0"]
@@ -314,7 +377,7 @@ class Bench:
 
     def _differ(self, one: Any, other: Any) -> bool:
         try:
-            return self._outputs(one) != self._outputs(other)
+            return self.outputs_of(one) != self.outputs_of(other)
         except SubjectFailed:
             return True
 
@@ -323,7 +386,7 @@ class Bench:
             raise OutOfTime
 
     def _judge(self, inputs: Inputs, found: dict[str, Value], edge: bool) -> None:
-        values = self._values(inputs, found)
+        values = self.values_of(inputs, found)
         for each in self.guarantees.values():
             hits = each.edge_hits if edge else each.hits
             for k, trigger in enumerate(each.triggers):
@@ -347,9 +410,9 @@ class Bench:
                 found = self.run(inputs)
             except SubjectFailed:
                 return None
-            return (inputs, found) if each.judged.holds(self._values(inputs, found)) is False else None
+            return (inputs, found) if each.judged.holds(self.values_of(inputs, found)) is False else None
 
-        return self._smallest(each.failure, broken)
+        return smallest(self, each.failure, broken)
 
     def _shrunk_crash(self) -> tuple[Inputs, str]:
         assert self.crash is not None
@@ -365,34 +428,15 @@ class Bench:
 
         if self.subject.silent:  # each further try would cost the whole patience
             return self.crash
-        inputs, _ = self._smallest((self.crash[0], {}), broken)
+        inputs, _ = smallest(self, (self.crash[0], {}), broken)
         return inputs, said[0]
-
-    def _smallest(self, first: Case, broken: Callable[[Inputs], Case | None]) -> Case:
-        best = [first]
-        limit = min(self.end or float("inf"), time.monotonic() + SHRINKING_SECONDS)
-
-        @seed(self.seed)
-        @self._configuration((Phase.generate, Phase.shrink))
-        @given(self.inputs)
-        def one(inputs: Inputs) -> None:
-            if time.monotonic() > limit:
-                raise OutOfTime
-            assume(self._assumed(inputs))
-            case = broken(inputs)
-            if case is not None:
-                best[0] = min(best[0], case, key=lambda c: (len(told(*c)), told(*c)))
-                raise _Broken
-
-        with contextlib.suppress(_Broken, OutOfTime, Flaky, Unsatisfiable, FailedHealthCheck):
-            one()
-        return best[0]
 
     def _report(self, stopped: str, smaller: Mapping[str, Case]) -> Answer:
         return Answer(
             valid=self.valid,
             edges=self.edges,
             replayed=self.replayed,
+            repeated=self.repeated,
             rejected=self.rejected,
             undecided=self.undecided,
             wanted=self.cases,
@@ -401,9 +445,9 @@ class Bench:
             observed=self.subject.observed(),
             isolation=self.subject.isolation,
             apart=tuple(self.apart),
-            unsteady=_pairs(self.unsteady, {}) if self.unsteady is not None else None,
+            unsteady=pairs(self.unsteady, {}) if self.unsteady is not None else None,
             silent=self.silent or self.subject.silent,
-            crash=(_pairs(self.crash[0], {}), self.crash[1]) if self.crash else None,
+            crash=(pairs(self.crash[0], {}), self.crash[1]) if self.crash else None,
             crash_trace=None,
             runs=None,
             guarantees={name: self._tried(name, smaller.get(name)) for name in self.guarantees},
@@ -413,25 +457,33 @@ class Bench:
         each = self.guarantees[name]
         counts = zip(each.triggers, each.hits, each.edge_hits, each.run_hits, strict=True)
         found = Tried(tuple(Met(t.whole.text, *met) for t, *met in counts), each.undecided)
-        return replace(found, failure=_pairs(*smaller), case=_sent(smaller[0])) if smaller is not None else found
+        if smaller is None:
+            return found
+        asked = self.only_after.get(name, 0)
+        return replace(found, failure=pairs(*smaller), case=sent_inputs(smaller[0]), asked=asked)
 
     # -- assumptions ---------------------------------------------------------------------------------------------------
 
-    def _assumed(self, inputs: Inputs) -> bool:
-        values = self._values(inputs, {})
+    def assumed(self, inputs: Inputs) -> bool:
+        met = self.meets(inputs)
+        self.undecided += met is None
+        return met is True
+
+    def meets(self, inputs: Inputs) -> bool | None:
+        """Whether the inputs meet the assumptions; None where it cannot be told."""
+        values = self.values_of(inputs, {})
         unknown = False
         for assumption in self.assumptions:
             held = assumption.holds(values)
             if held is False:
                 return False  # whatever cannot be told of the others
             unknown = unknown or held is None
-        self.undecided += unknown
-        return not unknown
+        return None if unknown else True
 
-    def _blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
-        return blamed(self.assumptions, self._values(inputs, {}))
+    def blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
+        return blamed(self.assumptions, self.values_of(inputs, {}))
 
-    def _values(self, inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
+    def values_of(self, inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
         """What a step's formulas are judged of."""
         return self.keeper.at(valuation(inputs, found))
 
@@ -439,48 +491,10 @@ class Bench:
         """What to draw again for a trigger to be met; parts that speak of outputs cannot be aimed at."""
 
         def failing(inputs: Inputs) -> tuple[str, ...] | None:
-            return blamed(trigger.parts, self._values(inputs, {}))
+            return blamed(trigger.parts, self.values_of(inputs, {}))
 
         return failing
-
-    def _configuration(self, phases: tuple[Phase, ...]) -> settings:
-        return settings(
-            max_examples=self.cases,
-            database=None,
-            deadline=None,
-            derandomize=False,
-            phases=phases,
-            report_multiple_bugs=False,
-            print_blob=False,
-            suppress_health_check=list(HealthCheck),
-        )
 
 
 class _Enough(BaseException):
     """Nothing more can be learnt."""
-
-
-class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
-    """The guarantee that is looked at fails."""
-
-
-def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
-    """Qualified names to values."""
-    return {f"in.{n}": v for n, v in inputs.items()} | {f"out.{n}": v for n, v in found.items()}
-
-
-def told(inputs: Inputs, found: Mapping[str, Value]) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in _pairs(inputs, found))
-
-
-def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> Pairs:
-    return tuple((name, show(value)) for name, value in valuation(inputs, found).items())
-
-
-def _with(inputs: Inputs, name: str, word: str) -> Pairs:
-    """The inputs, of which one is what the word says."""
-    return tuple((n, word if n == f"in.{name}" else value) for n, value in _pairs(inputs, {}))
-
-
-def _sent(inputs: Inputs) -> dict[str, Any]:
-    return {name: sent(value) for name, value in inputs.items()}

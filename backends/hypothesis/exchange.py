@@ -84,6 +84,8 @@ class Tried:
     """The steps up to the failure, where they are more than one."""
     case: Any = None
     """What the subject was asked, to be kept."""
+    asked: int = 0
+    """How often the same had been asked before, where the case alone breaks nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,8 @@ class Answer:
     valid: int
     edges: int
     replayed: int
+    repeated: int
+    """How often the same was asked of a subject that counts."""
     rejected: int
     undecided: int
     wanted: int

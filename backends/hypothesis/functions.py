@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from avow.formulas.values import Value
+from avow.isolation.scout import Sight
 from avow.isolation.subject import SubjectProcess
 from avow.language.sorts import Sort
 
+from .bench import Bench
 from .convention import received, sent
 from .generate import Inputs
 from .sequences import SequenceBench
@@ -22,7 +25,10 @@ class FunctionBench(SequenceBench):
         return {}
 
     def advance(self, subject: SubjectProcess, inputs: Inputs) -> dict[str, Value]:
-        return self._outputs(subject.ask(self._sent(inputs)))
+        return self.outputs_of(subject.ask(self.sent(inputs)))
+
+    def looked(self, start: list[Inputs], cases: Sequence[Inputs], *, on: bool = False) -> list[tuple[Sight, ...]]:
+        return Bench.looked(self, start, cases)
 
     def coded(self, value: Value) -> Any:
         return sent(value)

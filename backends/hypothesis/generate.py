@@ -119,6 +119,8 @@ class Generator:
 
     def _at_edges(self, sort: Sort) -> Iterator[Value]:
         match sort:
+            case FunctionSort(parameters=(one,), result=BoolSort()):
+                yield from (FunctionValue({(value,): True}, False) for value in self.pools.edges.get(one, ()))
             case FunctionSort(result=result):
                 yield from (FunctionValue({}, value) for value in self.pools.edges.get(result, ()))
             case SequenceSort(item=item):

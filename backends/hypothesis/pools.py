@@ -6,11 +6,13 @@ import ast
 import contextlib
 import itertools
 import math
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from types import CodeType
 
+from avow.base.alike import LOOK
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Element, Value
@@ -100,9 +102,26 @@ def pools(
     }
     seen = numbers | solved | of_subject[0]
     edges = _simple((*_around(seen), *(n for number in seen for n in _neighbours(number))))
+    written = tuple(dict.fromkeys((*texts, *(other for text in texts for other in variants(text)))))
     # what only the subject speaks of is tried in any case, and drawn now and then
     drawn = _simple((*combined, *(n + d for n in sorted(of_subject[0]) for d in (-1, 0, 1))))
-    return Pools(_by_sort(drawn, texts), near, rows, _by_sort(edges, texts), _lengths(seen))
+    return Pools(_by_sort(drawn, texts), near, rows, _by_sort(edges, written), _lengths(seen))
+
+
+_WIDE = {code: code + 0xFEE0 for code in range(0x21, 0x7F)}
+
+
+def variants(text: str) -> tuple[str, ...]:
+    """Texts that a careless comparison takes for this one: padded, in other cases, longer, shorter, turned round, with
+    signs that are not seen, of letters that look the same."""
+    if not text:
+        return (" ", "\0", "x")
+    padded = (f" {text}", f"{text} ", f" {text} ", f"{text}\n", f"\t{text}")
+    unseen = (f"{text}\0", f"\u200b{text}", f"\ufeff{text}", unicodedata.normalize("NFD", text))
+    cased = (text.upper(), text.lower(), text.capitalize(), text.swapcase())
+    alike = (text.translate(_WIDE), text.translate(LOOK))
+    other = (f"{text}x", f"x{text}", f"x{text}x", text + text, text[:-1], text[1:], text[::-1])
+    return tuple(one for one in dict.fromkeys((*padded, *unseen, *cased, *alike, *other)) if one != text)
 
 
 def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:

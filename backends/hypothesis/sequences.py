@@ -11,7 +11,7 @@ import json
 import math
 import random
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -19,20 +19,28 @@ from typing import Any
 
 from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import Data, Element, SequenceValue, Value
+from avow.isolation.scout import Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
-from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, _with, told, valuation
+from . import seek
+from .bench import Bench, _Enough
 from .beside import kept_runs
+from .cases import Case, asked_with, pairs, told, valuation
 from .convention import Malformed, outputs, received
-from .exchange import Answer, Question, Tried
+from .exchange import Answer, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Impossible, Inputs, Source
 from .machine import SPECIAL
+from .shrink import OutOfTime
 from .tuning import (
+    AFTER_COUNTING,
     ASKED_AGAIN,
     CASE_BYTES,
+    COUNTED_STEPS,
+    EDGES,
     HELD_STEPS,
+    LED_TO,
     LONG_HELD_STEPS,
     LONGEST_RUN,
     REJECTED_CASES,
@@ -55,6 +63,8 @@ class SequenceBench(Bench):
         super().__init__(asked, folder)
         self.memory = asked.memory
         self.unread = tuple(name.removeprefix("out.") for name in asked.left_out if name.startswith("out."))
+        self.turned = {n: s for n, s in self.inputs_sorts.items() if n not in self.memory}
+        self.counted = COUNTED_STEPS
         self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
         self.traces: dict[str, Trace] = {}
         self._first: list[list[Inputs]] = []
@@ -74,8 +84,7 @@ class SequenceBench(Bench):
 
     def advance(self, subject: SubjectProcess, inputs: Inputs) -> dict[str, Value]:
         """One step; the outputs, with memory among them. Raises SubjectFailed."""
-        given = {name: self.coded(value) for name, value in inputs.items() if name not in self.memory}
-        (answer,) = self._asked(subject, {"on": True, "steps": [given]})["steps"]
+        (answer,) = self._asked(subject, {"on": True, "steps": [self._step_of(inputs)]})["steps"]
         if "error" in answer:
             raise SubjectFailed(f"the step raises {answer['why']}")
         try:
@@ -122,6 +131,55 @@ class SequenceBench(Bench):
         """What `coded` made data of. Raises Malformed."""
         return received(_as_host(data), sort, name)
 
+    # -- looked at ---------------------------------------------------------------------------------------
+
+    def starts(self) -> list[list[Inputs]]:
+        """The beginnings of some runs."""
+        return [run[:steps] for run, steps in zip(self._first, LED_TO, strict=False) if len(run) >= steps]
+
+    def allowed(self, inputs: Inputs) -> bool:
+        """What the assumptions say hangs on where the run is: `tried_at` asks them."""
+        return True
+
+    def looked(self, start: list[Inputs], cases: Sequence[Inputs], *, on: bool = False) -> list[tuple[Sight, ...]]:
+        self._in_time()
+        asked: list[dict[str, Any]] = []
+        for inputs in cases:
+            if not (on and asked):
+                asked.append({"steps": [self._step_of(step) for step in start]})
+            asked.append({"on": True, "steps": [self._step_of(inputs)]})
+        seen = self.scout.sights([{"case": json.dumps(case)} for case in asked])
+        held = seen[0] if seen else ()
+        found = [sights for case, sights in zip(asked, seen, strict=True) if "on" in case]
+        return [(*held, *found[0]), *found[1:]] if found and not start else found
+
+    def tried_at(self, start: list[Inputs], cases: list[Inputs]) -> None:
+        for case in cases:
+            self._continued(start, [case])
+
+    def repeat(self, start: list[Inputs], inputs: Inputs, times: int) -> None:
+        self._continued(start, [*itertools.repeat(inputs, times), *self.tried[: self._steps]])
+
+    def _continued(self, start: list[Inputs], cases: list[Inputs]) -> None:
+        """A run of these steps, as far as the assumptions allow it."""
+        trace: Trace = []
+        try:
+            memory = self.begin(self.subject)
+        except SubjectFailed as error:
+            self.crash = ({}, str(error))
+            raise _Enough from error
+        for number, step in enumerate((*start, *cases)):
+            self._in_time()
+            inputs = {**step, **memory}
+            if self.assumed(inputs):
+                memory = self._one(inputs, trace, drawn=False)
+                self.edges += number >= len(start)
+            elif number < len(start):
+                break
+
+    def _step_of(self, inputs: Inputs) -> dict[str, Any]:
+        return {name: self.coded(value) for name, value in inputs.items() if name not in self.memory}
+
     # -- runs --------------------------------------------------------------------------------------------
 
     def _sweep(self) -> str:
@@ -131,11 +189,14 @@ class SequenceBench(Bench):
                 self._replayed_run(steps)
             for each in self.guarantees.values():
                 each.edge_hits = [0] * len(each.triggers)
-            self._edges_left = iter([*map(self._given, self.generator.edges(self._blamed))])
+            seek.learn(self)
+            self._edges_left = iter([*map(self.as_given, self.generator.edges(self.blamed))])
             while self.valid < self.cases:
                 self._run(chance)
                 if self.rejected > REJECTED_CASES * max(self.valid, 50):
                     return "assumptions"
+            self.tried_at([], [*itertools.islice(self._edges_left, EDGES // 3)])
+            seek.steer(self)
         except OutOfTime:
             return "time"
         except _Enough:
@@ -160,6 +221,8 @@ class SequenceBench(Bench):
             inputs = self._drawn(chance, memory, trace[-1][0] if trace else None, held)
             if inputs is None or self.valid >= self.cases:
                 break
+            if len(self.tried) < AFTER_COUNTING:
+                self.tried.append(inputs)
             memory = self._one(inputs, trace)
         self.runs += bool(trace)
         for name, each in self.guarantees.items():
@@ -206,11 +269,11 @@ class SequenceBench(Bench):
             else:
                 edge = next(self._edges_left, None) if chance.random() < 0.5 else None
                 data = Source(chance.randbytes(CASE_BYTES))
-                inputs = edge or self._given(
-                    self.generator.case(data, lambda drawn: self._blamed({**drawn, **memory}), self._aims)
+                inputs = edge or self.as_given(
+                    self.generator.case(data, lambda drawn: self.blamed({**drawn, **memory}), self._aims)
                 )
                 inputs = {**self._nudged(chance, inputs, memory, last), **memory}
-            if self._assumed(inputs):
+            if self.assumed(inputs):
                 return inputs
             self.rejected += attempt == STEP_TRIES - 1
         return None
@@ -266,8 +329,8 @@ class SequenceBench(Bench):
                 given = {n: self.decoded(step[n], s, n) for n, s in self.inputs_sorts.items() if n in step}
             except (Malformed, KeyError, ValueError, TypeError, AttributeError):
                 return
-            inputs = {**self._given(given), **memory}
-            if set(inputs) != set(self.inputs_sorts) or not self._assumed(inputs):
+            inputs = {**self.as_given(given), **memory}
+            if set(inputs) != set(self.inputs_sorts) or not self.assumed(inputs):
                 return
             memory = self._one(inputs, trace, drawn=False)
         self.replayed += 1
@@ -294,7 +357,7 @@ class SequenceBench(Bench):
 
     def _afresh(self, trace: Trace, name: str) -> Trace | None:
         """The run in a process that had no other before, if it breaks the guarantee there as well."""
-        with self._twin() as twin:
+        with self.twin() as twin:
             return self._again([inputs for inputs, _ in trace], name, twin)
 
     def _shorter(self, best: Trace, name: str, end: float) -> Trace:
@@ -310,7 +373,7 @@ class SequenceBench(Bench):
     def _plainer(self, best: Trace, name: str, end: float) -> Trace:
         """The run with simpler inputs, one after the other, the last step first: the simplest of all, those of the step
         before, whole numbers."""
-        plain = self._given(self.generator.case(Source(b""), lambda _: None))
+        plain = self.as_given(self.generator.case(Source(b""), lambda _: None))
         for port in (p for p in plain if p not in self.memory):
             for at in reversed(range(len(best))):
                 tried = [plain[port], best[at - 1][0][port]] if 0 < at < len(best) else [plain[port]]
@@ -334,11 +397,11 @@ class SequenceBench(Bench):
             memory = self.begin(subject)
             for step in steps:
                 inputs = {**step, **memory}
-                if not self._assumed(inputs):
+                if not self.assumed(inputs):
                     return None
                 found = self.advance(subject, inputs)
                 trace.append((inputs, found))
-                if self.guarantees[name].judged.holds(self._values(inputs, found)) is False:
+                if self.guarantees[name].judged.holds(self.values_of(inputs, found)) is False:
                     return trace
                 self.keeper.advance(valuation(inputs, found))
                 memory = self._looked([*self.memory], subject)
@@ -352,13 +415,12 @@ class SequenceBench(Bench):
 
     def _asked_again(self) -> Inputs | None:
         """The first inputs to which another process answers otherwise."""
-        with self._twin() as twin:
+        with self.twin() as twin:
             for run in self._first:
                 self.begin(self.subject)
                 self.begin(twin)
                 for inputs in run:
-                    if self.end is not None and time.monotonic() > self.end:
-                        return None
+                    self._in_time()
                     if self._said_by(self.subject, inputs) != self._said_by(twin, inputs):
                         return inputs
         return None
@@ -369,19 +431,19 @@ class SequenceBench(Bench):
         except SubjectFailed as error:
             return str(error)
 
-    def _asked_apart(self) -> list[Apart]:
+    def _asked_apart(self) -> list[tuple[Pairs, str]]:
         """Each REAL input in its turn is what no REAL is, in a first step."""
-        found: dict[str, Apart] = {}
+        found: dict[str, tuple[Pairs, str]] = {}
         reals = [n for n, s in self.inputs_sorts.items() if n not in self.memory and isinstance(s, RealSort)]
         for run in (r for r in self._first[:3] if r):
             for name, (word, text) in itertools.product(reals, SPECIAL.items()):
                 why = self._wrong_first(run[0], name, text)
                 if why:
-                    found.setdefault(why, (_with(run[0], name, word), why))
+                    found.setdefault(why, (asked_with(run[0], name, word), why))
         return list(found.values())
 
     def _wrong_first(self, inputs: Inputs, name: str, text: str) -> str:
-        given = {n: self.coded(v) for n, v in inputs.items() if n not in self.memory} | {name: {"f": text}}
+        given = self._step_of(inputs) | {name: {"f": text}}
         try:
             self.begin(self.subject)
             (answer,) = self._asked(self.subject, {"on": True, "steps": [given]})["steps"]
@@ -394,7 +456,7 @@ class SequenceBench(Bench):
 
     def _report(self, stopped: str, smaller: Mapping[str, Case]) -> Answer:
         report = super()._report(stopped, smaller)
-        crash = tuple(_pairs(*step) for step in self.traces.get("crash", []))
+        crash = tuple(pairs(*step) for step in self.traces.get("crash", []))
         runs = self.runs if self.remembers else None
         return replace(report, runs=runs, crash_trace=crash if self.asked.source else None)
 
@@ -404,7 +466,7 @@ class SequenceBench(Bench):
             return found
         trace = self.traces[name]
         case = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
-        return replace(found, case=case, trace=tuple(_pairs(*step) for step in trace) if len(trace) > 1 else ())
+        return replace(found, case=case, trace=tuple(pairs(*step) for step in trace) if len(trace) > 1 else ())
 
 
 def _as_host(data: Any, but: Collection[str] = ()) -> Any:

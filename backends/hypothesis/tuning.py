@@ -86,3 +86,55 @@ RUNS_TOGETHER = 25
 
 SILENCE = 3
 """Seconds, of virtual time, that such a run goes on after its last message: most timers and time-outs are shorter."""
+
+EDGES = 1500
+"""Cases at thresholds that are tried, or twice `cases` where that is more: a few dozen thresholds of a few inputs."""
+
+SAMPLED = 24
+"""Drawn cases in which a subject is looked at for what it compares with: most of what it does shows in these."""
+
+TRIED = 200
+"""Cases at thresholds that others are steered from."""
+
+STEERED = 600
+"""Cases that steering may come up with: a comparison takes some five."""
+
+STEERED_FROM = 60
+"""Cases that are steered from: each shows a way through the subject that none before has shown."""
+
+STEERED_PLACES = 10
+"""Times that one comparison is steered to: from other ways, and by other inputs."""
+
+STEERED_STEPS = 16
+"""Steps of the secant method: one where a difference is linear in an input, some ten where it is a square."""
+
+STEERED_TEXTS = 40
+"""Texts of the subject that each text of a case is turned to."""
+
+TURNS = (1, 997, 2**17, 2**33)
+"""By how much a number is turned to see what moves with it; each where the one before moved nothing: what is divided
+or shifted moves seldom."""
+
+POINTS_TURNED = 2
+"""Points of a function whose values are turned."""
+
+COUNTED = 25_000
+"""How often the same is asked of a subject that is seen to count: some twenty minutes at twenty hertz."""
+
+COUNTED_STEPS = 2500
+"""Likewise of a class, all of whose steps are kept and shown where they refute."""
+
+COUNTED_FROM = 3
+"""Cases that are asked again to see whether anything counts."""
+
+ASKED_TO_COUNT = 5
+"""Times that each of these is asked: what counts steadily shows in three differences."""
+
+LED_TO = (0, 2, 5)
+"""Steps of a run after which its next step is steered."""
+
+AFTER_COUNTING = 400
+"""Cases that are asked once more of a subject that has counted."""
+
+SCOUT_PATIENCE = 2.0
+"""Seconds for a question about what a subject compares: beyond it nothing more is looked at."""

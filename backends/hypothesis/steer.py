@@ -1,0 +1,254 @@
+"""Steers inputs to where a subject decides: from what it compares in some cases to cases in which it compares equal.
+
+As coverage-guided fuzzers do that trace comparisons. Of a comparison of numbers the difference of its sides is what is
+to be nought: each number and length of a case is turned a little to see whether and how fast the difference moves with
+it, and then as far as it takes (the secant method: one step where it is linear). Of texts the other side is put into
+each text. A case in which something new is compared, or something comes out the other way, is steered from in its turn.
+
+What is found are cases to be tried, and no more: they are judged as all others are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from avow.isolation.scout import Sight
+from avow.language.sorts import Sort, StringSort
+
+from .knobs import Inputs, Knob, at, knobs, put
+from .pools import STEP, variants
+from .tuning import STEERED, STEERED_FROM, STEERED_PLACES, STEERED_STEPS, STEERED_TEXTS, TURNS
+
+Look = Callable[[Sequence[Inputs]], list[tuple[Sight, ...]]]
+"""What the subject compares of each of some inputs."""
+
+Place = tuple[int, int]
+"""Of a comparison: where in the program, and the how manieth time (from the last: -1)."""
+
+Seen = dict[Place, Sight]
+
+
+@dataclass(slots=True)
+class Steering:
+    """`allowed`: whether inputs meet the assumptions. `left`: how many more cases it may come up with."""
+
+    sorts: Mapping[str, Sort]
+    look: Look
+    allowed: Callable[[Inputs], bool]
+    doubles: bool
+    left: int = STEERED
+    ways: list[Inputs] = field(default_factory=list)
+    """Cases that were steered from."""
+    _turned: Counter[Any] = field(default_factory=Counter)
+    _outcomes: set[tuple[int, int]] = field(default_factory=set)
+    """(place, which way it came out)."""
+    _known: set[str] = field(default_factory=set)
+
+    def cases(self, bases: Iterable[Inputs]) -> Iterator[list[Inputs]]:
+        """Cases to be tried, a few at a time."""
+        every = list(bases)
+        waiting = deque(base for base, seen in zip(every, self._looked(every), strict=True) if self._new(seen))
+        while waiting and self.left > 0 and len(self.ways) < STEERED_FROM:
+            base = waiting.popleft()
+            self.ways.append(base)
+            found: list[Inputs] = []
+            for case in self._from(base):
+                if repr(case) not in self._known and self.allowed(case):
+                    self._known.add(repr(case))
+                    found.append(case)
+            found = found[: self.left]
+            self.left -= len(found)
+            for case, seen in zip(found, self._looked(found), strict=True):
+                if self._new(seen):
+                    waiting.append(case)
+            if found:
+                yield found
+
+    def _looked(self, cases: Sequence[Inputs]) -> list[Seen]:
+        return [places(sights) for sights in self.look(cases)] if cases else []
+
+    def _new(self, seen: Seen) -> bool:
+        """Whether something is compared, or comes out, as never before."""
+        ways = {(place[0], _way(sight)) for place, sight in seen.items()}
+        new = not ways <= self._outcomes
+        self._outcomes |= ways
+        return new
+
+    def _from(self, base: Inputs) -> Iterator[Inputs]:
+        (seen,) = self._looked([base])
+        self._new(seen)
+        every = knobs(base, self.sorts)
+        for knob in every:
+            yield from (put(base, knob, choice) for choice in knob.choices() if choice != at(base, knob))
+        yield from self._texts(base, [k for k in every if isinstance(k.sort, StringSort)], seen)
+        yield from self._numbers(base, [k for k in every if k.numeric], seen)
+
+    # -- texts -------------------------------------------------------------------------------------------
+
+    def _texts(self, base: Inputs, texts: list[Knob], seen: Seen) -> Iterator[Inputs]:
+        said = [side for sight in seen.values() for side in (sight.right, sight.left) if isinstance(side, str)]
+        for knob in texts:
+            for text in dict.fromkeys(said):
+                if self._turned[knob.path] < STEERED_TEXTS and not self._turned[knob.path, text]:
+                    self._turned[knob.path] += 1
+                    self._turned[knob.path, text] += 1
+                    yield from (put(base, knob, other) for other in (text, *variants(text)))
+            longer = [int(n) for s in seen.values() for n in (s.left, s.right) if isinstance(n, Fraction)]
+            for length in dict.fromkeys(n for n in longer if 2 < n <= 5000):
+                if self._turned[knob.path, length] == 0 and self._turned[knob.path, "long"] < STEERED_TEXTS:
+                    self._turned[knob.path, length] += 1
+                    self._turned[knob.path, "long"] += 1
+                    yield from (put(base, knob, "x" * (length + more)) for more in (-1, 0, 1))
+
+    # -- numbers -----------------------------------------------------------------------------------------
+
+    def _numbers(self, base: Inputs, numbers: list[Knob], seen: Seen) -> Iterator[Inputs]:
+        apart = {place: d for place, sight in seen.items() if (d := _difference(sight)) is not None}
+        wanted = {place for place in apart if self._turned[place[0]] < STEERED_PLACES}
+        if not wanted:
+            return
+        moving = self._moving(base, numbers, {place: apart[place] for place in wanted})
+        for place, ways in moving.items():
+            for knob, slope in ways:
+                if self._turned[place[0]] < STEERED_PLACES and self._turned[place, knob.path] < 2:
+                    self._turned[place[0]] += 1
+                    self._turned[place, knob.path] += 1
+                    yield from self._steered(base, knob, place, apart[place], slope)
+
+    def _moving(
+        self, base: Inputs, numbers: list[Knob], apart: Mapping[Place, Fraction]
+    ) -> dict[Place, list[tuple[Knob, Fraction]]]:
+        """The numbers with which each difference moves, and how fast."""
+        found: dict[Place, list[tuple[Knob, Fraction]]] = {place: [] for place in apart}
+        still = list(numbers)
+        for turn in TURNS:
+            tried = [(knob, self._by(base, knob, Fraction(turn))) for knob in still]
+            made = [(knob, case) for knob, case in tried if case is not None]
+            moved: set[Knob] = set()
+            for (knob, _), seen in zip(made, self._looked([case for _, case in made]), strict=True):
+                for place, before in apart.items():
+                    now = _difference(seen[place]) if place in seen else None
+                    if now is not None and now != before:
+                        found[place].append((knob, (now - before) / turn))
+                        moved.add(knob)
+            still = [knob for knob in still if knob not in moved]
+        return found
+
+    def _by(self, base: Inputs, knob: Knob, distance: Fraction) -> Inputs | None:
+        now = at(base, knob)
+        fitting = knob.fitting(Fraction(now) + distance) if isinstance(now, int | Fraction) else None
+        return put(base, knob, fitting) if fitting is not None else None
+
+    def _steered(self, base: Inputs, knob: Knob, place: Place, apart: Fraction, slope: Fraction) -> Iterator[Inputs]:
+        """At and beside the value of one number at which the two sides meet."""
+        now = at(base, knob)
+        assert isinstance(now, int | Fraction)
+        here, goal = Fraction(now), Fraction(now)
+        for _ in range(STEERED_STEPS):
+            goal = _short(here - apart / slope)
+            near = goal if not knob.whole else Fraction(round(goal))
+            case = put(base, knob, number) if (number := knob.fitting(near)) is not None else None
+            (seen,) = self._looked([case]) if case is not None else ({},)
+            then = _difference(seen[place]) if place in seen else None
+            goal = near
+            if then is None or then in (0, apart) or near == here:
+                break
+            slope, here, apart = (then - apart) / (near - here), near, then
+        for beside in _beside(goal, knob.whole, self.doubles):
+            fitting = knob.fitting(beside)
+            if fitting is not None:
+                yield put(base, knob, fitting)
+
+
+def repeats(cases: Iterable[tuple[Sight, ...]], most: int) -> int:
+    """How often the same is to be asked until what a subject counts comes to where it compares equal, from what was
+    seen as it was asked a few times; 0 where nothing is seen to count."""
+    asked = [places(sights) for sights in cases]
+    found = 0
+    for place in asked[-1] if asked else ():
+        apart = [d for seen in asked[1:] if place in seen and (d := _difference(seen[place])) is not None]
+        steps = {now - before for before, now in itertools.pairwise(apart)}
+        if len(apart) < len(asked) - 1 or not steps:
+            continue
+        step = max(steps, key=abs)
+        steady = max(abs(step - other) for other in steps) * 1000 <= abs(step)
+        if step and steady and 0 < -apart[-1] / step <= most:
+            found = max(found, math.ceil(-apart[-1] / step) + 5)
+    return found
+
+
+def places(sights: Iterable[Sight]) -> Seen:
+    """The comparisons among what was seen: of each place the first few and the last."""
+    found: Seen = {}
+    count: Counter[int] = Counter()
+    for sight in sights:
+        if sight.right is None:
+            continue
+        nth = count[sight.place]
+        count[sight.place] += 1
+        found[sight.place, nth if nth < 3 else -1] = sight
+    return found
+
+
+def constants(cases: Sequence[tuple[Sight, ...]]) -> tuple[frozenset[Fraction], frozenset[str]]:
+    """The numbers and texts by which the subject decides, whatever its inputs were: what each place has had, where it
+    had the same in all of these cases, or nearly."""
+    had: dict[Any, Counter[Any]] = {}
+    for sights in cases:
+        count: Counter[tuple[int, str]] = Counter()
+        for sight in sights:
+            nth = count[sight.place, sight.what]
+            count[sight.place, sight.what] += 1
+            for side, value in (("left", sight.left), ("right", sight.right)):
+                if value is not None:
+                    key = (sight.place, value) if sight.place < 0 else (sight.place, sight.what, nth, side)
+                    had.setdefault(key, Counter())[value] += 1
+    steady = [v for values in had.values() if len(values) <= 1 + values.total() // 8 for v in values]
+    texts = {value for value in steady if isinstance(value, str)}
+    numbers = {value for value in steady if isinstance(value, Fraction)}
+    numbers |= {Fraction(text) for text in texts if text.isdecimal() and len(text) < 20}
+    return frozenset(numbers), frozenset(texts)
+
+
+def _difference(sight: Sight) -> Fraction | None:
+    if isinstance(sight.left, Fraction) and isinstance(sight.right, Fraction):
+        return sight.left - sight.right
+    return None
+
+
+def _way(sight: Sight) -> int:
+    """Which way a comparison comes out."""
+    left: Any = sight.left
+    right: Any = sight.right
+    return int(left > right) - int(left < right)
+
+
+def _short(number: Fraction) -> Fraction:
+    """A number that can be written: of what has more digits, the nearest double."""
+    if number.denominator < 10**9:
+        return number
+    try:
+        return Fraction(float(number))
+    except OverflowError:
+        return number
+
+
+def _beside(number: Fraction, whole: bool, doubles: bool) -> Iterator[Fraction]:
+    yield number
+    yield from (number + d for d in (-1, 1))
+    if whole:
+        return
+    yield from (number + d for d in (-STEP, STEP))
+    try:
+        near = float(number)
+    except OverflowError:
+        return
+    if doubles:
+        ends = (math.nextafter(near, -math.inf), near, math.nextafter(near, math.inf))
+        yield from (Fraction(end) for end in ends if math.isfinite(end))
