@@ -45,6 +45,9 @@ class Scout(SubjectProcess):
         command, shown = super()._command(there, back, mark)
         return [*command, json.dumps(SIGHTS)], shown
 
+    def _one_by_one(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
+        return [] if self.silent else super()._one_by_one(cases)  # which of them it hangs on is of no interest
+
     def _reply(self, reply: Any) -> Any:
         told = reply.get("sights") if isinstance(reply, dict) else None
         read = [_read(sight) for sight in told] if isinstance(told, list) else []

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from avow.base.persons import distance
+
 _DIGITS = re.compile(r"[0-9]+|'+$")
 
 
@@ -49,19 +51,3 @@ def _deletions(name: str) -> set[str]:
     if len(name) + 2 >= 9 and len(name) <= 40:
         found.update(part[:i] + part[i + 1 :] for part in once for i in range(len(part)))
     return found
-
-
-def distance(one: str, other: str, limit: int) -> int:
-    """How many letters to insert, delete, change or swap with the next; more than `limit` is not counted exactly."""
-    if abs(len(one) - len(other)) > limit:
-        return limit + 1
-    before: list[int] = []
-    row = list(range(len(other) + 1))
-    for i, a in enumerate(one, 1):
-        older, before, row = before, row, [i]
-        for j, b in enumerate(other, 1):
-            cost = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
-            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
-                cost = min(cost, older[j - 2] + 1)
-            row.append(cost)
-    return row[-1]

@@ -24,7 +24,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "measured runs, judged by exact binomial statistics"
-    version = "2"
+    version = "3"
     strength = Verdict.TESTED
     uses_scenario = False
     uses_wiring = False

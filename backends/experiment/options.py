@@ -179,12 +179,12 @@ class _Tolerance:
     text: str
     strict: bool
     contracts: bool
-    """Whether it is a number of the contract."""
+    """Whether each guarantee says it."""
 
 
 def _within(problems: Problems, unit: str) -> _Tolerance | None:
     """The tolerance, held against the contract: where a guarantee compares with numbers it is one of them; where it
-    names none, a constant of the contract, or a person has to say that it is meant."""
+    names none, a person has to say that it is meant, also of a constant: it may be of something else."""
     written = problems.job.options.get("within", "")
     constants = {n: v for n, t in problems.job.contract.constants if (v := constant(t)) is not None}
     found = _read_tolerance(problems, written, unit, constants)
@@ -210,8 +210,7 @@ def _within(problems: Problems, unit: str) -> _Tolerance | None:
         hint = "a tolerance is the least number T for which the whole guarantee says `quantity <= T` or `< T`"
         problems.add("within", why, hint, "EXP107")
     strict = any(bound.strict for _, bound in bounds if isinstance(bound, Bound))
-    contracts = len(bounds) == len(formulas) or number in constants.values()
-    return _Tolerance(value, f"{written}", strict, contracts)
+    return _Tolerance(value, f"{written}", strict, len(bounds) == len(formulas))
 
 
 def _read_tolerance(

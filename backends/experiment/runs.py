@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+from avow.base.alike import alike
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.records import dataclass
 
@@ -82,10 +84,11 @@ class _RunsReader:
         if "\0" in text:
             raise self.fail(text[: text.index("\0")].count("\n") + 1, "EXP111", "a NUL character in the data")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        rows = []
+        rows: list[tuple[int, list[str]]] = []
         try:
             for cells in reader:
-                if cells and not (len(cells) == 1 and not cells[0].strip()):
+                quoted = len(cells) == 1 and not cells[0].strip() and bool(rows) and len(rows[0][1]) == 1
+                if cells and (len(cells) > 1 or cells[0].strip() or quoted):
                     rows.append((reader.line_num, [cell.strip() for cell in cells]))
                 if len(rows) > RUNS + 1:
                     raise self.fail(reader.line_num, "EXP111", f"more than {RUNS} runs")
@@ -96,6 +99,11 @@ class _RunsReader:
     def header(self, line: int, columns: list[str]) -> list[str]:
         for name in sorted({c for c in columns if columns.count(c) > 1}):
             self.add(line, "EXP112", f"the column '{name}' is there twice")
+        read = Counter(alike(name) for name in columns)
+        for name in (*self.measure.columns, *([self.id_column] if self.id_column else [])):
+            if name in columns and read[alike(name)] > 1:
+                others = ", ".join(repr(other) for other in columns if other != name and alike(other) == alike(name))
+                self.add(line, "EXP112", f"nobody can tell the column '{name}' from {others}")
         wanted = [*self.measure.columns, *([self.id_column] if self.id_column else [])]
         for name in wanted:
             if name not in columns:

@@ -177,6 +177,7 @@ class Bench:
         adopt_orphans()
         self.end = time.monotonic() + seconds
         self.subject.patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
+        self.scout.patience = min(SCOUT_PATIENCE, self.subject.patience / 4)
         try:
             stopped = self._sweep()
             self.scout.close()

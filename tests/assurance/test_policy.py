@@ -391,9 +391,19 @@ def test_a_method_that_gave_no_answer_is_seen_to_first() -> None:
 
 ADA = """Lovelace Ada|Dr. Ada Lovelace|Ada Lovelace MSc|Ada Lovelace-King|Ada King Lovelace|A.L.|Ada|Mrs Lovelace
 ada.lovelace@x.org|Ada Lovelace <a@b.c>|Ada Lovelace (safety)|Ada Lovelace Jr.|Ada  Love lace|ADA LOVELACE
-A. B. Lovelace"""
+A. B. Lovelace
+alovelace@x.org|lovelacea|adal|Ada Lovelase|Ada Loveiace|Ada Lovleace"""
 SPELLINGS = ADA.replace("\n", "|").split("|")
-OTHERS = [("A. Müller", "B. Müller"), ("A. Müller", "A. Maier"), ("Ada Lovelace", "Alan Turing"), ("Ада", "Олег")]
+OTHERS = [
+    ("A. Müller", "B. Müller"),
+    ("A. Müller", "A. Maier"),
+    ("Ada Lovelace", "Alan Turing"),
+    ("Ада", "Олег"),
+    ("Иван Петров", "Olga Petrova"),
+    ("Ann Lee", "Dan Lee"),
+    ("Anna Schmidt", "Hanna Schmitt"),
+    ("Li Wei", "Wang Wei"),
+]
 
 
 def test_one_person_under_several_spellings_is_one_reviewer() -> None:
@@ -413,9 +423,17 @@ def test_one_person_under_several_spellings_is_one_reviewer() -> None:
         name for name in SPELLINGS if not one_person("Ada Lovelace", name) or not one_person(name, "Ada Lovelace")
     ] == []
     assert [pair for pair in OTHERS if one_person(*pair)] == []
+    alphabets = [
+        ("Иван Петров", "Ivan Petrov"),
+        ("Щербаков, Юрий", "Yuri Shcherbakov"),
+        ("Γιώργος Παππάς", "Giorgos Pappas"),
+    ]
+    assert [pair for pair in alphabets if not one_person(*pair)] == []
 
 
-@pytest.mark.parametrize("name", ["Ada L\u200bovelace", "\u0410da", "Ada\u202e", "\u1d00da", "Ada \u3164", "123"])
+@pytest.mark.parametrize(
+    "name", ["Ada L\u200bovelace", "\u0410da", "Ada\u202e", "\u1d00da", "Ada \u3164", "123", "Ada L0velace", "?"]
+)
 def test_names_that_look_like_anothers_are_told(name: str) -> None:
     from avow.base.persons import unreadable
 

@@ -181,8 +181,8 @@ NAMES_NONE = "in.goal >= 7.5 -> out.there"
         ("0.1 * out.x <= Tolerance", "Tolerance", "m", "refused"),
         ("out.x * out.x <= Tolerance * Tolerance", "Tolerance", "m", "tested"),
         ("out.x * out.x <= Reach", "Reach", "m", "refused"),
-        (NAMES_NONE, "Reach", "m", "tested"),
-        (NAMES_NONE, "300 cm", "m", "tested"),
+        (NAMES_NONE, "Reach", "m", "supposed"),
+        (NAMES_NONE, "300 cm", "m", "supposed"),
         (NAMES_NONE, 30, "m", "supposed"),
         (NAMES_NONE, 7.5, "m", "supposed"),
     ],
@@ -293,6 +293,16 @@ def test_too_few_runs_are_never_green(make_job: Callable[..., Any], tmp_path: Pa
         ('run,d\n1,"0.1\n', 2, "not CSV"),
         ("run,d\n1,0.1\n\n ,0.1\n", 4, "no name"),
         ("run,d\n1,=0.1+0.1\n", 2, "not a number"),
+        ('d\n0.1\n""\n0.2\n', 3, "empty cell"),  # a run without a measurement is no blank line
+        ("run,d,D\n1,0.1,0.2\n", 1, "nobody can tell the column 'd' from 'D'"),
+        ("run,d,\u0501\n1,0.1,0.2\n", 1, "nobody can tell"),
+        ("run,d,d\u200b\n1,0.1,0.2\n", 1, "nobody can tell"),
+        ("run,d,\uff44\n1,0.1,0.2\n", 1, "nobody can tell"),
+        ("run,d\n1,\u0661\n", 2, "not a number"),
+        ('run,d\n1,"0,1"\n', 2, "not a number"),
+        ("run;d\n1;0.1\n", 1, "no column 'd'"),
+        ("run,d\r1,0.1\r\n2,x\n", 3, "not a number"),
+        ("run,d\n1,1e400\n", 2, "not a number"),
     ],
 )
 def test_bad_data_is_told_with_its_line_and_never_green(
