@@ -1,14 +1,12 @@
 """Diagnostics for people (with the source line and a caret under the place), as JSON, and as SARIF 2.1.0.
 
 Everything shown comes from files that nobody vouches for: what is not printable is made visible, never passed on to the
-terminal, and long lines are cut to what surrounds the place. The JSON is flat, and has every key, as
-`avow/language/check.schema.json` says.
+terminal, and long lines are cut to what surrounds the place. The JSON is flat, and has every key.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,11 +14,11 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
-from avow.base import codec
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.plain import count
+from avow.base.records import dataclass
 from avow.tuning.shown import SOURCE_COLUMNS
 from avow.tuning.sizes import SOURCE_SHOWN
 
@@ -137,24 +135,39 @@ def _excerpt(line: str, span: Span) -> tuple[str, int, int]:
 # --- for machines ----------------------------------------------------------------------------------------------------
 
 
-def to_json(diagnostics: Iterable[Diagnostic]) -> dict[str, Any]:
-    """``{"diagnostics": […]}`` as avow/language/check.schema.json describes it."""
-    return {"diagnostics": [_as_json(d) for d in diagnostics]}
+@dataclass(frozen=True, slots=True)
+class ShownDiagnostic:
+    """A diagnostic. Its file is called as it was on the command line; lines and columns count from 1, columns in
+    characters (code points), the end is exclusive; where it has no place, these are null."""
+
+    file: str | None
+    line: int | None
+    column: int | None
+    end_line: int | None
+    end_column: int | None
+    severity: Severity
+    code: str
+    message: str
+    hint: str | None
 
 
-def _as_json(diagnostic: Diagnostic) -> dict[str, Any]:
-    told = codec.to_json(diagnostic)
-    place = told.pop("span") or dict.fromkeys(("file", "line", "column", "end_line", "end_column"))
-    del told["notes"]
-    return {key: _decoded(said) if isinstance(said, str) else said for key, said in (place | told).items()}
+@dataclass(frozen=True, slots=True)
+class CheckDocument:
+    """What is to be said of files."""
+
+    diagnostics: tuple[ShownDiagnostic, ...]
 
 
-def _decoded(text: str) -> str:
-    """The text without the lone surrogates that Python has for a file name's bytes: no JSON reader takes those."""
-    return text if text.isascii() else _SURROGATES.sub("\ufffd", text)
+def told(diagnostics: Iterable[Diagnostic]) -> CheckDocument:
+    """For machines: docs/schemas/check.schema.json follows from it."""
+    return CheckDocument(tuple(map(_shown, diagnostics)))
 
 
-_SURROGATES = re.compile("[\ud800-\udfff]")
+def _shown(d: Diagnostic) -> ShownDiagnostic:
+    s, said = d.span, (d.severity, d.code, d.message, d.hint)
+    if s is None:
+        return ShownDiagnostic(None, None, None, None, None, *said)
+    return ShownDiagnostic(s.file, s.line, s.column, s.end_line, s.end_column, *said)
 
 
 def to_sarif(
@@ -194,12 +207,12 @@ def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
         "ruleId": diagnostic.code,
         "ruleIndex": rule,
         "level": str(diagnostic.severity),
-        "message": {"text": _decoded(text)},
+        "message": {"text": text},
     }
     if diagnostic.span is not None:
         result["locations"] = [{"physicalLocation": _location(diagnostic.span)}]
     related = [
-        {"id": i, "physicalLocation": _location(place), "message": {"text": _decoded(note)}}
+        {"id": i, "physicalLocation": _location(place), "message": {"text": note}}
         for i, (note, place) in enumerate(diagnostic.notes, 1)
         if place is not None
     ]

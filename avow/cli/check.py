@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("paths", metavar="SYSTEM...", nargs=-1, required=True, type=ContractArgument())
-@json_option("see avow/language/check.schema.json")
+@json_option("see docs/schemas/check.schema.json")
 @click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
 @click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")
 @click.option("--separately", is_flag=True, help="Each file is a contract of its own, also within one folder.")
@@ -44,7 +44,7 @@ def command(
     error.
     """
     from avow import __version__
-    from avow.base.rendering import render, summary, to_json, to_sarif
+    from avow.base.rendering import render, summary, to_sarif, told
 
     found: list[Diagnostic] = []
     files = 0
@@ -62,7 +62,7 @@ def command(
         )
         shelves[folder].keep()
     if as_json:
-        click.echo(document(to_json(found)))
+        click.echo(document(told(found)))
     elif sarif:
         click.echo(document(to_sarif(found, version=__version__, codes=_codes(found))))
     else:

@@ -30,7 +30,8 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.files import write
-    from avow.base.rendering import printable, render, to_json
+    from avow.base.rendering import printable, render
+    from avow.base.rendering import told as shown
     from avow.language.format import format_text
     from avow.language.load import decode, read_source
     from avow.language.source import Source
@@ -71,7 +72,7 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
             if not as_json:
                 click.echo(f"formatted {printable(str(path))}")
     if as_json:
-        told = {"changed": changed, "written": not (check or diff), "faults": to_json(faults)["diagnostics"]}
+        told = {"changed": changed, "written": not (check or diff), "faults": shown(faults).diagnostics}
         click.echo(document(told))
     if faults:
         click.echo(render(faults), err=True)

@@ -12,6 +12,7 @@ from typing import Any
 from avow.assurance.codec import case_schema, evidence_schema
 from avow.base import codec
 from avow.base.files import write
+from avow.base.rendering import CheckDocument
 from avow.calculus.document import ComposeDocument
 from avow.sanity.document import SanityDocument
 
@@ -23,6 +24,7 @@ def schemas() -> dict[str, dict[str, Any]]:
     return {
         "case": case_schema(),
         "evidence": evidence_schema(),
+        "check": codec.published(CheckDocument, f"{_PLACE}check.schema.json", "avow check --json"),
         "compose": codec.published(ComposeDocument, f"{_PLACE}compose.schema.json", "avow compose --json"),
         "sanity": codec.published(SanityDocument, f"{_PLACE}sanity.schema.json", "avow sanity --json"),
     }

@@ -131,11 +131,11 @@ def _folder(node: str, system: System) -> str:
 
 
 def _data(notation: str, files: dict[str, str], left_out: list[Diagnostic], output: Path | None) -> str:
-    from avow.base.rendering import to_json
+    from avow.base.rendering import told
 
     listed = [{"name": name, "text": text} for name, text in files.items()]
     written = None if output is None else str(output)
-    whole = {"notation": notation, "files": listed, "written": written, "left_out": to_json(left_out)["diagnostics"]}
+    whole = {"notation": notation, "files": listed, "written": written, "left_out": told(left_out).diagnostics}
     return document(whole)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from avow.base.codec import document
+from avow.base.codec import Unreadable, document, from_text
+from avow.base.files import read_regular
 from avow.base.verdict import said
 from avow.pipeline.results import Result
 from avow.tuning.shown import GATE_REASON
@@ -132,15 +132,21 @@ def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from avow.pipeline.workload import Listing
+
     wanted = {name.partition(":")[2] for name in selected if name.startswith("obligations")} - {""}
     console = Console(file=out, highlight=False)
     for path in sorted(Path("artifacts").glob("*/obligations.json")):
         if wanted and path.parent.name not in wanted:
             continue
         table = Table("obligation", "claim", "settled by", box=None, header_style="bold", title=path.parent.name)
-        for o in json.loads(path.read_text())["obligations"]:
-            name = o["id"].partition("/")[2]
-            table.add_row(_plain(name), _plain(o["claim"]), _plain(", ".join(o["methods"]) or "no method"))
+        try:
+            listed = from_text(Listing, read_regular(path)).obligations
+        except (OSError, Unreadable) as error:
+            console.print(_plain(f"{path} cannot be read: {error}"))
+            continue
+        for o in listed:
+            table.add_row(_plain(o.id.partition("/")[2]), _plain(o.claim), _plain(", ".join(o.methods) or "no method"))
         console.print(table)
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any
 
 from avow import __version__
+from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, sha256, write
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
 from avow.base.workspace import Workspace
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Kind, Obligation
 from avow.pipeline.engine_code import reading_digest
 from avow.pipeline.export import whole_digest
 from avow.pipeline.work import Catalogue, Offered, Work, catalogue
@@ -67,6 +67,26 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
     return Survey(system, listed, sha256(json.dumps(texts)), shelf)
 
 
+@dataclass(frozen=True, slots=True)
+class ListedClaim:
+    """An obligation in obligations.json: `at` is its place, `methods` who settles it."""
+
+    id: str
+    kind: Kind
+    claim: str
+    formula: str
+    digest: str
+    clauses: tuple[str, ...]
+    at: str | None
+    methods: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    system: str
+    obligations: tuple[ListedClaim, ...]
+
+
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:
     """artifacts/<system>/obligations.json: every claim, with its formula and who settles it. `dry`: is it current?"""
     text = _listed(workspace, surveyed)
@@ -85,19 +105,10 @@ def _listed(workspace: Workspace, surveyed: Survey) -> str:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
     shown = functools.cache(lambda file: workspace.relative(Path(file)))
-    listed = [_obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
-    return json_text({"system": surveyed.system.name, "obligations": listed})
+    listed = tuple(_listed_claim(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations)
+    return json_text(to_json(Listing(surveyed.system.name, listed)))
 
 
-def _obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:
-    span = obligation.span
-    return {
-        "id": obligation.id,
-        "kind": obligation.kind.value,
-        "claim": obligation.claim,
-        "formula": obligation.formula,
-        "digest": obligation.digest,
-        "clauses": list(obligation.clauses),
-        "at": f"{shown(span.file)}:{span.line}:{span.column}" if span else None,
-        "methods": methods,
-    }
+def _listed_claim(shown: Callable[[str], str], o: Obligation, methods: Sequence[str]) -> ListedClaim:
+    at = f"{shown(o.span.file)}:{o.span.line}:{o.span.column}" if o.span else None
+    return ListedClaim(o.id, o.kind, o.claim, o.formula, o.digest, o.clauses, at, tuple(methods))

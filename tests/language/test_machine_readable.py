@@ -12,14 +12,15 @@ import jsonschema
 import pytest
 from sarif import loader
 
+from avow.base.codec import to_json
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.base.rendering import to_json, to_sarif
+from avow.base.rendering import to_sarif, told
 from avow.cli import main
 from avow.language.load import check_text
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = json.loads((ROOT / "avow" / "language" / "check.schema.json").read_text("utf-8"))
+SCHEMA = json.loads((ROOT / "docs" / "schemas" / "check.schema.json").read_text("utf-8"))
 SARIF = json.loads((ROOT / "tests" / "report" / "sarif.subset.schema.json").read_text("utf-8"))
 # What the report's logs do not have, as SARIF 2.1.0 defines it (3.49.9, 3.27.22).
 _RUN, _RESULT = SARIF["$defs"]["run"]["properties"], SARIF["$defs"]["result"]["properties"]
@@ -97,7 +98,7 @@ def test_sarif_tools_reads_every_severity_and_path(tmp_path: Path) -> None:
 
 def test_json_keeps_to_its_schema() -> None:
     for found in (wide(), [], list(check_text(BAD, "é %.rcl")[1])):
-        document = to_json(found)
+        document = to_json(told(found))
         jsonschema.validate(document, SCHEMA)
         assert len(json.loads(json.dumps(document))["diagnostics"]) == len(found)
     with pytest.raises(jsonschema.ValidationError):
