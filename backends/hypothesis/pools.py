@@ -7,11 +7,11 @@ import contextlib
 import itertools
 import math
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from types import CodeType
 
+from avow.backend_kit.programs.samples import worked_out
 from avow.base.alike import LOOK
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
@@ -130,11 +130,11 @@ def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
     texts: set[str] = set()
     try:
         tree = ast.parse(program)
-        worked_out = _worked_out(compile(tree, "", "exec", dont_inherit=True))
+        calculated = tuple(worked_out(compile(tree, "", "exec", dont_inherit=True)))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return frozenset(), frozenset()
     documentation = {id(part.value) for part in ast.walk(tree) if isinstance(part, ast.Expr)}
-    for part in (*ast.walk(tree), *map(ast.Constant, worked_out)):
+    for part in (*ast.walk(tree), *map(ast.Constant, calculated)):
         if (
             len(numbers) + len(texts) >= CONSTANTS_READ
             or id(part) in documentation
@@ -152,15 +152,6 @@ def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
             case str(text) if len(text) <= LONGEST_TEXT:
                 texts.add(text)
     return frozenset(numbers), frozenset(texts)
-
-
-def _worked_out(code: CodeType) -> Iterator[int | float]:
-    """The numbers in a program as it is compiled: ``2**31 - 1`` is a threshold as much as 2 is."""
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _worked_out(constant)
-        elif isinstance(constant, int | float):
-            yield constant
 
 
 def _neighbours(number: Fraction) -> Iterable[Fraction]:

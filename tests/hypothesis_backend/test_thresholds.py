@@ -8,6 +8,7 @@ import pytest
 from helpers import some
 from hoare.systems import make_job
 
+from avow.backend_kit.programs.samples import written
 from avow.backend_kit.protocol import Limits
 from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Verdict
@@ -69,3 +70,9 @@ def test_is_refuted(tmp_path: Path, formula: str, assume: str, subject: str) -> 
         (folder / name).write_text(text)
     (outcome,) = BACKEND.discharge(job, folder, Limits(seconds=60)).outcomes
     assert outcome.verdict is Verdict.REFUTED, outcome.summary
+
+
+def test_calculated_numbers_are_numbers_of_a_program() -> None:
+    """Also where classes with callbacks, and translations, are held against their sources."""
+    text = "LIM = 5\nclass A:\n    most = 2**10 + 1\ndef f(a=3 * 9):\n    return a > 7 * 6"
+    assert {5, 1025, 27, 42} <= {*written(text)}

@@ -9,6 +9,7 @@ import random
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
+from types import CodeType
 from typing import Any
 
 from avow.base.records import dataclass
@@ -54,10 +55,21 @@ def leaves(data: Any) -> list[Fraction]:
 
 
 def written(text: str) -> list[Fraction]:
-    """The numbers that a Python program writes down."""
-    values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
+    """The numbers that a Python program writes down, calculated ones among them."""
+    tree = ast.parse(text)
+    values = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+    values += worked_out(compile(tree, "", "exec", dont_inherit=True))
     numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
     return [Fraction(n) for n in numbers if isinstance(n, int) or math.isfinite(n)]
+
+
+def worked_out(code: CodeType) -> Iterator[int | float]:
+    """The numbers in a program as it is compiled: ``2**31 - 1`` is a threshold as much as 2 is."""
+    for held in code.co_consts:
+        if isinstance(held, CodeType):
+            yield from worked_out(held)
+        elif isinstance(held, int | float):
+            yield held
 
 
 def pool(numbers: Iterable[Fraction]) -> Pool:
