@@ -1,10 +1,14 @@
-"""The Dafny backend: the contract as a specification that a hand-written implementation refines, verified by Dafny."""
+"""The Dafny backend: the contract as a specification that a hand-written implementation refines, verified by Dafny.
+
+Imports stay light: whoever lists the backends does not load what writes and reads Dafny.
+"""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from avow.backend_kit.given import existing_file, file, file_path, schema, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
@@ -13,17 +17,17 @@ from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.plain import one_line
 from avow.base.verdict import Link, Outcome, Verdict
-from avow.isolation.outside import Outside
 from avow.language.contract import Clause, Node
 from avow.system.plan import System
 
 from .codes import CODES
-from .judge import Settled, settle
-from .modules import PROBE_FILE, Generated, generate, lines_map
-from .printer import NotExpressible
-from .runner import INSTALL, dafny
-from .scanner import Scan, scan
+from .dafny_tool import INSTALL, dafny
 from .tuning import PROGRAM_BYTES
+
+if TYPE_CHECKING:
+    from .judge import Settled
+    from .modules import Generated
+    from .scanner import Scan
 
 
 class DafnyBackend(Backend):
@@ -57,6 +61,8 @@ class DafnyBackend(Backend):
         return unsaid(self.name, node, clause)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from .printer import NotExpressible
+
         try:
             path, text = _implementation(job)
         except Rejected as error:
@@ -79,6 +85,9 @@ class DafnyBackend(Backend):
 
     def export(self, job: Job) -> Mapping[str, str]:
         """Types, contract, specification, the map from `ensures` to guarantees, and a skeleton to start from."""
+        from .modules import PROBE_FILE, lines_map
+        from .printer import NotExpressible
+
         try:
             generated = _generate(job)
         except NotExpressible as problem:
@@ -92,6 +101,9 @@ class DafnyBackend(Backend):
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """Types, contract, specification and skeleton, as `export` has them, of all the node's guarantees."""
+        from .modules import generate
+        from .printer import NotExpressible
+
         names = [clause.name for clause in node.guarantees if self.unsaid(node, clause) is None]
         try:
             generated = generate(node, names)
@@ -107,6 +119,11 @@ class DafnyBackend(Backend):
         return Translated({**_specification(generated), generated.impl_file: generated.skeleton}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from avow.isolation.outside import Outside
+
+        from .judge import settle
+        from .printer import NotExpressible
+
         tool = dafny()
         version = tool.version or ""
 
@@ -176,10 +193,14 @@ def _shown(folder: Path) -> str:
 
 
 def _generate(job: Job) -> Generated:
+    from .modules import generate
+
     return generate(job.node, [o.name for o in job.obligations] or job.method.guarantees)
 
 
 def _scan(text: str, generated: Generated) -> Scan:
+    from .scanner import scan
+
     return scan(text, generated.spec_module, generated.impl_module, tuple(_specification(generated)), generated.lemmas)
 
 

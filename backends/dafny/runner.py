@@ -10,37 +10,22 @@ import re
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from avow.backend_kit.protocol import Limits, Tool
+from avow.backend_kit.protocol import Limits
 from avow.base.files import text_or_nothing
 from avow.base.records import dataclass
-from avow.base.tools import find_tool
 from avow.isolation.outside import Outside
 
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members
+from .dafny_tool import dafny
 from .tuning import MODEL_CHARACTERS
 
-INSTALL = "apt-get install dafny"
-
-_MONO = ("/usr/lib/mono", "/etc/mono")
 _ANSWER = "answer.xml"
 _RESOLVED = "resolved.txt"
 _MODEL = "model.txt"
 _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
-
-
-def dafny() -> Tool:
-    """Dafny as found now. Never raises."""
-    # Any run prints its version in the XML only; without a file it says it in a usage line.
-    found = find_tool("dafny", ("/version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
-    if found.version == "unknown":
-        found = find_tool("dafny", ("--version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
-    # Its prover; what runs it, from version 4 on, and before.
-    parts = (shutil.which("z3"), shutil.which("dotnet"), *(place for place in _MONO if os.path.isdir(place)))  # noqa: PTH112
-    return replace(found, parts=tuple(part for part in parts if part is not None))
 
 
 def has_commands(version: str | None) -> bool:

@@ -46,7 +46,7 @@ class FuzzBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        from .building import clang
+        from .clang_tool import clang
 
         return (clang(),)
 

@@ -8,16 +8,16 @@ from pathlib import Path
 
 from avow.base.process import Completed, ToolMissing
 from avow.base.records import dataclass
-from avow.base.tools import Tool, find_tool
+from avow.base.tools import Tool
 from avow.isolation.observed import Observed, folded, recorded
 from avow.isolation.outside import Outside
 
+from .clang_tool import clang
 from .reading import Reading
 from .tables import TABLES, Drawable, native, tables
 from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
 from .unseen import WATCHED, Line, Unseen, own, unseen
 
-_INSTALL = "sudo apt install clang"
 _INSTALL_RUN_TIME = "sudo apt install --install-recommends clang; a package of its own, libclang-rt-*-dev, has them"
 _RUN_TIME = re.compile(r"cannot find \S*libclang_rt\.")
 """What the linker says where clang was installed without them."""
@@ -60,10 +60,6 @@ class Built:
     read: tuple[Path, ...]
     linked: str = ""
     """What the linker said of the functions that are watched."""
-
-
-def clang() -> Tool:
-    return find_tool("clang++", install=_INSTALL, optional=False)
 
 
 def write(reading: Reading, made: Drawable, folder: Path) -> None:
@@ -118,7 +114,7 @@ def _preprocessed(
 def _there() -> Tool:
     tool = clang()
     if tool.path is None:
-        raise ToolMissing(f"clang++ is not here ({_INSTALL})")
+        raise ToolMissing(f"clang++ is not here ({tool.install})")
     return tool
 
 

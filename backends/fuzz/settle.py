@@ -31,6 +31,7 @@ from avow.isolation.outside import Outside
 
 from . import building
 from .building import NotBuilt
+from .clang_tool import clang
 from .drawn import Drawn, Step, command
 from .reading import Reading, load
 from .runner import Answered, Campaign, Campaigned, Question, Run, Runs, Show, Shown
@@ -45,7 +46,7 @@ TOOL = "libfuzzer"
 
 def settle(job: Job, limits: Limits) -> Report:
     """One outcome for each obligation and claim."""
-    tool = building.clang()
+    tool = clang()
     version = f"clang {tool.version}"
     if not job.every:
         return Report((), TOOL, version)
@@ -97,7 +98,7 @@ class Work:
 
     def __post_init__(self) -> None:
         self._end = time.monotonic() + self.limits.seconds * 0.9
-        self._outside = Outside((building.clang(),))
+        self._outside = Outside((clang(),))
 
     @property
     def job(self) -> Job:

@@ -11,7 +11,7 @@ from hoare.systems import make_job
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
-from avow.backends.dafny.runner import dafny
+from avow.backends.dafny.dafny_tool import dafny
 from avow.base.verdict import Outcome, Verdict
 
 needs_dafny = pytest.mark.skipif(not dafny().present, reason="dafny is not on this machine")

@@ -13,10 +13,11 @@ import pytest
 
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
+from avow.backends.dafny.dafny_tool import dafny
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.names import RESERVED, Names, identifier
 from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
-from avow.backends.dafny.runner import dafny, verify
+from avow.backends.dafny.runner import verify
 from avow.base.verdict import Verdict
 from avow.isolation.outside import Outside
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from helpers import some
 
-from avow.backends.fuzz.building import clang
+from avow.backends.fuzz.clang_tool import clang
 from avow.backends.fuzz.drawn import Drawn, command
 from avow.backends.fuzz.reading import load
 from avow.backends.fuzz.tables import drawable

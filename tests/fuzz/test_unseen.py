@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from helpers import some
 
-from avow.backends.fuzz.building import clang
+from avow.backends.fuzz.clang_tool import clang
 from avow.backends.fuzz.unseen import CATCHING, UNDECLARED, Line, own, unseen
 from avow.base.verdict import Verdict
 from avow.isolation.tracing import traces
