@@ -21,6 +21,7 @@ import time
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -120,7 +121,6 @@ class Cluster:
         address.greet()
         _unpickle_nothing()
         _say_nothing()
-        _open.add(self)
         try:
             self._client = Client(
                 address.url,
@@ -131,7 +131,6 @@ class Cluster:
                 name="avow",
             )
         except (OSError, TimeoutError, ValueError) as error:
-            _open.discard(self)
             raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
         for topic in ("print", "warn"):  # else a worker writes on our terminal, and into our answer
             self._client.unsubscribe_topic(topic)
@@ -207,7 +206,6 @@ class Cluster:
         self._came.put(None)
         with contextlib.suppress(Exception):  # as above; also what its reader failed of
             self._client.close(timeout=5)
-        _open.discard(self)
 
     # -- inside ------------------------------------------------------------------------------------------
 
@@ -288,13 +286,11 @@ def not_installed() -> Rejected:
 
 # -- what comes from a cluster is data -----------------------------------------------------------------------------
 
-_open: set[Cluster] = set()
-
 
 def _unpickle_nothing() -> None:
     """Answers are bytes, but Dask also unpickles errors, warnings and parts of its own messages, which a worker can
-    make, and a pickle can run anything. While a cluster is open, this process finds nothing for one to run: only the
-    name of the type of bytes, which Dask writes so."""
+    make, and a pickle can run anything. In this process Dask finds nothing for one to run: only the name of the type
+    of bytes, which it writes so."""
     if not _guarded:
         sys.addaudithook(_refuse)  # it cannot be taken away again
         _guarded.append(True)
@@ -304,8 +300,12 @@ _guarded: list[bool] = []
 
 
 def _refuse(event: str, arguments: tuple[object, ...]) -> None:
-    if event == "pickle.find_class" and _open and arguments != ("builtins", "bytes"):
-        raise TypeError("what comes from a cluster is not unpickled")
+    if event == "pickle.find_class" and arguments != ("builtins", "bytes"):
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None:
+            if str(frame.f_globals.get("__name__")).partition(".")[0] == "distributed":
+                raise TypeError("what comes from a cluster is not unpickled")
+            frame = frame.f_back
 
 
 def _say_nothing() -> None:

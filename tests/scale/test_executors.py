@@ -404,6 +404,35 @@ def _command(pid: str) -> bytes:
 
 
 @pytest.mark.slow
+def test_verify_on_a_cluster_says_what_verify_says(place: Workspace, machines: Machines, tmp_path: Path) -> None:
+    """The command itself, anew and after an edit: then it reads what it kept of the nodes' texts."""
+    from avow.pipeline.cluster import Address, Cluster
+
+    avow = str(Path(sys.executable).with_name("avow"))
+    machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+    until(cluster.offers)
+    cluster.close()
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    contract = place.contracts / "made" / "system.rcl"
+
+    def said(*options: str) -> tuple[int, list[tuple[str, str]], str]:
+        done = subprocess.run(
+            [avow, "verify", *options], cwd=place.root, env=environment, capture_output=True, text=True, check=False
+        )
+        assert "Traceback" not in done.stderr + done.stdout, done.stderr
+        case = json.loads((place.root / "reports/made/report.json").read_text())
+        found = [(o["obligation"]["node"] + o["obligation"]["name"], o["standing"]) for o in case["obligations"]]
+        return done.returncode, sorted(found), done.stdout
+
+    said("--on", machines.url)
+    contract.write_text(contract.read_text().replace("in.x1 >= -1000", "in.x1 >= -900"))
+    code, there, text = said("--on", machines.url)
+    assert "discharge" in text
+    assert said()[:2] == (code, there)
+
+
+@pytest.mark.slow
 def test_what_a_worker_pickles_is_not_read(
     machines: Machines, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
