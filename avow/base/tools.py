@@ -86,6 +86,16 @@ def package_digest(name: str) -> str:
     return kept_digest(f"package-{name}-{sha256(str(place))[:12]}", {str(f.relative_to(place)): f for f in files})
 
 
+LIBRARIES = ("z3", "cvc5", "lark", "yaml")
+"""Packages by which any answer may come about: solvers, of which the second need not be there, and readers of texts."""
+
+
+@functools.cache
+def libraries() -> str:
+    """Those of this machine, each by digest: part of every key. Nothing is imported."""
+    return ", ".join(f"{name} {package_digest(name) or 'missing'}" for name in LIBRARIES)
+
+
 def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:
     key = json.dumps([str(Path(path).resolve()), program_digest((path,)), arguments, pattern])
     known = _read()

@@ -268,6 +268,12 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
             told("list", at(arguments[0] if arguments[0] is not None else ".", None))
         elif event == "import":
             told("read", arguments[1])
+            if arguments[0] in _READING or _is_extension(arguments[1]):
+                told("program", f"the module {arguments[0]}")
+        elif event == "cpython.PyInterpreterState_New":
+            told("outside", "another interpreter")  # which no hook looks into
+        elif event == "sqlite3.load_extension":
+            told("outside", "an extension of SQLite")
         elif event == "ctypes.dlopen" and arguments[0] is not None:  # of None: `import ctypes` itself
             told("outside", f"the library {arguments[0]}")
         elif event.startswith("ctypes.dlsym"):
@@ -300,7 +306,10 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
 
     looking: list[str] = []  # what it looks at itself to answer that is nothing that the subject asks for
     senses = _beside("senses.py")
+    machine_code = _beside("machine_code.py")
     drawn = senses.watch_all(told)
+    machine_code.watch_modules(told, senses.asked)
+    machine_code.watch_sqlite(told)
     sys.addaudithook(hook)
     return seen, drawn
 
@@ -311,6 +320,22 @@ _AROUND = frozenset(
 )
 """Events by which a subject may find out that it is run by a judge and not by what it is made for."""
 _LEADING = ("tb_frame", "__code__")
+
+_READING = frozenset(
+    {"_ssl", "_dbm", "_gdbm", "_curses", "_posixshmem", "_tkinter", "nis", "ossaudiodev", "readline", "spwd", "syslog"}
+)
+"""Modules of Python's own in C that open files by themselves: a trace of system calls tells which."""
+_STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
+
+
+def _is_extension(file: Any) -> bool:
+    """Whether a module is of machine code, and not Python's own."""
+    return (
+        isinstance(file, str)
+        and file.endswith(tuple(importlib.machinery.EXTENSION_SUFFIXES))
+        and (not file.startswith(_STDLIB) or "-packages" in file)
+    )
+
 
 _HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
 

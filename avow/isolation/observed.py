@@ -181,8 +181,11 @@ def _kind(event: str, path: str) -> Seen | None:
         return Seen(event)
     if _of_python(path):
         return None
-    if f"{path}/".startswith(("/proc/", "/sys/")):
-        return None if event in ("state", "kind") else Seen.OUTSIDE
+    looked = event in ("state", "kind", "link")
+    if f"{path}/".startswith("/proc/"):  # processes come and go
+        return None if looked and (path == "/proc" or f"{path}/".startswith(_OF_EVERY_PROCESS)) else Seen.OUTSIDE
+    if f"{path}/".startswith("/sys/") and not looked:
+        return Seen.OUTSIDE
     try:
         mode = os.stat(path).st_mode  # noqa: PTH116
     except (OSError, ValueError):
@@ -198,6 +201,7 @@ def _kind(event: str, path: str) -> Seen | None:
     return None if path in _EMPTY else Seen.OUTSIDE
 
 
+_OF_EVERY_PROCESS = ("/proc/self/", "/proc/thread-self/")
 _EMPTY = ("/dev/null", "/dev/zero", "/dev/full")
 
 _PYTHON = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")))

@@ -7,7 +7,9 @@ as nobody's.
 
 from __future__ import annotations
 
+import _datetime  # type: ignore[import-not-found]
 import _posixsubprocess
+import _random
 import datetime
 import functools
 import grp
@@ -18,7 +20,6 @@ import posix
 import pwd
 import random
 import resource
-import sqlite3
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -33,7 +34,10 @@ _CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time")
 _NOW = {"localtime": 0, "gmtime": 0, "ctime": 0, "asctime": 0, "strftime": 1}
 """Functions of `time` that take now where they are given no more than so many arguments."""
 
-_HOST = (__file__, os.path.join(os.path.dirname(__file__), "host.py"))  # noqa: PTH118, PTH120
+_HOST = tuple(
+    os.path.join(os.path.dirname(__file__), name)  # noqa: PTH118, PTH120
+    for name in ("host.py", "senses.py", "machine_code.py")
+)
 _INSTALLED = tuple(place + os.sep for place in sys.path if place.endswith("-packages"))
 _IMPORT = ("<frozen importlib", "<frozen zipimport")
 _STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
@@ -50,7 +54,7 @@ _OWN_USE += ("socket.py", "concurrent/", "multiprocessing/", "warnings.py", "uni
 """Parts of the library that look at the clock, or draw names, for their own business."""
 
 
-def _asked(*, importing: bool = True) -> bool:
+def asked(*, importing: bool = True) -> bool:
     """Whether it is the subject that asks for a clock or a random number: no module that is just imported, and not the
     library for its own business. `importing`: an installed package that is just imported counts as the subject."""
     frame: Any = sys._getframe(2)
@@ -68,6 +72,11 @@ def _asked(*, importing: bool = True) -> bool:
             return True
         frame = frame.f_back
     return False
+
+
+def _from(depth: int, part: str) -> bool:
+    """Whether it is called from that part of the library."""
+    return sys._getframe(depth).f_code.co_filename.startswith(_STDLIB + part)
 
 
 def looks_around(event: str) -> bool:
@@ -92,7 +101,7 @@ def _watch_chance(told: Told) -> Callable[[], None]:
 
     def outer(inner: Callable[..., Any], what: str, most: int | None = None) -> Callable[..., Any]:
         def call(*arguments: Any, **named: Any) -> Any:
-            if (most is None or len([a for a in arguments if a is not None]) <= most) and _asked():
+            if (most is None or len([a for a in arguments if a is not None]) <= most) and asked():
                 told("outside", what)
             return inner(*arguments, **named)
 
@@ -110,6 +119,14 @@ def _watch_chance(told: Told) -> Callable[[], None]:
     for module, names in ((os, ("urandom", "getrandom")), (posix, ("urandom", "getrandom")), (random, ("_urandom",))):
         for name in names:
             setattr(module, name, outer(getattr(module, name), chance))
+
+    class Unseeded(_random.Random):
+        def __new__(cls, *arguments: Any) -> Any:
+            if (not arguments or arguments[0] is None) and asked():
+                told("outside", chance)
+            return super().__new__(cls, *arguments)
+
+    _random.Random = Unseeded  # type: ignore[misc]
     seed, set_state = random.Random.seed, random.Random.setstate
     shared = random._inst
     started: list[Any] = [random.Random.getstate(shared)]
@@ -119,7 +136,7 @@ def _watch_chance(told: Told) -> Callable[[], None]:
             told("outside", chance)
 
     def seeded(own: random.Random, a: Any = None, version: int = 2) -> None:
-        if a is None and _asked():
+        if a is None and asked():
             told("outside", chance)
         if own is shared and a is not None:
             drawn()
@@ -154,25 +171,29 @@ def _watch_dates(told: Callable[[], None]) -> None:
 
         @classmethod
         def now(cls, tz: Any = None) -> Any:
-            if _asked():
+            if asked():
                 told()
             return super().now(tz)
 
         @classmethod
         def utcnow(cls) -> Any:
-            if _asked():
+            if asked():
                 told()
             return super().utcnow()
 
     Watched.__name__, Watched.__qualname__, Watched.__module__ = "datetime", "datetime", "datetime"
-    datetime.datetime = Watched  # type: ignore[misc]
+    datetime.datetime = _datetime.datetime = Watched  # type: ignore[misc]
 
 
 # -- the running system --------------------------------------------------------------------------------------------
 
 _SYSTEM: tuple[tuple[Any, str, str], ...] = (
-    (os, "the clock", "times getloadavg"),
-    (os, "the machine", "uname cpu_count sched_getaffinity sysconf confstr pathconf fpathconf get_terminal_size"),
+    (os, "the clock", "times getloadavg wait3 wait4"),
+    (
+        os,
+        "the machine",
+        "uname cpu_count process_cpu_count sched_getaffinity sysconf confstr pathconf fpathconf get_terminal_size",
+    ),
     (os, "the state of a disk", "statvfs fstatvfs"),
     (os, "the numbers of a process", "getpid getppid getpgid getpgrp getsid getpriority nice umask"),
     (os, "the numbers of a process", "sched_getscheduler sched_getparam sched_rr_get_interval"),
@@ -198,7 +219,8 @@ def _watch_system(told: Told) -> None:
         library = _STDLIB + _THROUGH.get(name, " ")
 
         def call(*arguments: Any, **named: Any) -> Any:
-            if sys._getframe(1).f_code.co_filename != library and _asked(importing=False):
+            handed_on = name == "cpu_count" and _from(2, "multiprocessing/")
+            if sys._getframe(1).f_code.co_filename != library and (handed_on or asked(importing=False)):
                 told("outside", what)
             return inner(*arguments, **named)
 
@@ -213,31 +235,12 @@ def _watch_system(told: Told) -> None:
                         setattr(place, name, wrapped)
 
     def created(record: Any) -> Any:
-        if _asked():
+        if asked():
             told("outside", "the clock")
         return record.__dict__["created"]
 
     kept = property(created, lambda record, value: record.__dict__.update(created=value))
     setattr(logging.LogRecord, "created", kept)  # noqa: B010 - an attribute of the type's instances
-    connect = sqlite3.connect
-
-    def allowed(action: int, _: Any, name: Any, *more: Any) -> int:
-        if action == sqlite3.SQLITE_FUNCTION and str(name).lower() in _SQLITE:
-            told("outside", "the clock" if "random" not in str(name) else "random numbers")
-        return sqlite3.SQLITE_OK
-
-    def connected(*arguments: Any, **named: Any) -> Any:
-        connection = connect(*arguments, **named)
-        connection.set_authorizer(allowed)
-        return connection
-
-    sqlite3.connect = sqlite3.dbapi2.connect = functools.wraps(connect)(connected)
-
-
-_SQLITE = frozenset(
-    {"date", "time", "datetime", "julianday", "unixepoch", "strftime", "timediff", "current_date", "current_time"}
-    | {"current_timestamp", "random", "randomblob"}
-)
 
 
 # -- the state of files ----------------------------------------------------------------------------------------------
@@ -264,7 +267,7 @@ class _State:
                     self._told("state", self._path)
             case "st_ino" | "st_dev" if caller.startswith(_OF_KIND):
                 pass  # whether two names are of one file
-            case _ if _asked(importing=False) and not caller.startswith(
+            case _ if asked(importing=False) and not caller.startswith(
                 (_STDLIB + "linecache.py", _STDLIB + "shutil.py")
             ):
                 self._told("outside", "the clock" if "time" in name else "a file's place on its disk")
@@ -374,7 +377,7 @@ def _watch_state(told: Told) -> None:
         return open_(os.path.join(os.fsencode(folder), os.fsencode(path)), flags, mode)  # noqa: PTH118
 
     def mine(named: dict[str, Any]) -> bool:
-        if named.get("dir_fd") is not None and _asked():
+        if named.get("dir_fd") is not None and asked():
             told("outside", "a file by its folder's descriptor")
         return not sys._getframe(2).f_code.co_filename.startswith(_IMPORT)
 
@@ -430,7 +433,7 @@ class _Variables(dict[bytes, bytes]):
 
     def _read(self, *names: Any) -> None:
         for name in names:
-            if name in (b"PATH", b"PYTHONPATH") and _asked(importing=False):
+            if name in (b"PATH", b"PYTHONPATH") and asked(importing=False):
                 self.told("variable", name.decode())
 
     def __getitem__(self, name: bytes) -> bytes:
@@ -460,14 +463,14 @@ def _watch_place(told: Told) -> None:
     for name in ("getcwd", "getcwdb"):
         inner = getattr(os, name)
 
-        def asked(inner: Callable[[], Any] = inner) -> Any:
+        def where(inner: Callable[[], Any] = inner) -> Any:
             here = inner()
-            if _asked(importing=False):
+            if asked(importing=False):
                 told("place", here)
             return here
 
         for module in (os, posix):
-            setattr(module, name, functools.wraps(inner)(asked))
+            setattr(module, name, functools.wraps(inner)(where))
 
 
 def watch_all(told: Told) -> Callable[[], None]:

@@ -19,9 +19,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.isolation.symbols import asks
+
 _SIGNALS = frozenset({"kill", "tkill", "pidfd_send_signal", "rt_sigqueueinfo"})
 _PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
 _NETWORK = frozenset({"socket", "connect"})
+_MACHINE_CALLS = frozenset({"uname", "sysinfo"})
+"""What a program asks of the machine by a call. The clock is read without one (`symbols`)."""
 _OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
 _LOOKS = frozenset(
     {"stat", "lstat", "newfstatat", "statx", "access", "faccessat", "faccessat2", "readlink", "readlinkat"}
@@ -86,7 +90,7 @@ def remedy() -> str:
 
 
 def _strace(place: str) -> list[str]:
-    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE)])
+    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE | _MACHINE_CALLS)])
     program = shutil.which("strace") or "strace"
     return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
@@ -165,6 +169,8 @@ def _names(line: bytes, program: str) -> bool:
     return found is not None and found[3] is not None and _text(found[3]) == program
 
 
+_FAILED = b")"
+"""How the line of a call ends that failed: ``= -1 ENOENT (No such file or directory)``."""
 _CONNECTED = (b"= 0", b"(Operation now in progress)")
 _OF_THE_MACHINE = ("/proc/", "/sys/", "/dev/", "/etc/ld.so.cache/", "/etc/ld.so.preload/")
 
@@ -220,6 +226,8 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
     host: int | None = None
     ended = False
     running: set[int] = set()
+    started: dict[str, None] = {}
+    """What started programs are made of, among what they read."""
     ours: set[int] = set()
     """Processes of the sandbox itself: they were there before the subject."""
     for process, line in lines:
@@ -251,6 +259,9 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
         elif call in _NETWORK:
             if (call == "socket" and b"AF_UNIX" not in line) or (call == "connect" and rest.rstrip().endswith(b"= 0")):
                 events["outside", "the network"] = None
+        elif call in _MACHINE_CALLS:
+            if process != host:  # the host's own: `senses`
+                events["outside", "the machine"] = None
         elif call in _BOTH:
             for path in _both(call, line, places.get(process, folder)):
                 if path != scratch and not path.startswith(scratch + os.sep):
@@ -272,9 +283,12 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
             elif text and not f"{path}/".startswith(_MACHINE):
                 if call in _OPENS:
                     events["read", path] = None
+                    if process != host and not rest.rstrip().endswith(_FAILED):
+                        started[path] = None
                 elif call in _LOOKS and process != host:  # the host's own: the audit hook
                     events["state", path] = None
-    return Traced((*events, *_interpreters(events)), tuple(faults)) if ended else None
+    asked = (("outside", f"{what} ({os.path.basename(path)})") for path in started for what in asks(path))  # noqa: PTH119
+    return Traced((*events, *_interpreters(events), *asked), tuple(faults)) if ended else None
 
 
 def _interpreters(events: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:

@@ -25,7 +25,7 @@ from avow.base.files import identity
 from avow.base.notes import read_note, write_note
 from avow.base.programs import program_files
 from avow.base.records import dataclass
-from avow.base.tools import package_digest
+from avow.base.tools import LIBRARIES, package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, look, marks
@@ -38,7 +38,7 @@ _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in pack
 """Avow's own code, wherever it is installed."""
 _OURS = (".doit.json", ".lock", ".settled.json")
 """Among the artifacts: doit's own memory and our locks, which change with every run."""
-_PACKAGES = ("z3", "cvc5", "hypothesis")
+_PACKAGES = (*LIBRARIES, "hypothesis", "rosbags")
 """Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
 
 

@@ -21,7 +21,7 @@ from avow.base.files import digest_or_missing, sha256
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
-from avow.base.tools import package_digest, package_version
+from avow.base.tools import libraries, package_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
 from avow.formulas.finite import Ranges
 from avow.formulas.formula import digest, node_digest, sort_digest
@@ -178,6 +178,7 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
         tool.name,
         tool.version,
         backend_digest(tool),
+        libraries(),
         json.dumps(tools),
         told,
         _files(files),
@@ -414,6 +415,5 @@ def _scenario(system: System) -> str:
 
 @functools.cache
 def engine_identity() -> str:
-    """The core's engines with their solver, in every key of theirs."""
-    # importing z3 to ask it would cost more than all the rest of a run with nothing to do
-    return f"avow {engine_digest()}, z3 {package_version('z3-solver')} {package_digest('z3')}"
+    """The core's engines with their solvers, in every key of theirs."""
+    return f"avow {engine_digest()}, {libraries()}"

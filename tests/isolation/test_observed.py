@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import py_compile
 import shutil
 import subprocess
@@ -13,6 +14,9 @@ from helpers import some
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
+from avow.isolation import observed as observed_module
+from avow.isolation import subject as subject_module
+from avow.isolation import tracing
 from avow.isolation.level import SANDBOX, seals
 from avow.isolation.observed import Seen, look
 from avow.isolation.subject import SubjectProcess
@@ -297,8 +301,62 @@ UNRECORDABLE = {
             "resource.getrusage(0)",
         )
     },
+    "another interpreter": "import _xxsubinterpreters as i\n"
+    "i.run_string(i.create(), 'import time; time.time()')\ntop = 10\n",
+    "the hour, from C": "import _datetime\n_datetime.datetime.now()\ntop = 10\n",
+    "chance, from C": "import _random\n_random.Random().random()\ntop = 10\n",
+    "chance of OpenSSL": "import ssl\nssl.RAND_bytes(1)\ntop = 10\n",
+    "SQLite's clock by its class": "import sqlite3\n"
+    "sqlite3.Connection(':memory:').execute(\"select datetime('now')\")\ntop = 10\n",
+    "another process": "import os\nos.path.exists('/proc/1')\ntop = 10\n",
+    "a clock that rings": "import signal\nsignal.getitimer(signal.ITIMER_REAL)\ntop = 10\n",
+    "a profile": "import cProfile\ntop = 10\n",
+    "names of the network": "import socket\nsocket.if_nameindex()\ntop = 10\n",
+    "processors by way of the library": "import multiprocessing\nmultiprocessing.cpu_count()\ntop = 10\n",
+    "the number of a thread": "import threading\nthreading.get_native_id()\ntop = 10\n",
     "a pipe": "import os\nos.close(os.open('pipe', os.O_RDONLY | os.O_NONBLOCK))\ntop = 10\n",
 }
+
+
+BY_PROGRAMS = {"the clock": ["date"], "the machine": ["hostname"]}
+
+
+@pytest.mark.skipif(not traces(), reason="strace does not run here")
+@pytest.mark.parametrize("name", BY_PROGRAMS)
+def test_what_a_started_program_asks_is_told(tmp_path: Path, name: str) -> None:
+    """The clock, which it reads without asking the kernel, and what it asks the kernel."""
+    (command,) = BY_PROGRAMS[name]
+    if shutil.which(command) is None:
+        pytest.skip(f"{command} is not here")
+    text = f"import subprocess\nsubprocess.run([{command!r}], stdout=-3)\ntop = 10\n"
+    assert any(name in what for what in outside(tmp_path, text))
+    assert not outside(tmp_path, "import subprocess\nsubprocess.run(['cat', '/dev/null'])\ntop = 10\n")
+
+
+BY_THE_C_LIBRARY = {
+    "locales": "import locale\nlocale.setlocale(locale.LC_ALL, 'C')\ntop = 10\n",
+    "time zones": "import time\ntime.tzset()\ntop = 10\n",
+    "certificates": "import ssl\ntop = 10\n",
+    "another file of SQLite": "import sqlite3\nopen('o', 'rb').close()\n"
+    "sqlite3.connect(':memory:').execute(\"attach 'file:o?mode=ro' as o\")\ntop = 10\n",
+    "an extension module": "import _cffi_backend\ntop = 10\n",
+    "passwords": "import spwd\ntop = 10\n",
+}
+
+
+@pytest.mark.parametrize("name", some(BY_THE_C_LIBRARY, 2))
+def test_what_machine_code_reads_is_told_by_a_trace_or_undeclared(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "o").write_bytes(b"")
+    text = BY_THE_C_LIBRARY[name]
+    if "_cffi_backend" in text and importlib.util.find_spec("_cffi_backend") is None:
+        pytest.skip("there is no extension module here")
+    if traces():
+        assert not outside(tmp_path, text)
+    for module in (subject_module, observed_module, tracing):
+        monkeypatch.setattr(module, "traces", lambda: False)
+    assert [what for what in outside(tmp_path, text) if tracing.remedy() in what]
 
 
 @pytest.mark.parametrize("name", some(UNRECORDABLE, 4))
