@@ -29,6 +29,7 @@ def test_an_output_is_determined_through_another() -> None:
     assert verdict(CHAIN.format("out.x == in.a"), "determined-y") is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_and_is_not_where_the_other_is_not() -> None:
     assert verdict(CHAIN.format("out.x >= in.a"), "determined-y") is Verdict.REFUTED
 

@@ -88,6 +88,7 @@ def test_scripts_with_sequences_say_how_cvc5_reads_them() -> None:
     assert "strings-exp" not in formulas_script([say("in.r < 3")])
 
 
+@pytest.mark.slow
 def test_a_cvc5_that_does_not_keep_its_time_limit_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """On some scripts it does not look at its clock; nothing but the end of its process ends it."""
     pytest.importorskip("cvc5")

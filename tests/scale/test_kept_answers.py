@@ -86,6 +86,7 @@ def test_what_does_not_hold_is_asked_again_and_never_kept(tmp_path: Path) -> Non
 OPEN = chain(9).replace("in.x2 >= 0", "in.x2 >= 1").replace("in.x5 >= 0", "in.x5 >= 1")
 
 
+@pytest.mark.slow
 def test_what_is_not_asked_for_is_not_asked_again_because_it_does_not_hold(tmp_path: Path) -> None:
     first = KeptAnswers()
     before = settle(tmp_path, OPEN, first)
