@@ -76,14 +76,9 @@ class Bench:
         self.output_sorts: dict[str, Sort] = {p.name: wire.decode(p.sort) for p in asked.outputs}
         records = Records()
         self.formulas = [wire.decode(c.formula) for c in (*asked.assumptions, *asked.guarantees)]
-        assumed, promised = self.formulas[: len(asked.assumptions)], self.formulas[len(asked.assumptions) :]
-        self.assumptions = tuple(
-            judged(c.name, formula, c.text, records) for c, formula in zip(asked.assumptions, assumed, strict=True)
-        )
-        self.guarantees = {
-            c.name: guarantee(c.name, formula, c.text, records)
-            for c, formula in zip(asked.guarantees, promised, strict=True)
-        }
+        formulas = iter(self.formulas)
+        self.assumptions = tuple(judged(c.name, next(formulas), c.text, records) for c in asked.assumptions)
+        self.guarantees = {c.name: guarantee(c.name, next(formulas), c.text, records) for c in asked.guarantees}
         self.keeper = Keeper(records.cells)
         self.remembers = bool(records.cells)
         root = system_root(asked, folder)

@@ -7,8 +7,8 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from avow.base.codec import once
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 from .bags import NOWHERE, Event, Origin, is_bag, messages
@@ -25,17 +25,7 @@ class Recorded:
     event: Event
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object each of whose keys stands once: readers of JSON differ in which value of a repeated one they take."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        keys = [key for key, _ in pairs]
-        double = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {json.dumps(double[:60])} stands twice in one object")
-    return found
-
-
-_DECODER = json.JSONDecoder(parse_float=Decimal, object_pairs_hook=_once)
+_DECODER = json.JSONDecoder(parse_float=Decimal, object_pairs_hook=once)
 
 
 def parse_event(text: str) -> Event:

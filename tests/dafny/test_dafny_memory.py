@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hoare.systems import make_job
+from hoare.systems import gate, make_job
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits
@@ -16,17 +16,7 @@ from avow.base.verdict import Outcome, Verdict
 
 needs_dafny = pytest.mark.skipif(not dafny().present, reason="dafny is not on this machine")
 
-GATE = """node gate {
-  inputs( request : BOOL, reading : REAL )
-  outputs( open : BOOL, alarm : BOOL, n : NATURAL )
-  topics()
-  assume smooth ( abs(reading - previous(reading, reading)) <= 2 )
-  guarantee still ( open and request -> open until not request )
-  guarantee alarm ( alarm <=> held[2 steps](reading > 10) )
-  guarantee count ( n == counted(reading > 10 since reading <= 10) )
-  guarantee soon ( request -> within[200 ms](open) )
-}
-"""
+GATE = gate("guarantee soon ( request -> within[200 ms](open) )")
 
 IMPLEMENTATION = """
 include "gate_spec.dfy"

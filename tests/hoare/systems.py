@@ -48,3 +48,18 @@ node sensor {{
 def sensor(orange: int = 120, red: int = 250) -> str:
     """A contract with thresholds."""
     return SENSOR.format(orange=orange, red=red)
+
+
+def gate(guarantee: str) -> str:
+    """A node that remembers: guarantees of each kind, and one more."""
+    return f"""node gate {{
+  inputs( request : BOOL, reading : REAL )
+  outputs( open : BOOL, alarm : BOOL, n : NATURAL )
+  topics()
+  assume smooth ( abs(reading - previous(reading, reading)) <= 2 )
+  guarantee still ( open and request -> open until not request )
+  guarantee alarm ( alarm <=> held[2 steps](reading > 10) )
+  guarantee count ( n == counted(reading > 10 since reading <= 10) )
+  {guarantee}
+}}
+"""

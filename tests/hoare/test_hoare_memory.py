@@ -21,19 +21,9 @@ from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
 from avow.language.terms import Literal
 
-from .systems import make_job
+from .systems import gate, make_job
 
-GATE = """node gate {
-  inputs( request : BOOL, reading : REAL )
-  outputs( open : BOOL, alarm : BOOL, n : NATURAL )
-  topics()
-  assume smooth ( abs(reading - previous(reading, reading)) <= 2 )
-  guarantee still ( open and request -> open until not request )
-  guarantee alarm ( alarm <=> held[2 steps](reading > 10) )
-  guarantee count ( n == counted(reading > 10 since reading <= 10) )
-  guarantee later ( fell(request) -> next(not open) )
-}
-"""
+GATE = gate("guarantee later ( fell(request) -> next(not open) )")
 
 PROGRAM = """MEMORY high : NATURAL := 0;
 MEMORY waiting : NATURAL := 0;

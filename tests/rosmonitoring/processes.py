@@ -15,6 +15,17 @@ from typing import Any
 LONGEST = 150.0
 """Seconds after which something has gone wrong."""
 
+RCL = """
+node n {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee low ( out.s <= 120 )
+}
+"""
+MAPPING = {"in.r": "data", "out.s": "data"}
+"""A node that is watched while it runs."""
+
 
 def a_free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as free:

@@ -28,20 +28,11 @@ from avow.ros.listing import Listed, Listing
 from avow.system.load import load_system
 from avow.system.plan import System
 
-from .processes import LONGEST, running, wait_for
+from .processes import LONGEST, MAPPING, RCL, running, wait_for
 from .test_bags import write_bag
 
 needs_dds = pytest.mark.needs_dds
 HERE = Path(__file__).parent
-RCL = """
-node n {
-  inputs( r : REAL )
-  outputs( s : REAL )
-  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
-  guarantee low ( out.s <= 120 )
-}
-"""
-MAPPING = {"in.r": "data", "out.s": "data"}
 
 
 class Peer:

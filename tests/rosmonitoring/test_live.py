@@ -27,19 +27,9 @@ from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected
 from avow.system.plan import System
 
-from .processes import a_free_port, answers, running, wait_for
+from .processes import MAPPING, RCL, a_free_port, answers, running, wait_for
 
 pytest.importorskip("rosbags")
-
-RCL = """
-node n {
-  inputs( r : REAL )
-  outputs( s : REAL )
-  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
-  guarantee low ( out.s <= 120 )
-}
-"""
-MAPPING = {"in.r": "data", "out.s": "data"}
 
 
 class Master:

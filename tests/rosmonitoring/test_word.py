@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from avow.backends.rosmonitoring import word as words
 from avow.backends.rosmonitoring.command import command
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.judged import Judgement, Telling
-from avow.backends.rosmonitoring.options import Setup, setup
+from avow.backends.rosmonitoring.options import Setup
 from avow.backends.rosmonitoring.watched import Fault
 from avow.base.verdict import Verdict
 from avow.formulas.formula import free_variables
@@ -32,9 +31,8 @@ from avow.system.plan import System
 
 from .conftest import job_for
 from .test_compiled import both
+from .test_other_steps import Event, Make, found
 
-Event = dict[str, Any]
-Make = Callable[..., System]
 HEAD = """
 node n {
   inputs( a : BOOL, n : NATURAL )
@@ -53,12 +51,6 @@ SPEAKS = "guarantee g ( previous(in.a, FALSE) and in.n >= 0 -> out.b )"
 def made(make: Make, way: str, *clauses: str, **options: Any) -> System:
     text = HEAD + "\n".join(clauses or (SPEAKS,)) + "\n}"
     return make(text, MAPPING, **{"answers": WAYS[way], **options})
-
-
-def found(system: System) -> Setup:
-    known, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
-    assert faults == ()
-    return known
 
 
 def recorded(run: list[Step], rng: random.Random, numbered: bool = True) -> list[Event]:
