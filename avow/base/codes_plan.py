@@ -116,12 +116,6 @@ PLAN_CODES: dict[str, Code] = {
             remedy="Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
         ),
         Code(
-            "PLAN131",
-            "nobody's name",
-            "Who answers for something (`who`) has an invisible character, letters of several scripts, or none.",
-            remedy="Write the person's name in the letters of one script.",
-        ),
-        Code(
             "PLAN121",
             "types clash",
             "An output and the input that it would feed have different types.",

@@ -15,7 +15,6 @@ from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, sha256
-from avow.base.persons import unreadable
 from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
 from avow.system.launched import read_launched
@@ -134,7 +133,6 @@ class _PlanReader:
             key: (self.root.at(key) or Piece(self.root.span, value=None)).located() for key in ("model", "policy")
         }
         self.model_graph()
-        self.people(self.root)
         scenario = self.scenario()
         launched = self.noted(read_launched(self.path, self.items("ros", "launch")))
         return Plan(
@@ -162,16 +160,6 @@ class _PlanReader:
             launched=launched,
             included=launched.files if launched is not None else (),
         )
-
-    def people(self, piece: Piece) -> None:
-        """Nobody answers for what a name signs that nobody can read."""
-        who = piece.at("who")
-        if who is not None and who.value is not None and (why := unreadable(who.text)):
-            hint = "write the name in the letters of one script"
-            self.fault("PLAN131", f"nobody can tell who {who.text!r} is: {why}", who.span, hint)
-        for inner in (*(piece.entries or {}).values(), *(piece.items or ())):
-            if inner.entries or inner.items:
-                self.people(inner)
 
     def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
         """What was read; what was wrong with it is noted."""
