@@ -20,9 +20,10 @@ from pathlib import Path
 
 from drawn.contracts import CONTRACT, Varied
 
+from avow.base.codec import to_json
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.rendering import render, to_json, to_sarif
+from avow.base.rendering import render, to_sarif, told
 from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
@@ -324,7 +325,7 @@ def examine(text: str) -> Contract | None:
             _place(diagnostic, lines)
         shown = render(found, {"f": text})
         assert not any(c in shown for c in "\x00\x1b\u202e\x7f\x85\u2028")
-        to_json(found), to_sarif(found)
+        to_json(told(found)), to_sarif(found)
         formatted = _format(text)
         if contract is not None:
             assert formatted is not None

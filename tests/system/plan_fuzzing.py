@@ -20,8 +20,9 @@ from pathlib import Path
 
 from language.fuzzing import at_most
 
+from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
-from avow.base.rendering import render, to_json, to_sarif
+from avow.base.rendering import render, to_sarif, told
 from avow.language import load as language_load
 from avow.system.load import load_system
 from avow.system.plan import System
@@ -156,7 +157,7 @@ def examine(folder: Path, text: str) -> System | None:
     assert any(d.is_error for d in found)
     shown = render(found, {str(path): text})
     assert not any(c in shown for c in "\x00\x1b\u202e")
-    to_json(found), to_sarif(found)
+    to_json(told(found)), to_sarif(found)
     lines = re.split(r"\r\n|[\n\r\x85\u2028\u2029]", text)
     for diagnostic in found:
         span = diagnostic.span
