@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import field, fields
+from typing import Any
 
+from avow.base.codec import LATER, Unreadable, called, from_text
 from avow.base.records import dataclass
 from avow.ros.definitions import canonical
 from avow.ros.names import is_name
@@ -111,26 +112,36 @@ def listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
     return Listed(name, **{side: tuple(sides.get(side, ())) for side in EVERY_SIDE})
 
 
+_Names = Mapping[str, str | None] | tuple[str, ...]
+
+
+def _side(word: str) -> Any:
+    return field(default=(), metadata={**called(word), **LATER})
+
+
+@dataclass(frozen=True, slots=True)
+class _Sides:
+    """Of a node; each by names alone, or with their types."""
+
+    publishes: _Names = _side("publishers")
+    subscribes: _Names = _side("subscribers")
+    serves: _Names = _side("services")
+    calls: _Names = _side("clients")
+    does: _Names = _side("action servers")
+    orders: _Names = _side("action clients")
+
+
 def _of_json(text: str) -> Listing:
     """``{"/a": {"publishers": {"/t": "std_msgs/Float64"}, "subscribers": {…}, "services": {…}, "clients": {…},
     "action servers": {…}, "action clients": {…}}}``."""
-    words = {"publishers": "publishes", "subscribers": "subscribes", "services": "serves", "clients": "calls"}
-    words |= {"action servers": "does", "action clients": "orders"}
     try:
-        data = json.loads(text)
-        nodes: list[Listed] = []
-        types: dict[str, str] = {}
-        for name, said in data.items():
-            sides: dict[str, tuple[str, ...]] = {}
-            for word, names in said.items():
-                sides[words[word]] = tuple(names)
-                if isinstance(names, dict):
-                    types |= {topic: canonical(kind) for topic, kind in names.items() if kind}
-            nodes.append(listed(name, sides))
-    except (ValueError, AttributeError, TypeError, RecursionError) as error:
+        told = from_text(dict[str, _Sides], text)
+    except Unreadable as error:
         raise NoListing(f"it is no JSON of nodes and their topics: {error}") from None
-    except KeyError as error:
-        raise NoListing(f"{error} is none of {', '.join(words)}") from None
+    sides = {name: {f.name: getattr(said, f.name) for f in fields(_Sides)} for name, said in told.items()}
+    nodes = [listed(name, said) for name, said in sides.items()]
+    typed = (names.items() for said in sides.values() for names in said.values() if isinstance(names, Mapping))
+    types = {name: canonical(kind) for names in typed for name, kind in names if kind}
     wrong = [n for node in nodes for n in (node.name, *node.publishes, *node.subscribes) if not is_name(n)]
     if wrong:
         raise NoListing(f"{wrong[0][:60]!r} is no name that ROS takes")

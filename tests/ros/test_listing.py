@@ -67,7 +67,12 @@ def test_json() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "a -> b", "{", "[]", '{"/a": 3}', '{"/a": {"x": []}}', '{"/a b": {}}', "{" * 9999]
+    "text",
+    [
+        *("", "a -> b", "{", "[]", '{"/a": 3}', '{"/a": {"x": []}}', '{"/a b": {}}', "{" * 9999),
+        *(f'{{"/a": {{"publishers": {wrong}}}}}' for wrong in ("3", '"/t"', "[7]", '{"/t": 7}', "[NaN]", '[["/t"]]')),
+        '{"/a": {}, "/a": {}}',
+    ],
 )
 def test_what_is_no_listing(text: str) -> None:
     with pytest.raises(NoListing):
