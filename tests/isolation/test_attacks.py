@@ -38,7 +38,7 @@ FORGERY = json.dumps(
     to_json(
         Answer(
             **dict.fromkeys(("valid", "edges", "wanted"), 9),
-            **dict.fromkeys(("replayed", "rejected", "undecided"), 0),
+            **dict.fromkeys(("replayed", "rejected", "undecided", "repeated"), 0),
             **dict.fromkeys(("stopped", "silent"), ""),
             **dict.fromkeys(("left_out", "observed", "apart"), ()),
             **dict.fromkeys(("unsteady", "crash", "crash_trace", "runs"), None),
