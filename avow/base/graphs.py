@@ -9,14 +9,14 @@ N = TypeVar("N", bound=Hashable)
 
 
 def reached(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> dict[N, None]:
-    """The roots and all that can be reached from them, each once, in the order in which they are met: depth first."""
-    found: dict[N, None] = {}
-    stack = [*roots][::-1]
+    """The roots and all that can be reached from them, each once, in the order in which they are met."""
+    found = dict.fromkeys(roots)
+    stack = [*found]
     while stack:
-        node = stack.pop()
-        if node not in found:
-            found[node] = None
-            stack.extend([*successors(node)][::-1])
+        for node in successors(stack.pop()):
+            if node not in found:
+                found[node] = None
+                stack.append(node)
     return found
 
 

@@ -81,7 +81,7 @@ class Graph:
         self, node: str, among: Collection[str], next_to: Callable[..., tuple[str, ...]]
     ) -> tuple[str, ...]:
         def neighbours(name: str) -> list[str]:
-            return [n for n in next_to(name, delayed=False) if n in among and n != node]
+            return [n for n in reversed(next_to(name, delayed=False)) if n in among and n != node]
 
         return tuple(reached(neighbours(node), neighbours))
 
