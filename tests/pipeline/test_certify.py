@@ -101,6 +101,7 @@ accepted:
     reason: it is known
     who: A. Person
     date: 2026-11-01
+    expires: 2030-01-01
 """
 NAMED = "compose: {D: {select: [a, b], rule: %s}}\n"
 
