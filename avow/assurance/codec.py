@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +38,10 @@ def read_case(path: Path) -> Case:
     """The case of a report (its folder, or report.json). Raises Rejected."""
     file = path / "report.json" if path.is_dir() else path
     try:
-        return from_json(json.loads(file.read_text(encoding="utf-8")))
+        return from_json(codec.parsed(file.read_bytes()))
     except OSError as error:
         raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         message = f"{file} is no report of this version of Avow: {error}"
         raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
 

@@ -140,7 +140,8 @@ def from_text(kind: type[T], text: str | bytes) -> T:
 def parsed(text: str | bytes) -> Any:
     """The plain data of a JSON text, of which all readers of JSON would say the same. Raises Unreadable."""
     try:
-        return json.loads(text, object_pairs_hook=once, parse_constant=_no_number)
+        said = text if isinstance(text, str) else str(text, "utf-8")
+        return json.loads(said, object_pairs_hook=once, parse_constant=_no_number)
     except RecursionError:
         raise Unreadable("it is nested too deeply") from None
     except ValueError as error:

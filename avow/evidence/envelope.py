@@ -6,13 +6,12 @@ it says that the holder of the key vouches for it.
 
 from __future__ import annotations
 
-import base64
-import binascii
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from avow.base.codec import Foreign, from_text, parsed, to_json
 from avow.base.records import dataclass
 from avow.evidence.signing import private_key, public_key
 
@@ -29,21 +28,32 @@ class Opened:
     """The public key that signed it, in hexadecimal; empty: none did."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Signature(Foreign):
+    keyid: str
+    sig: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class _Envelope(Foreign):
+    """As DSSE has it."""
+
+    payload: bytes
+    payloadType: str  # noqa: N815 - its own name
+    signatures: tuple[_Signature, ...]
+
+
 def seal(statement: dict[str, Any], private: Path | None, *, indent: int | None = 1) -> str:
     """The envelope as JSON; on one line with `indent` None. Raises Rejected for a key that cannot be used."""
     payload = json.dumps(statement, ensure_ascii=True, sort_keys=True).encode()
-    signatures = []
+    signatures: list[_Signature] = []
     if private is not None:
         key = private_key(private)
         public = key.public_key().public_bytes_raw()
         signature = key.sign(_authenticated(payload))
-        signatures.append({"keyid": public.hex(), "sig": base64.b64encode(signature).decode()})
-    body = {
-        "payload": base64.b64encode(payload).decode(),
-        "payloadType": PAYLOAD,
-        "signatures": signatures,
-    }
-    return json.dumps(body, indent=indent, sort_keys=True) + "\n"
+        signatures.append(_Signature(public.hex(), signature))
+    body = _Envelope(payload, PAYLOAD, tuple(signatures))
+    return json.dumps(to_json(body), indent=indent, sort_keys=True) + "\n"
 
 
 def seal_lines(statements: str, private: Path) -> str:
@@ -66,16 +76,13 @@ def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
     an envelope without a signature is taken at its word, and one with a signature must bear it truly.
     Raises Rejected for a trusted key that cannot be read."""
     try:
-        body = json.loads(text)
-        payload = base64.b64decode(body["payload"], validate=True)
-        signatures = [
-            (bytes.fromhex(s["keyid"]), base64.b64decode(s["sig"], validate=True)) for s in body["signatures"]
-        ]
-        statement = json.loads(payload)
-        if body["payloadType"] != PAYLOAD or not isinstance(statement, dict):
-            return "it is no in-toto statement"
-    except (ValueError, KeyError, TypeError, binascii.Error, RecursionError) as error:
+        body = from_text(_Envelope, text)
+        payload, signatures = body.payload, [(bytes.fromhex(s.keyid), s.sig) for s in body.signatures]
+        statement = parsed(payload)
+    except ValueError as error:
         return f"it is no envelope: {error}"
+    if body.payloadType != PAYLOAD or not isinstance(statement, dict):
+        return "it is no in-toto statement"
     if not signatures:
         return "no trusted key has signed it" if trusted else Opened(statement, "by name, without a key")
     try:

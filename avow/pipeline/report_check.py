@@ -11,7 +11,6 @@ thing it cannot know: whether the obligations are still those of today's contrac
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -42,9 +41,8 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     Without a ledger only the report's own consistency is checked, and that is said.
     """
     try:
-        text = (folder / "report.json").read_text(encoding="utf-8")
-        case = from_json(json.loads(text))
-    except (OSError, ValueError, RecursionError) as error:
+        case = from_json(codec.parsed((folder / "report.json").read_bytes()))
+    except (OSError, ValueError) as error:
         return (f"report.json cannot be read: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]

@@ -20,6 +20,7 @@ from avow.backends.hypothesis import exchange
 from avow.base.codec import Foreign, Unreadable, canonical, from_json, from_text, to_json
 from avow.base.programs import _Digest
 from avow.cli.recheck import _Report
+from avow.evidence.envelope import _Envelope
 from avow.evidence.heads import Line
 from avow.evidence.ledger import _Known
 from avow.fretish.project import _Export
@@ -42,7 +43,7 @@ KINDS: list[Any] = [
     runner.Shown,
 ]
 KINDS += [_Kept, _Told, _Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
-KINDS += [_Known, _Digest, _Report, _Export]
+KINDS += [_Known, _Digest, _Report, _Export, _Envelope]
 
 
 def sample(kind: Any) -> Any:
@@ -62,7 +63,7 @@ def sample(kind: Any) -> Any:
         return {"key": sample(given[1])}
     if isinstance(kind, type) and issubclass(kind, StrEnum):
         return next(iter(kind))
-    return {str: "text", int: 7, bool: True, float: 0.5}.get(kind, {"any": [1]})
+    return {str: "text", bytes: b"x", int: 7, bool: True, float: 0.5}.get(kind, {"any": [1]})
 
 
 def objects(data: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
@@ -129,7 +130,7 @@ def test_no_text_makes_a_reader_fail_otherwise(kind: Any) -> None:
     for place in (n for n, sign in enumerate(text) if sign in ":[" and text[n + 1] not in "]"):
         end = min(k for k in range(place + 1, len(text)) if text[k] in ",]}" or k == len(text) - 1)
         bad += [text[: place + 1] + odd + text[end:] for odd in ("NaN", "-Infinity", "9" * 5000)]
-    for one in bad:
+    for one in (*bad, text.encode("utf-16"), b"\xff" + text.encode()):
         with pytest.raises(Unreadable):
             from_text(kind, one)
     halves = re.sub('"text"(?!:)', r'"\\ud800"', text)
