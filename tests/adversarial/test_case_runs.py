@@ -76,7 +76,7 @@ class Judged(System):
             lines.insert(0, f"{start}select: [{', '.join(self.nodes)}], {REASONS}}}}}")
         accepted = [
             f"  - {{obligation: {n}/guarantee/{self.names[k]}, verdict: refuted, reason: known, who: A. Person, "
-            f"date: {TODAY.isoformat()}}}"
+            f"date: {TODAY.isoformat()}, expires: {TODAY.isoformat()}}}"
             for n, k in sorted(self.refuted)
             if k < len(self.promised[n]) and self.chance.random() < 0.7
         ]
