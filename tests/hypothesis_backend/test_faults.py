@@ -36,9 +36,9 @@ from avow.language.sorts import (
 
 from .faults import FAULTS, Fault
 
-UNSEEN = ("packed", "near a parabola")
+UNSEEN = ("packed", "near a parabola", "an expression", "too large to square")
 """Faults that are still missed: nothing of what is compared moves until a number is larger than any that is tried; the
-secant method goes astray."""
+secant method goes astray; nothing is compared that moves."""
 
 
 def outcome_of(folder: Path, fault: Fault, *, faulty: bool) -> Outcome:
