@@ -38,7 +38,15 @@ from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import ANOTHER_SOLVER_EFFORT, FIRST_LOOK_EFFORT, QUESTION_EFFORT, QUESTION_SHARE, ROUNDS
+from avow.tuning.effort import (
+    ANOTHER_SOLVER_EFFORT,
+    FIRST_LOOK_EFFORT,
+    QUESTION_EFFORT,
+    QUESTION_SHARE,
+    RESTART,
+    RESTARTS,
+    ROUNDS,
+)
 
 __all__ = [
     "Answer",
@@ -213,8 +221,21 @@ def _solve(
                 return Solution("sat", values, engine=engine)
         return None
 
+    def restarted() -> Solution | None:
+        """By other seeds of the solver, each for a short while."""
+        for another in range(seed + 1, seed + 1 + RESTARTS):
+            limit = max(1, int(effort * RESTART))
+            answer = check(translator, background, effort=limit, seed=another, tracked=tracked)
+            if answer.status == "unsat":
+                return Solution("unsat", core=answer.core)
+            if solution := replayed(answer, simple=True):
+                return solution
+        return None
+
     reason = ""
     for plain, tables in ROUNDS:
+        if functions and (plain, tables) == ROUNDS[-1] and (solution := restarted()):
+            return solution
         limit = max(1, int(effort * plain))
         if functions and plain == ROUNDS[0][0]:
             limit = min(limit, FIRST_LOOK_EFFORT)

@@ -47,10 +47,18 @@ ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
 """Parts of the effort allowed, for the solver's own methods and for functions as tables: short rounds of different
 methods before any gets long."""
 
+RESTARTS = 8
+"""Where there are functions, the solver's own methods find a contradiction early or by luck: before the last round as
+many further seeds have a try. One redundant clause, its question's parts in 14 orders: 3 answered by one attempt of
+effort 400, 13 by 8 of 25, 14 by 16."""
+
+RESTART = 0.025
+"""The part of the effort allowed for each."""
+
 FIRST_LOOK_EFFORT = 30
 """Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
 
-QUESTION_SHARE = 1.3
+QUESTION_SHARE = 1.5
 """The share of the limit for everything that is done to answer one question, replays of what is found included."""
 
 ANOTHER_SOLVER_EFFORT = 1_500
