@@ -82,6 +82,7 @@ def test_what_was_mended_is_no_cause_any_more(tmp_path: Path) -> None:
 def test_the_environment_is_blamed_only_where_it_provides(tmp_path: Path) -> None:
     found = judge(chain(tmp_path), ("r", -20), ("s", -1))
     assert [v.fault for v in found] == [Fault.ASSUMPTION, Fault.EXCUSED, Fault.PROVIDER]
+    assert found[1].cause == "sensor.real at event 1 (environment) caused it"
     assert "sensor.real at event 1 (environment) caused guard.nonneg at event 2" in found[2].cause
 
 
