@@ -24,6 +24,8 @@ STAYS = {
     "engine_code.reading_digest": "of the code that runs in this process",
     "engine_code.trusted_parts": "of the code that runs in this process",
     "blobs._classes": "of the code that runs in this process",
+    "cluster._guarded": "an audit hook cannot be taken away again: a process has one",
+    "cluster_worker.own_code": "of the code that runs in this process",
     "tasks.sys.dont_write_bytecode": "what the interpreter does, whoever asks",
     "fork_server.sys.argv": "a fork takes its own arguments; it is a process of one work",
 }
@@ -38,6 +40,7 @@ KEPT = "what was computed of the same arguments: faster, and never another answe
 PATCHED = "another's module, in the process of a subject or for the time of a search"
 ELSEWHERE = {
     "avow/assurance/policy._data": ONCE,
+    "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
     "avow/base/file_systems._known": ONCE,
@@ -57,6 +60,7 @@ ELSEWHERE = {
     "avow/isolation/machine_code.sqlite3.connect": PATCHED,
     "avow/isolation/machine_code.time.tzset": PATCHED,
     "avow/isolation/tracing.traces": ONCE,
+    "avow/isolation/sights.most": PROCESS,
     "avow/language/load._lately": KEPT,
     "avow/language/load._under": KEPT,
     "avow/report/page.environment": ONCE,
