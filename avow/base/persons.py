@@ -139,7 +139,7 @@ def _sound(letter: str) -> str:
             return _CYRILLIC.get(called, called[1:] if re.fullmatch("E[^AEIOU]", called) else called[:1]).lower()
         case "GREEK":
             return _GREEK.get(called.removeprefix("FINAL "), called[:1]).lower()
-        case _:
+        case _:  # letters of other alphabets, signs, digits: as they stand
             return letter
 
 
