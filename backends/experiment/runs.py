@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -87,8 +86,8 @@ class _RunsReader:
         rows: list[tuple[int, list[str]]] = []
         try:
             for cells in reader:
-                quoted = len(cells) == 1 and not cells[0].strip() and bool(rows) and len(rows[0][1]) == 1
-                if cells and (len(cells) > 1 or cells[0].strip() or quoted):
+                one_column = bool(rows) and len(rows[0][1]) == 1
+                if cells and (one_column or len(cells) > 1 or cells[0].strip()):
                     rows.append((reader.line_num, [cell.strip() for cell in cells]))
                 if len(rows) > RUNS + 1:
                     raise self.fail(reader.line_num, "EXP111", f"more than {RUNS} runs")
@@ -99,12 +98,12 @@ class _RunsReader:
     def header(self, line: int, columns: list[str]) -> list[str]:
         for name in sorted({c for c in columns if columns.count(c) > 1}):
             self.add(line, "EXP112", f"the column '{name}' is there twice")
-        read = Counter(alike(name) for name in columns)
-        for name in (*self.measure.columns, *([self.id_column] if self.id_column else [])):
-            if name in columns and read[alike(name)] > 1:
-                others = ", ".join(repr(other) for other in columns if other != name and alike(other) == alike(name))
-                self.add(line, "EXP112", f"nobody can tell the column '{name}' from {others}")
         wanted = [*self.measure.columns, *([self.id_column] if self.id_column else [])]
+        for name in wanted:
+            others = [other for other in columns if other != name and alike(other) == alike(name)]
+            if name in columns and others:
+                told = ", ".join(map(repr, others))
+                self.add(line, "EXP112", f"nobody can tell the column '{name}' from {told}")
         for name in wanted:
             if name not in columns:
                 self.add(line, "EXP112", f"there is no column '{name}'", f"columns: {', '.join(columns)}")

@@ -143,10 +143,12 @@ def _clause(clause: Clause) -> Stated:
 def _scenario(job: Job) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
     """The rows of the plan's scenario for each input of the node that it interprets."""
     scenario = job.system.plan.scenario
+    if scenario is None:
+        return
     names = {port.name for port in job.node.inputs}
-    for key, (table_name, columns) in sorted(scenario.interpret.items()) if scenario is not None else ():
+    for key, (table_name, columns) in sorted(scenario.interpret.items()):
         owner, _, port = key.rpartition(".")
-        if scenario is not None and port in names and owner in {"", "in", job.node.name}:
+        if port in names and owner in {"", "in", job.node.name}:
             table = scenario.table(table_name)
             at = [table.columns.index(column) for column in columns if column in table.columns]
             yield port, tuple(tuple(row[k] for k in at) for row in table.rows)

@@ -22,9 +22,9 @@ from avow.language.sorts import (
     TupleSort,
 )
 
+from .generate import Inputs
 from .tuning import LONGEST_SEQUENCE, POINTS_TURNED
 
-Inputs = dict[str, Value]
 Number = RealSort | IntegerSort | NaturalSort
 
 _LENGTH = "length"

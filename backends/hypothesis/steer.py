@@ -21,7 +21,8 @@ from typing import Any
 from avow.isolation.scout import Sight
 from avow.language.sorts import Sort, StringSort
 
-from .knobs import Inputs, Knob, at, knobs, put
+from .generate import Inputs
+from .knobs import Knob, at, knobs, put
 from .pools import STEP, variants
 from .tuning import STEERED, STEERED_FROM, STEERED_PLACES, STEERED_STEPS, STEERED_TEXTS, TURNS
 

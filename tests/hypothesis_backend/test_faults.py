@@ -13,7 +13,8 @@ from hoare.systems import make_job
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.hypothesis import BACKEND
-from avow.backends.hypothesis.knobs import Inputs, at, knobs, put
+from avow.backends.hypothesis.generate import Inputs
+from avow.backends.hypothesis.knobs import at, knobs, put
 from avow.backends.hypothesis.pools import variants
 from avow.backends.hypothesis.steer import Steering, constants, repeats
 from avow.base.verdict import Outcome, Verdict
