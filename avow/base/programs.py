@@ -26,7 +26,7 @@ def program_digest(places: tuple[str, ...]) -> str:
     if not places:
         return ""
     files = sorted({file for place in places for file in program_files(place)})
-    return kept_digest(f"program-{sha256(json.dumps(places))[:16]}", {str(file): file for file in files})
+    return kept_digest(f"program-{sha256(json.dumps(places))[:16]}", {str(file): str(file) for file in files})
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +37,15 @@ class _Digest:
     digest: str
 
 
-def kept_digest(name: str, files: Mapping[str, Path]) -> str:
-    """SHA-256 of files, by what they are called. Kept, sealed, under that name, while each file is the same by its
-    identity: there are many, and some are large."""
-    mark = sha256(json.dumps([[str(file), _mark(file)] for file in files.values()]))
+def kept_digest(name: str, files: Mapping[str, str]) -> str:
+    """SHA-256 of files (what each is called → its path). Kept, sealed, under that name, while each file is the same by
+    its identity: there are many, and some are large."""
+    mark = sha256(json.dumps([[file, _mark(file)] for file in files.values()]))
     note = cache_folder() / f"{name}.json"
     known = read_note(_Digest, note)
     if known is None or known.of != mark:
-        known = _Digest(mark, sha256(json.dumps([[called, digest_or_missing(file)] for called, file in files.items()])))
+        said = [[called, digest_or_missing(Path(file))] for called, file in files.items()]
+        known = _Digest(mark, sha256(json.dumps(said)))
         with contextlib.suppress(OSError):  # a read-only home costs that each time
             write_note(note, known)
     return known.digest
@@ -111,8 +112,8 @@ def _linked(binary: Path) -> frozenset[Path]:
     return frozenset(Path(os.path.realpath(name)) for name in named)
 
 
-def _mark(file: Path) -> tuple[int | str, ...]:
+def _mark(file: str) -> tuple[int | str, ...]:
     try:
-        return identity(file.stat(), file)
+        return identity(os.stat(file), file)  # noqa: PTH116 - asked of each file of several packages
     except OSError:
         return ()

@@ -7,6 +7,7 @@ import contextlib
 import functools
 import importlib.util
 import json
+import os
 import re
 import shutil
 from collections.abc import Sequence
@@ -81,9 +82,10 @@ def package_digest(name: str) -> str:
     spec = importlib.util.find_spec(name)
     if spec is None or not spec.submodule_search_locations:
         return ""
-    place = Path(spec.submodule_search_locations[0])
-    files = sorted(path for path in place.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-    return kept_digest(f"package-{name}-{sha256(str(place))[:12]}", {str(f.relative_to(place)): f for f in files})
+    place = os.path.normpath(spec.submodule_search_locations[0])
+    walked = (walk for walk in os.walk(place) if not walk[0].endswith("__pycache__"))
+    files = sorted(os.path.join(folder, name) for folder, _, names in walked for name in names)  # noqa: PTH118 - many
+    return kept_digest(f"package-{name}-{sha256(place)[:12]}", {file[len(place) + 1 :]: file for file in files})
 
 
 LIBRARIES = ("z3", "cvc5", "lark", "yaml")

@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 from avow.base.files import digest_file, identity, sha256
 from avow.base.module_path import absolute_only
-from avow.isolation.tracing import remedy, traces
 from avow.tuning.sizes import FOLDED
 
 
@@ -64,6 +63,8 @@ def look(kind: Seen, path: str) -> str:
     if kind is Seen.PLACE:
         return sha256(os.path.realpath(path))
     if kind is Seen.TRACER:
+        from avow.isolation.tracing import traces  # not in a run with nothing to do: its patterns take their time
+
         return sha256(str(traces()))
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
@@ -220,6 +221,8 @@ def _of_python(path: str) -> bool:
 
 def untold(what: str) -> tuple[Observed, Observed]:
     """Of what read files while nothing traced: that they are not known, and that this is so for want of a tracer."""
+    from avow.isolation.tracing import remedy
+
     return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})"), tracer()
 
 

@@ -14,7 +14,6 @@ from helpers import some
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
-from avow.isolation import observed as observed_module
 from avow.isolation import subject as subject_module
 from avow.isolation import tracing
 from avow.isolation.level import SANDBOX, seals
@@ -354,7 +353,7 @@ def test_what_machine_code_reads_is_told_by_a_trace_or_undeclared(
         pytest.skip("there is no extension module here")
     if traces():
         assert not outside(tmp_path, text)
-    for module in (subject_module, observed_module, tracing):
+    for module in (subject_module, tracing):
         monkeypatch.setattr(module, "traces", lambda: False)
     assert [what for what in outside(tmp_path, text) if tracing.remedy() in what]
 

@@ -12,7 +12,6 @@ import pytest
 from avow.base import programs
 from avow.base.process import ToolMissing
 from avow.base.tools import Tool
-from avow.isolation import observed as observed_module
 from avow.isolation import outside, tracing
 from avow.isolation.observed import Observed, Seen, folded, look
 from avow.isolation.outside import Outside
@@ -121,16 +120,15 @@ def test_without_strace_what_it_reads_is_not_known(
     there: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its answer is an undeclared input, which names the remedy; and is asked again once something traces."""
-    for module in (outside, observed_module):
+    for module in (outside, tracing):
         monkeypatch.setattr(module, "traces", lambda: False)
-    monkeypatch.setattr(tracing, "traces", lambda: False)
     said, observed = ran(there, tmp_path)
     assert "lenient" in said
     assert [o.kind for o in observed] == [Seen.TRACER, Seen.OUTSIDE]
     assert "tool" in observed[1].path
     assert tracing.remedy() in observed[1].path
     assert not changed(observed)
-    monkeypatch.setattr(observed_module, "traces", lambda: True)
+    monkeypatch.setattr(tracing, "traces", lambda: True)
     assert changed(observed) == ["strace"]
 
 
