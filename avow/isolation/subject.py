@@ -232,8 +232,6 @@ class SubjectProcess:
         os.close(there)
         os.close(back)
         ready = self._message()
-        if self._trace is not None:
-            self._trace.hide()
         if not ready.ready:
             raise self._end(f"the subject cannot be loaded: {ready.error or 'no reason given'}")
 

@@ -26,6 +26,8 @@ _PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
 _NETWORK = frozenset({"socket", "connect"})
 _MACHINE_CALLS = frozenset({"uname", "sysinfo"})
 """What a program asks of the machine by a call. The clock is read without one (`symbols`)."""
+_STEPS = frozenset({"clone", "clone3", "fork", "vfork", "fchdir"})
+"""Calls that say in which folder a process is."""
 _OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
 _LOOKS = frozenset(
     {"stat", "lstat", "newfstatat", "statx", "access", "faccessat", "faccessat2", "readlink", "readlinkat"}
@@ -90,16 +92,18 @@ def remedy() -> str:
 
 
 def _strace(place: str) -> list[str]:
-    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE | _MACHINE_CALLS)])
+    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE | _MACHINE_CALLS | _STEPS)])
     program = shutil.which("strace") or "strace"
     return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
 
 class Trace:
-    """The trace of one process and all that it starts. Its file is nobody's to open once the process runs."""
+    """The trace of one process and all that it starts. It lies in memory: on a disk that is full for a while it would
+    have gaps, and nobody could tell."""
 
     def __init__(self) -> None:
-        handle, self._place = tempfile.mkstemp(prefix="avow-trace-")
+        handle = os.memfd_create("avow-trace")
+        self._place = f"/proc/{os.getpid()}/fd/{handle}"
         self._file = os.fdopen(handle, "rb")
         self.mark = f"/avow-{secrets.token_hex(8)}"
         """The process looks at ``<mark>-begin`` and ``<mark>-end``: what it asks for in between is its subject's."""
@@ -107,61 +111,129 @@ class Trace:
     def around(self, command: Sequence[str]) -> list[str]:
         return [*_strace(self._place), *command]
 
-    def hide(self) -> None:
-        """The process runs: strace holds the file open, and so do we."""
-        Path(self._place).unlink(missing_ok=True)
-
     def read(self, folder: Path, scratch: str) -> Traced | None:
         """What was asked for by a process that began in `folder`; None where the trace has no end: then nobody knows.
         Said once. What lies in `scratch` is the subject's own."""
-        self.hide()
         with self._file as file:
-            lines = _whole(file.read().split(b"\n"))
+            lines = list(_whole(file.read().split(b"\n")))
         return _read(lines, self.mark, str(folder), scratch)
 
     def read_all(self, program: str, folder: Path) -> tuple[tuple[str, str], ...] | None:
         """As `read`, of a trusted tool, from the start of its program: what it asked for, but for what it made itself
         and what the machine is (``/proc``, devices). Said once."""
-        self.hide()
         with self._file as file:
             lines = list(_whole(file.read().split(b"\n")))
         begins = (k for k, (_, line) in enumerate(lines) if line.startswith(b"execve(") and _names(line, program))
         begin = next(begins, None)
-        ended = any(not line for _, line in lines)
-        return _looked_at(lines[begin:], str(folder)) if begin is not None and ended else None
+        if begin is None or (lines[begin][0], b"") not in lines[begin:]:  # the program's own end, not of what it starts
+            return None
+        return _looked_at(lines[begin:], str(folder))
 
 
-def _looked_at(lines: Iterable[tuple[int, bytes]], folder: str) -> tuple[tuple[str, str], ...]:
+class _Places:
+    """The folder that each process is in. A started one begins in that of who started it; whatever a line says of it
+    (``AT_FDCWD</folder>``) is so."""
+
+    def __init__(self, lines: Iterable[tuple[int, bytes]], first: int, folder: str) -> None:
+        self._now: dict[int, str] = {first: folder}
+        self._begins: dict[int, str] = {}
+        self._parents: dict[int, int] = {}
+        moved: set[int] = set()
+        for process, line in lines:
+            if line.startswith((b"chdir(", b"fchdir(")):
+                moved.add(process)
+            elif process not in moved and (said := _FROM.match(line)):
+                self._begins.setdefault(process, _text(said[1]))
+            elif child := _STARTED.match(line):
+                self._parents.setdefault(int(child[1]), process)
+
+    def of(self, process: int) -> str | None:
+        """None: nothing tells. Sandboxes count processes otherwise than who watches them."""
+        if process not in self._now:
+            parent = self._parents.pop(process, None)
+            place = self._begins.get(process) or (self.of(parent) if parent is not None else None)
+            if place is None:
+                return None
+            self._now[process] = place
+        return self._now[process]
+
+    def see(self, process: int, line: bytes) -> None:
+        """The next line: where its process is from now on."""
+        if child := _STARTED.match(line):
+            self.of(int(child[1]))
+        elif said := _FROM.match(line):
+            self._now[process] = _text(said[1])
+        elif (step := _STEP.match(line)) is not None:
+            to = _text(step[1] or step[2])
+            at = "" if to[:1] == os.sep else self.of(process)
+            if at is not None:
+                self._now[process] = _plain(os.path.join(at, to))  # noqa: PTH118
+
+
+_STEP = re.compile(rb'(?:chdir\("((?:[^"\\]|\\.)+)"|fchdir\(\d+<((?:[^>\\]|\\.)*)>)\)\s+= 0')
+_FROM = re.compile(rb"\w+\(AT_FDCWD<((?:[^>\\]|\\.)*)>")
+_STARTED = re.compile(rb"(?:clone3?|v?fork)\(.*= (\d+)", re.DOTALL)
+_NOWHERE = ("outside", "a file in a folder that no trace tells of")
+
+
+def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[str, str], ...]:
     events: dict[tuple[str, str], None] = {}
-    places: dict[int, str] = {}
+    places = _Places(lines, lines[0][0], folder)
     made: set[str] = set()
+
+    def own(path: str) -> bool:
+        return any(f"{path}/".startswith(f"{one}/") for one in made)
+
     for process, line in lines:
+        places.see(process, line)
         found = _CALL.match(line)
         if found is None:
             continue
         call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
-        at = _text(base) if base is not None else places.get(process, folder)
         if call == "connect" and b"AF_UNIX" not in line and rest.rstrip().endswith(_CONNECTED):
             events["outside", "the network"] = None
-        if text is None or not text:
+        if call in ("chdir", "fchdir") or text is None or (not text and call != "execveat"):
             continue
-        path = _plain(os.path.join(at, _text(text)))  # noqa: PTH118
+        at = _text(base) if base is not None else places.of(process)
+        if at is None and _text(text)[:1] != os.sep:
+            events[_NOWHERE] = None
+            continue
+        path = _plain(os.path.join(at or "", _text(text)))  # noqa: PTH118
         well = b"= -1 " not in rest
-        if call == "chdir":
-            places[process] = path
+        if call in _BOTH:
+            old, new = (_plain(p) for p in _both(call, line, at or ""))
+            if well and call not in _LINKS and not own(old):
+                events["read", old] = None  # by its new name it is as little made here
+            elif well:
+                made.add(new)
         elif call in _CHANGES or call == "creat" or (call in _OPENS and _WRITES.search(rest)):
-            if call in _OPENS and b"O_RDWR" in rest and b"O_CREAT" not in rest and path not in made:
+            if call in _OPENS and b"O_RDWR" in rest and b"O_CREAT" not in rest and not own(path):
                 events["read", path] = None
-            made |= {_plain(p) for p in (_both(call, line, at) if call in _BOTH else [path])} if well else set()
-        elif f"{path}/".startswith(_OF_THE_MACHINE) or any(f"{path}/".startswith(f"{own}/") for own in made):
+            if well:
+                folder, name = os.path.split(path)
+                made |= {path, _opened(rest) or os.path.join(os.path.realpath(folder), name)}  # noqa: PTH118
+        elif f"{path}/".startswith(_OF_THE_MACHINE):
             pass
-        elif path.startswith(tempfile.gettempdir()) and str(process) in path:
+        elif path.startswith(tempfile.gettempdir()) and re.search(_JAVA % process, path):
             pass  # a Java asks whether somebody wants to speak to it
-        elif call in _OPENS:
-            events["kind" if b"O_PATH" in rest else "read", path] = None
-        elif call in _LOOKS:
-            events["link" if call.startswith("readlink") else "state", path] = None
+        elif call in _OPENS | _LOOKS:
+            # what was made here may be a link; that may be gone when we look
+            name = (_opened(rest) if call in _OPENS else None) or os.path.realpath(path) if own(path) else path
+            if not own(name):
+                kind = "link" if call.startswith("readlink") else "state" if call in _LOOKS else "read"
+                events["kind" if kind == "read" and b"O_PATH" in rest and call not in _RUNS else kind, name] = None
     return (*events, *_interpreters(events))
+
+
+_RUNS = frozenset({"execve", "execveat"})
+_JAVA = r"/(\.(java|attach)_pid|hsperfdata_[^/]+/)%d$"
+_OPENED = re.compile(rb"\) = \d+<(/(?:[^>\\]|\\.)*)>$")
+
+
+def _opened(rest: bytes) -> str | None:
+    """What a call that opens says that it opened, behind all links."""
+    found = _OPENED.search(rest.rstrip())
+    return _text(found[1]) if found is not None else None
 
 
 def _names(line: bytes, program: str) -> bool:
@@ -219,10 +291,11 @@ def _both(call: str, line: bytes, folder: str) -> list[str]:
     return paths
 
 
-def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: str) -> Traced | None:
+def _read(lines: Sequence[tuple[int, bytes]], mark: str, folder: str, scratch: str) -> Traced | None:
     events: dict[tuple[str, str], None] = {}
     faults: dict[str, None] = {}
-    places: dict[int, str] = {}
+    begins = (process for process, line in lines if mark.encode() in line)
+    places = _Places(lines, next(begins, 0), folder)
     host: int | None = None
     ended = False
     running: set[int] = set()
@@ -231,6 +304,7 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
     ours: set[int] = set()
     """Processes of the sandbox itself: they were there before the subject."""
     for process, line in lines:
+        places.see(process, line)
         if not line:
             running.discard(process)
         found = _CALL.match(line)
@@ -263,7 +337,7 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
             if process != host:  # the host's own: `senses`
                 events["outside", "the machine"] = None
         elif call in _BOTH:
-            for path in _both(call, line, places.get(process, folder)):
+            for path in _both(call, line, places.of(process) or ""):
                 if path != scratch and not path.startswith(scratch + os.sep):
                     faults[f"writes {path}"] = None
         elif text is None and call in _BY_HANDLE:
@@ -271,16 +345,19 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
             if path != scratch and not path.startswith((scratch + os.sep, "/memfd:", "/dev/")):
                 faults[f"writes {path or 'a file'}"] = None
         elif text is not None:
-            at = _text(base) if base is not None else places.get(process, folder)
-            path = os.path.normpath(os.path.join(at, _text(text)))  # noqa: PTH118
+            at = _text(base) if base is not None else places.of(process)
+            if at is None and text and _text(text)[:1] != os.sep:
+                events[_NOWHERE] = None
+                continue
+            path = os.path.normpath(os.path.join(at or "", _text(text)))  # noqa: PTH118
             if path == scratch or path.startswith(scratch + os.sep):
                 continue
-            if call == "chdir":
-                places[process] = path
+            if call in ("chdir", "fchdir"):
+                pass
             elif call in _CHANGES or (call in _OPENS and _WRITES.search(rest)):
                 if not path.startswith(("/dev/null", "/dev/tty")):
                     faults[f"writes {path}"] = None
-            elif text and not f"{path}/".startswith(_MACHINE):
+            elif (text or call == "execveat") and not f"{path}/".startswith(_MACHINE):
                 if call in _OPENS:
                     events["read", path] = None
                     if process != host and not rest.rstrip().endswith(_FAILED):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from avow.base.tools import Tool
 from avow.isolation import outside, tracing
 from avow.isolation.observed import Observed, Seen, folded, look
 from avow.isolation.outside import Outside
-from avow.isolation.tracing import traces
+from avow.isolation.tracing import Trace, traces
 
 needs_strace = pytest.mark.skipif(not traces(), reason="strace does not run here")
 
@@ -160,3 +161,47 @@ def test_rows_are_folded_without_loss(tmp_path: Path) -> None:
         *((Seen.READ, name) for name in names),
     }
     assert not changed(found)
+
+
+UNSEEN = {
+    "a program that a started one is started from, by a path from the folder that it went to": "(cd $D; ./prog; true)",
+    "the same, of a folder that it came to by a handle": "perl -e 'opendir(D, shift); chdir(D); exec(\"./prog\")' $D",
+    "a folder that it did not come to": "cd $D; cd /no-such-folder; (./prog)",
+    "a file behind a link that it makes": "ln -s $D d; cat d/prog",
+    "behind one that is gone when it ends": "ln -s $D d; cat d/prog; rm d",
+    "a file to which it makes a link before it is read": "ln -s $D/prog d; cat $D/prog",
+    "what it gives a second name, and reads by that": "ln $D/prog d; cat d",
+}
+
+
+@needs_strace
+@pytest.mark.parametrize("script", UNSEEN.values(), ids=UNSEEN)
+def test_what_it_reaches_by_another_way_is_seen(tmp_path: Path, script: str) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    shutil.copy("/bin/true", data / "prog")
+    place = tmp_path / "bin" / "tool"
+    place.parent.mkdir()
+    place.write_text(f'#!/bin/sh\nT={tmp_path}; D="$T/data"\n{script}\n')
+    place.chmod(0o755)
+    folder = tmp_path / "made"
+    folder.mkdir()
+    run = Outside((Tool("tool", "1", str(place), ""),))
+    done = run.run([str(place)], cwd=folder, seconds=60)
+    assert done.code == 0, done.stderr
+    observed = run.observed()
+    assert not changed(observed)
+    (data / "prog").write_text("#!/bin/sh\nexit 0\n")
+    assert str(data / "prog") in changed(observed)
+
+
+@needs_strace
+def test_a_trace_that_ends_before_its_program_tells_nothing(tmp_path: Path) -> None:
+    """As a full disk cuts it: what the program started has ended there, not the program."""
+    trace = Trace()
+    command = ["/bin/sh", "-c", "/bin/true; /bin/cat /etc/passwd"]
+    subprocess.run(trace.around(command), cwd=tmp_path, check=True, capture_output=True)
+    whole = Path(trace._place).read_bytes()
+    child = next(line for line in whole.splitlines(keepends=True) if b"+++ exited" in line)
+    os.truncate(trace._place, whole.index(child) + len(child))
+    assert trace.read_all("/bin/sh", tmp_path) is None
