@@ -68,7 +68,8 @@ class Operator:
     evaluate: Callable[..., Any] | Why
     """Of values (`avow.formulas.values`) to a value."""
     z3: Callable[..., Any] | Why
-    """Of the module z3 and expressions to an expression."""
+    """Of the module z3 and expressions to an expression; numbers are Python's (`z.If(a < 0, -a, a)`), as one that z3
+    makes by itself is of another context."""
     smtlib: str
     """The head of its form in the scripts that Z3 prints."""
     dafny: str

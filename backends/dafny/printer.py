@@ -18,7 +18,7 @@ from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
-from avow.language.operators import OPERATORS, Level, Operator
+from avow.language.operators import OPERATORS, Level, Operator, Why
 from avow.language.sorts import (
     BOOL,
     REAL,
@@ -298,10 +298,12 @@ class _Printer:
             texts.append(text)
         if operator.level is not Level.ATOM:
             return f"{operator.dafny}({', '.join(texts)})", True
-        kind = "Real" if term.sort == REAL else "Bool" if term.sort == BOOL else "Int"
-        name = f"{operator.dafny}{kind}"
+        sorts = {argument.sort for argument in term.children}
+        name = f"{operator.dafny}{'Real' if REAL in sorts else 'Bool' if BOOL in sorts else 'Int'}"
         self.words.functions.add(name.removeprefix("Types."))
-        return (f"{name}({texts[0]})" if len(texts) == 1 else reduce(lambda a, b: f"{name}({a}, {b})", texts)), True
+        if not isinstance(operator.takes, Why) and operator.takes[1] is not None:
+            return f"{name}({', '.join(texts)})", True
+        return reduce(lambda a, b: f"{name}({a}, {b})", texts), True  # of any number: two after two
 
     def membership(self, item: Term, collection: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
         left = yield self.operand(item, scope)
