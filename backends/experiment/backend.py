@@ -10,13 +10,15 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Outcome, Verdict
+from avow.evidence.record import CASE
 
 from .codes import CODES
 from .figures import Figures, read_figures
 from .judge import Judgement, exceeds, judge_figures, judge_runs
+from .kept import failing, held_against
 from .options import SCHEMA, Experiment, read
 from .quantity import show
-from .runs import Runs, read_runs
+from .runs import Run, Runs, read_runs
 
 
 class ExperimentBackend(Backend):
@@ -24,7 +26,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "measured runs, judged by exact binomial statistics"
-    version = "3"
+    version = "4"
     strength = Verdict.TESTED
     uses_scenario = False
     uses_wiring = False
@@ -73,42 +75,49 @@ class ExperimentBackend(Backend):
         return {"claim.json": document(claim) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        judgement, logs = _settle(job)
-        outcomes = tuple(
-            Outcome(
-                o.id,
-                judgement.verdict,
-                judgement.summary,
-                judgement.counterexample,
-                judgement.hypotheses,
-                dict(judgement.bound),
-                dict(judgement.details),
-                Link.GUIDED,
+        experiment, problems = read(job)
+        found, runs, logs = _settle(job, experiment, problems)
+        outcomes = []
+        for o in job.obligations:
+            kept = job.kept.get(o.id, ())
+            judged = held_against(found, runs, experiment, kept) if experiment is not None else found
+            outcomes.append(
+                Outcome(
+                    o.id,
+                    judged.verdict,
+                    judged.summary,
+                    judged.counterexample,
+                    judged.hypotheses,
+                    dict(judged.bound),
+                    dict(judged.details),
+                    Link.GUIDED,
+                )
             )
-            for o in job.obligations
-        )
-        return Report(outcomes, "avow experiment", self.version, logs=logs)
+        return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)
 
 
-def _settle(job: Job) -> tuple[Judgement, dict[str, str]]:
-    experiment, problems = read(job)
+def _settle(
+    job: Job, experiment: Experiment | None, problems: tuple[Diagnostic, ...]
+) -> tuple[Judgement, tuple[Run, ...], dict[str, str]]:
     try:
         if experiment is None:
             raise Rejected(*problems)
         material = _material(experiment)
     except Rejected as error:
         why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
-        return Judgement(Verdict.ERROR, why, {}, {}), {}
+        return Judgement(Verdict.ERROR, why, {}, {}), (), {}
     if isinstance(material, Figures):
-        return judge_figures(material, experiment), {}
+        return judge_figures(material, experiment), (), {}
     judgement = judge_runs(material.runs, experiment)
+    if judgement.verdict is Verdict.REFUTED:
+        judgement.details[CASE] = failing(material.runs, experiment)
     if material.warnings:
         judgement.details["warnings"] = [told(job, [d]) for d in material.warnings[:20]]
     lines = [
         f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if exceeds(run, experiment) else 'ok'}"
         for run in material.runs
     ]
-    return judgement, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}
+    return judgement, material.runs, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}
 
 
 def _material(experiment: Experiment) -> Runs | Figures:

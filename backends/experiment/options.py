@@ -41,6 +41,17 @@ SCHEMA = schema(
             "run at all may fail",
         },
         "protocol": text("how the runs were made, for the report"),
+        "left_out": {
+            "type": "object",
+            "properties": {
+                "runs": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
+                "because": {"type": "string", "minLength": 1},
+            },
+            "required": ["runs", "because"],
+            "additionalProperties": False,
+            "description": "runs that failed before and are no longer among the data, by name, and why they do not "
+            "count",
+        },
     },
     "within",
     oneOf=[{"required": ["data", "measure"]}, {"required": ["summary"]}],
@@ -69,6 +80,9 @@ class Experiment:
     protocol: str
     supposed: str
     """That the tolerance is what the guarantee allows, where the contract has no number to say so; else empty."""
+    left_out: tuple[str, ...] = ()
+    """Failing runs that the plan says are rightly no longer among the data, and why."""
+    because: str = ""
 
 
 FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 2)}
@@ -118,6 +132,7 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
         )
     if problems.found or within is None or confidence is None:
         return None, tuple(problems.found)
+    left_out = options.get("left_out", {})
     supposed = "" if within.contracts else f"a tolerance of {within.text} is what the guarantee allows"
     return Experiment(
         data,
@@ -132,6 +147,8 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
         floor,
         " ".join(options.get("protocol", "").split()),
         supposed,
+        tuple(str(name) for name in left_out.get("runs", ())),
+        " ".join(left_out.get("because", "").split()),
     ), ()
 
 

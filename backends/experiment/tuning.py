@@ -9,6 +9,9 @@ EXPRESSION_DEPTH = 50
 FAILURES_SHOWN = 20
 """Failing runs that are spelt out."""
 
+FAILURES_KEPT = 200
+"""Failing runs that are kept in a record: more than anybody leaves out one by one."""
+
 RUNS = 100_000
 """Of one table: a larger campaign gives its figures, or several tables."""
 

@@ -265,6 +265,53 @@ def test_a_claimed_rate_allows_failures_only_as_far_as_the_runs_show_it(
     assert refuted.counterexample is not None
 
 
+@pytest.mark.parametrize("change", ["deleted", "renamed", "looser", "figures", "another column"])
+def test_a_failing_run_is_not_forgotten_by_deleting_it(
+    make_job: Callable[..., Any], tmp_path: Path, change: str
+) -> None:
+    """Whoever leaves it out says so, and why; somebody has to stand for that."""
+    (tmp_path / "runs.csv").write_text(rows(*runs(46, "0.2"), "0.3"))
+    first = make_job(**GOOD)
+    refuted = settle(first)
+    assert refuted.verdict is Verdict.REFUTED
+    kept = {o.id: (refuted.details["case"],) for o in first.obligations}
+    options, expected = dict(GOOD), Verdict.UNKNOWN
+    (tmp_path / "runs.csv").write_text(rows(*runs(46, "0.2")))
+    match change:
+        case "renamed":  # another run has its name now
+            (tmp_path / "runs.csv").write_text(rows(*runs(47, "0.2")))
+        case "looser":
+            options["within"], expected = 0.5, Verdict.TESTED
+        case "figures":
+            (tmp_path / "s.yaml").write_text("n: 47\nmean: 0.1 m\nmin: 0.05 m\nmax: 0.2 m\nsource: here\n")
+            options = {"summary": "s.yaml", "within": 0.25, "unit": "m"}
+        case "another column":
+            lines = rows(*runs(46, "0.2")).replace("run,d", "run,e")
+            (tmp_path / "runs.csv").write_text(lines)
+            options["measure"] = "e"
+    outcome = settle(replace(make_job(**options), kept=kept))
+    assert outcome.verdict is expected, outcome.summary
+    if expected is Verdict.UNKNOWN:
+        assert "47; put them back" in outcome.summary
+        explained = replace(make_job(**options, left_out={"runs": [47], "because": "it hit the door"}), kept=kept)
+        outcome = settle(explained)
+        assert outcome.verdict is Verdict.TESTED
+        assert "that run 47 failed does not count: it hit the door" in outcome.hypotheses
+        other = replace(make_job(**options, left_out={"runs": [46], "because": "it hit the door"}), kept=kept)
+        assert settle(other).verdict is Verdict.UNKNOWN
+
+
+def test_a_failing_run_that_is_still_there_says_nothing_new(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    """Under another name, in another place, and where so many runs show the claimed rate all the same."""
+    (tmp_path / "runs.csv").write_text(rows("0.3", *runs(20, "0.2")))
+    first = make_job(**GOOD, at_least=0.9)
+    refuted = settle(first)
+    assert refuted.verdict is Verdict.REFUTED
+    kept = {o.id: (refuted.details["case"],) for o in first.obligations}
+    (tmp_path / "runs.csv").write_text(rows(*runs(70, "0.2"), "0.30"))
+    assert settle(replace(first, kept=kept)).verdict is Verdict.TESTED
+
+
 def test_too_few_runs_are_never_green(make_job: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "runs.csv").write_text(rows("0.1", "0.1"))
     few = settle(make_job(**GOOD))
