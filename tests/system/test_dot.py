@@ -37,7 +37,7 @@ SPACE = [" ", "\n", "\t", " /* } -> { */ ", " // [ {\n", "\n# [ {\n"]
 
 
 def graph(rng: random.Random) -> str:
-    """Words with anything between them; of some statements a word is missing."""
+    """Words with anything between them: mostly a graph."""
     words = [rng.choice(["", "strict", "STRICT"]), rng.choice(["digraph", "DiGraph"]), rng.choice(["", "g", '"{"'])]
     return "".join(word + rng.choice(SPACE) for word in [*words, "{", *statements(rng, 3), "}"])
 
