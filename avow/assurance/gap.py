@@ -15,8 +15,9 @@ from avow.base.persons import one_person
 from avow.base.plain import count
 from avow.base.verdict import Isolation, Link, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, OBSERVED, SIGNED_BY, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
+from avow.isolation.observed import Seen
 from avow.tuning.shown import TOOL_WORDS
 
 
@@ -190,6 +191,10 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             return Suggestion(f"install what `{method}` needs: {info.install}", method)
         if method not in tried:
             return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
+    for item in view.counting:
+        record = item.entry.evidence
+        if record.method in used and (record.verdict is Verdict.ERROR or _undeclared(record)):
+            return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
@@ -201,11 +206,15 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
     new = _new_method(view, demand, used, facts)
     for item in view.counting:
         record = item.entry.evidence
-        if record.method in used and record.verdict is Verdict.ERROR:
-            return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
         if record.method in used and record.verdict is Verdict.UNKNOWN and not record.vacuous:
             return replace(new, text=f"{new.text}; or see why `{record.method}` gave up: {_clipped(record.summary)}")
     return new
+
+
+def _undeclared(record: Evidence) -> bool:
+    """Whether what it used that cannot be recorded kept it from an answer."""
+    rows = record.details.get(OBSERVED, [])
+    return record.verdict is Verdict.UNKNOWN and any(row[0] == Seen.OUTSIDE for row in rows)
 
 
 def _clipped(text: str) -> str:
