@@ -94,6 +94,12 @@ WORKSPACE_CODES = register(
         "Use another name; an invariant speaks of what the program keeps, and of the past (`previous(in.r, 0)`).",
     ),
     declare(
+        "BACKEND008",
+        "backend failed",
+        "Something of the backend that is asked before it runs (tools, files, check, export) raised an exception.",
+        "This is a defect of the backend: tell its authors. The message has its place.",
+    ),
+    declare(
         "POLICY001",
         "no such profile",
         "The plan names a policy profile that does not exist.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,6 +13,7 @@ import yaml
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.base.codec import from_json, to_json
 from avow.base.files import write
 from avow.base.verdict import Verdict
 from avow.pipeline.work import method_job
@@ -93,11 +95,12 @@ class Seeded:
 
 
 def settle(backend: Backend, job: Job, folder: Path, limits: Limits) -> Report:
-    """Export and discharge, as the pipeline does both."""
+    """Export and discharge, as the pipeline does both: it reads the report from a process of its own."""
     for name, text in one_step.export(backend, job).items():
         write(folder / name, text)
     folder.mkdir(parents=True, exist_ok=True)
-    return one_step.discharge(backend, job, folder, limits)
+    report = one_step.discharge(backend, job, folder, limits)
+    return from_json(Report, json.loads(json.dumps(to_json(report), default=str)))
 
 
 def verdicts(job: Job, report: Report) -> dict[str, Verdict]:

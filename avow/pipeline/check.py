@@ -13,6 +13,7 @@ from doit.exceptions import TaskError
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import COMMON_OPTIONS
+from avow.backend_kit.registry import asking
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
@@ -178,14 +179,17 @@ def _method(
         yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
         return
     whole = f"nodes.{node}: {method.id}"
-    wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
+    with asking(tool, "options_schema"):
+        wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
     yield from wrong
     if any(d.is_error for d in wrong):
         method = replace(method, options=_right(tool.options_schema, method.options))
         if any(_schema(tool.options_schema, method.options, whole)):
             return  # without what is wrong they say nothing
     if node in [n.name for n in system.contract.nodes]:
-        said = one_step.check(tool, method_job(system, system.contract.node(node), method))
+        job = method_job(system, system.contract.node(node), method)
+        with asking(tool, "check"):
+            said = tuple(one_step.check(tool, job))
         yield from (d for d in said if not follows(d))
 
 

@@ -10,6 +10,7 @@ from dataclasses import field, replace
 from pathlib import Path, PurePosixPath
 
 from avow.backend_kit import one_step
+from avow.backend_kit.registry import asking
 from avow.base.codec import LATER
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import identity, is_intact, sha256, write
@@ -103,7 +104,9 @@ def generated(work: Work) -> Mapping[str, str]:
     assert isinstance(cut, MethodSlice)
     tool = method_backend(work.system, planned_method(work))
     method = cut.system.plan.node(cut.node).methods[0]
-    return one_step.export(tool, method_job(cut.system, cut.system.contract.node(cut.node), method))
+    job = method_job(cut.system, cut.system.contract.node(cut.node), method)
+    with asking(tool, "export"):
+        return one_step.export(tool, job)
 
 
 def export(workspace: Workspace, work: Work, key: str, beside: Beside | None = None) -> tuple[str, ...]:

@@ -9,12 +9,21 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
-from avow.backend_kit import registry
+from avow.backend_kit import one_step, registry
+from avow.backend_kit.protocol import Limits, Report
+from avow.base import process
+from avow.base.codec import Unreadable
+from avow.base.diagnostics import Rejected
+from avow.conformance.seeded import settle
+from avow.pipeline.check import of_plan
 from avow.pipeline.evidence_keys import surroundings
+from avow.pipeline.export import generated
 from avow.pipeline.work import method_job
+from avow.pipeline.workload import survey
 from avow.system.load import load_system
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "adding-a-backend.md"
@@ -81,3 +90,59 @@ def test_the_optional_members_are_read(workspace: Path, monkeypatch: pytest.Monk
     assert seen["full", "0..3"] == seen["full", "0..4"]
     assert list(registry.backend("coin", ("coin_full",)).codes) == ["COIN101"]
     assert registry.backend("coin", ("coin_plain",)).codes == {}
+
+
+def refused(folder: Path) -> Rejected:
+    """What the stages before a tool runs are refused with."""
+    surveyed = survey(folder)
+    if isinstance(surveyed, Rejected):
+        return surveyed
+    try:
+        of_plan(surveyed.system)
+        generated(surveyed.work("coin"))
+    except Rejected as rejected:
+        return rejected
+    raise AssertionError("nothing is wrong with it")
+
+
+BROKEN = {
+    "tools": ("    def tools(self):\n", "        raise KeyError('odd')\n"),
+    "files": ('    name = "coin"\n', "    def files(self, job):\n        raise KeyError('odd')\n"),
+    "check": ('    name = "coin"\n', "    def check(self, job):\n        raise KeyError('odd')\n"),
+    "options_schema": ('    name = "coin"\n', ""),
+    "export": ("    def export(self, job: Job):\n", "        raise KeyError('odd')\n"),
+}
+
+
+@pytest.mark.parametrize("part", BROKEN)
+def test_what_a_backend_raises_is_told_as_its_defect(
+    part: str, workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever Avow asks it in its own process: by its name and the place, and never as a traceback."""
+    code = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
+    before, added = BROKEN[part]
+    assert before in code
+    text = code.replace(before, before + added)
+    if part == "options_schema":
+        text = text.replace('{"type": "boolean"}', '{"type": "truth"}')
+    (workspace / f"coin_{part}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(workspace))
+    monkeypatch.setattr(process.here, "trusts_plugins", True)
+    folder = workspace / "contracts" / "toss"
+    folder.mkdir()
+    (folder / "system.rcl").write_text("node n { inputs() outputs(b : BOOL) topics() guarantee same (out.b) }\n")
+    (folder / "plan.yaml").write_text(
+        f"plugins: [coin_{part}]\nnodes: {{n: {{methods: [{{coin: {{heads: true}}}}]}}}}\n"
+    )
+    (told,) = refused(folder).diagnostics
+    assert told.code == "BACKEND008"
+    assert f"'coin' failed in {part}: " in told.message
+    assert ".py:" in told.message
+
+
+def test_the_suite_reads_a_report_as_the_pipeline_does(tmp_path: Path) -> None:
+    """From another process: what cannot be said there is a fault in the suite already."""
+    report = Report((), "coin", "1 euro", "toss")  # type: ignore[arg-type]
+    asked = mock.patch.multiple(one_step, export=mock.Mock(return_value={}), discharge=mock.Mock(return_value=report))
+    with asked, pytest.raises(Unreadable, match="command: not a list"):
+        settle(mock.Mock(), mock.Mock(), tmp_path, Limits(10))
