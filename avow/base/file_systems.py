@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import re
 from pathlib import Path
@@ -31,7 +30,6 @@ def _kind(path: str) -> str:
     return max(inside, default=(0, 0, ""))[2]
 
 
-@functools.cache
 def _mounts() -> tuple[tuple[str, str], ...]:
     """(folder with a slash, kind of file system), the later over the earlier."""
     try:

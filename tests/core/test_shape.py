@@ -44,7 +44,6 @@ ELSEWHERE = {
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
     "avow/base/file_systems._known": ONCE,
-    "avow/base/file_systems._mounts": ONCE,
     "avow/base/process.here": PROCESS,
     "avow/base/tools.libraries": ONCE,
     "avow/calculus/kept_answers._kept": "where a work's answers are kept, for the time of that work",

@@ -27,7 +27,7 @@ from avow.pipeline.results import Result
 from avow.pipeline.shortcut import Shortcut
 from avow.pipeline.tasks import wanted as read_wanted
 
-RESULT = Result("crane", 0, {"proved": 3}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
+RESULT = Result("crane", 0, {"proved": 3}, "reports/crane/index.html", (("all", True, "fine"),))
 
 
 def run(workspace: Workspace) -> None:
@@ -162,22 +162,28 @@ def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, m
     mounts = tmp_path / "mountinfo"
     mounts.write_text("\n".join(lines) + "\n")
     monkeypatch.setattr(file_systems, "_MOUNTS", mounts)
-    file_systems._mounts.cache_clear()
-    try:
-        kinds = {p: file_systems._kind(p) for p in ("/", "/home/a", "/media/x", "/media/my stick/a", "/mediax")}
-        assert kinds == {
-            "/": "ext4",
-            "/home/a": "ext4",
-            "/media/x": "tmpfs",
-            "/media/my stick/a": "vfat",
-            "/mediax": "ext4",
-        }
-        assert file_systems._kind("/media/my stick/data/a") == "ext4"
-        mounts.unlink()
-        file_systems._mounts.cache_clear()
-        assert file_systems._kind("/home/a") == ""  # no Linux: nobody says, and the bytes count
-    finally:
-        file_systems._mounts.cache_clear()
+    kinds = {p: file_systems._kind(p) for p in ("/", "/home/a", "/media/x", "/media/my stick/a", "/mediax")}
+    assert kinds == {
+        "/": "ext4",
+        "/home/a": "ext4",
+        "/media/x": "tmpfs",
+        "/media/my stick/a": "vfat",
+        "/mediax": "ext4",
+    }
+    assert file_systems._kind("/media/my stick/data/a") == "ext4"
+    mounts.unlink()
+    assert file_systems._kind("/home/a") == ""  # no Linux: nobody says, and the bytes count
+
+
+def test_what_is_mounted_later_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An editor's server runs for days; a stick that is put in meanwhile has a device that nobody saw."""
+    mounts, root = tmp_path / "mountinfo", "23 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw\n"
+    mounts.write_text(root)
+    monkeypatch.setattr(file_systems, "_MOUNTS", mounts)
+    monkeypatch.setattr(file_systems, "_known", {})
+    assert file_systems.keeps_changes("/home/a", 1)
+    mounts.write_text(f"{root}24 23 8:2 / /media/stick rw - vfat /dev/sdb1 rw\n")
+    assert not file_systems.keeps_changes("/media/stick/a", 2)
 
 
 def test_where_a_contract_was_edited_what_earlier_runs_wrote_is_not_looked_at(
