@@ -134,7 +134,6 @@ class Cluster:
             raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
         for topic in ("print", "warn"):  # else a worker writes on our terminal, and into our answer
             self._client.unsubscribe_topic(topic)
-        self._url = address.url
         self._under_way: dict[str, tuple[Asked, Any]] = {}
         self._tries: dict[str, int] = {}
         self._wanted: set[frozenset[str]] = set()
@@ -195,10 +194,7 @@ class Cluster:
             yield came
 
     def cancel(self, keys: Collection[str]) -> None:
-        with self._lock:
-            futures = [found[1] for key in keys if (found := self._under_way.pop(key, None)) is not None]
-        with contextlib.suppress(Exception):  # who lost its cluster has nothing there to cancel
-            self._client.cancel(futures, force=True)
+        self._drop(keys)
 
     def close(self) -> None:
         self._closed.set()
@@ -208,6 +204,14 @@ class Cluster:
             self._client.close(timeout=5)
 
     # -- inside ------------------------------------------------------------------------------------------
+
+    def _drop(self, keys: Collection[str]) -> list[str]:
+        """Those of the keys that were under way still."""
+        with self._lock:
+            found = {key: self._under_way.pop(key)[1] for key in keys if key in self._under_way}
+        with contextlib.suppress(Exception):  # who lost its cluster has nothing there to cancel
+            self._client.cancel(list(found.values()), force=True)
+        return list(found)
 
     def _fetch(self, asked: Asked, future: Any) -> None:
         came = _fetched(asked, future)
@@ -239,17 +243,16 @@ class Cluster:
             except Exception:  # of whatever kind: there is no answer
                 workers, why = {}, _GONE
             now, was = time.monotonic(), bool(alone)
-            lacking = [w for w in self._wanted if not any(w <= offered.keys() for offered in workers.values())]
-            alone = {wanted: alone.get(wanted, now) for wanted in lacking}
             with self._lock:
-                under_way = [asked for asked, _ in self._under_way.values()]
+                asked_for, under_way = tuple(self._wanted), [asked for asked, _ in self._under_way.values()]
+            lacking = [w for w in asked_for if not any(w <= offered.keys() for offered in workers.values())]
+            alone = {wanted: alone.get(wanted, now) for wanted in lacking}
             waiting = [asked for asked in under_way if frozenset(needs(asked.request)) in alone]
             if waiting and not was and not self._closed.is_set():
                 print(f"warning: {why}; waited for, {CLUSTER_PATIENCE:.0f} s", file=sys.stderr)
             late = [a for a in waiting if now - alone[frozenset(needs(a.request))] > CLUSTER_PATIENCE]
-            self.cancel([asked.key for asked in late])
-            for asked in late:
-                self._came.put(Came(asked.key, failure=why))
+            for key in self._drop([asked.key for asked in late]):
+                self._came.put(Came(key, failure=why))
 
 
 _GONE = "the cluster's scheduler does not answer any more"

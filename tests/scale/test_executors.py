@@ -511,6 +511,27 @@ def test_what_nobody_can_do_any_more_is_not_waited_for(
     assert "Traceback" not in capfd.readouterr().err
 
 
+def test_works_may_be_submitted_while_it_is_looked_for_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing else ends the wait for a cluster that is lost: whoever looks must not fail."""
+    pytest.importorskip("distributed")
+    from avow.pipeline import cluster as there
+
+    cluster = object.__new__(there.Cluster)
+    cluster._lock, cluster._closed, cluster._under_way = threading.Lock(), threading.Event(), {}
+    cluster._wanted = {frozenset({"a"}), frozenset({"b"})}
+
+    class Offered(dict[str, int]):
+        def keys(self) -> Any:
+            cluster._wanted.add(frozenset({f"another {len(cluster._wanted)}"}))
+            cluster._closed.set()  # this look is the last
+            return super().keys()
+
+    monkeypatch.setattr(there, "CLUSTER_LOOK", 0)
+    monkeypatch.setattr(there.Cluster, "_workers", lambda self, seconds: {"w": Offered()})
+    cluster._watch()
+    assert len(cluster._wanted) == 4
+
+
 def test_only_a_worker_of_the_same_code_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from avow.base.diagnostics import Rejected
