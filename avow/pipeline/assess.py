@@ -265,7 +265,6 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         case.system,
         case.exit_code,
         dict(counts),
-        case.grade.value,
         index,
         tuple(gates),
         left_out,

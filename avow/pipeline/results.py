@@ -16,7 +16,6 @@ class Result:
     exit_code: int
     counts: Mapping[str, int]
     """Status → how many obligations have it."""
-    grade: str
     report: str
     gates: tuple[tuple[str, bool, str], ...]
     """(title, passed, reason and what would close it)."""

@@ -16,9 +16,6 @@ from avow.report.source import plain_lines
 from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
 from avow.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
 
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
-
-
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 """What these say is worth as much as their bounds."""
 

@@ -101,11 +101,13 @@ def _verdict(folder: Path, claim: str, deepest: int, deadline: float, outside: O
     for depth in (SPIN_DEPTH, deepest):  # a deep stack costs more than most searches
         command = ["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim]
         done = outside.run(command, cwd=folder, seconds=_left(deadline))
+        if done.timed_out:
+            raise NoOpinion(f"pan gave no answer in {done.seconds:.0f} s")
         text = done.stdout + done.stderr
         if "too small" not in text:
             break
     found = _ERRORS.search(text)
-    if done.timed_out or found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
+    if found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
         raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")
     return found[1] == "0"
 

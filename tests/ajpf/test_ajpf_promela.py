@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -23,6 +24,7 @@ from avow.backends.ajpf.parser import parse_system, read_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
 from avow.backends.ajpf.structure import reduce
+from avow.base.process import Completed
 from avow.isolation.outside import Outside
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -136,6 +138,19 @@ start [perform]
 
 
 @pytest.mark.needs_spin
+def test_a_search_that_takes_too_long_is_told_as_such(tmp_path):
+    asked = []
+
+    def run(command, *, cwd, seconds):
+        asked.append(command)
+        return Completed(tuple(command), None, "", "", 3.0)
+
+    with pytest.raises(spin.NoOpinion) as found:
+        spin._verdict(tmp_path, "c0", 10, spin.time.monotonic() + 100, SimpleNamespace(run=run))
+    assert found.value.reason == "pan gave no answer in 3 s"
+    assert len(asked) == 1
+
+
 def test_what_a_program_may_have_is_translated(tmp_path):
     """Groups, cuts, lists, comparisons, computing, texts, free variables in beliefs and goals."""
     (tmp_path / "e.yaml").write_text("draws: {at_start: true, at_quiescence: once}\npercepts: {x: [p, nothing]}\n")

@@ -9,12 +9,11 @@ import pytest
 from avow.pipeline.results import Result
 from avow.pipeline.summary import append_job_summary, job_summary
 
-GOOD = Result("crane", 0, {"proved": 3, "tested": 1}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
+GOOD = Result("crane", 0, {"proved": 3, "tested": 1}, "reports/crane/index.html", (("all", True, "fine"),))
 BAD = Result(
     "hook",
     1,
     {"refuted": 2},
-    "CHECKED",
     "reports/hook/index.html",
     (("Nothing | is <b>refuted</b>", False, "a\n| b | `c`"),),
 )

@@ -132,7 +132,7 @@ def test_a_binarys_libraries_are_asked_for_once(monkeypatch: pytest.MonkeyPatch)
 
 def test_where_a_tools_library_is_another_there_is_something_to_do(tmp_path: Path) -> None:
     library = _program(tmp_path / "made" / "engine.exe", "1")
-    workspace, done = Workspace(tmp_path / "here"), Result("s", 0, {}, "", "", ())
+    workspace, done = Workspace(tmp_path / "here"), Result("s", 0, {}, "", ())
     for folder in (workspace.contracts, workspace.artifacts, workspace.reports):
         folder.mkdir(parents=True)
     first = shortcut.Shortcut(workspace)
