@@ -16,7 +16,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import ISOLATION, OBSERVED, RETRY, Evidence
+from avow.evidence.record import STANDS_ON, Evidence
 from avow.evidence.status import Status, roll_up, weigh
 from avow.tuning.shown import OLDER_RECORDS, TREND_RUNS
 
@@ -66,13 +66,9 @@ def history(
     return frozenset(kept), History(sum(e.hash not in kept for e in records), _trend(records, claims))
 
 
-_STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
-"""The details by which one of two records may count and the other not."""
-
-
 def _says(record: Evidence, refuting: bool) -> tuple[object, ...]:
     """Two current records, or refutations, of a claim and a method that have this in common count alike."""
-    details = {name: plain(item) for name, item in record.details.items() if refuting or name in _STANDS_ON}
+    details = {name: plain(item) for name, item in record.details.items() if refuting or name in STANDS_ON}
     left = sorted(record.outputs.items()) if "certificate" in details else []
     shown = to_json(record.counterexample), record.key, record.obligation_digest
     return record.backend, record.verdict, record.strength, record.vacuous, canonical([details, left, *shown])

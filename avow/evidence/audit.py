@@ -16,7 +16,7 @@ from avow.base.files import digest_once
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry, Ledger
-from avow.evidence.record import Evidence
+from avow.evidence.record import STANDS_ON, Evidence
 from avow.evidence.status import Status, effective
 
 
@@ -197,11 +197,11 @@ def _files(
     left: dict[str, list[Entry]] = {}
     read: dict[str, tuple[str, Entry]] = {}
     newest: dict[tuple[str, str], str] = {}
-    repeated: dict[tuple[object, ...], int] = {}
+    alike: dict[tuple[object, ...], list[Entry]] = {}
     for entry in entries:  # oldest first: the newest record has the last word
         record = entry.evidence
         newest[record.obligation, record.method] = record.key
-        repeated[_words(record)] = entry.number
+        alike.setdefault(_words(record), []).append(entry)
         for path in record.outputs:
             left.setdefault(path, []).append(entry)
         for path, mark in record.inputs.items():
@@ -214,10 +214,12 @@ def _files(
 
     def serious(entry: Entry) -> bool:
         """Only what a status rests on today can be undermined: files of past attempts may be cleaned away, and of
-        those that say the same only the newest counts."""
+        those that say the same, and stand on the same, only the newest counts."""
         record = entry.evidence
-        pair = (record.obligation, record.method)
-        return repeated[_words(record)] == entry.number and any(k.get(pair) == record.key for k in relied_upon)
+        if all(known.get((record.obligation, record.method)) != record.key for known in relied_upon):
+            return False
+        newer = (e.evidence for e in alike[_words(record)] if e.number > entry.number)
+        return not any(_stands_on(later) == _stands_on(record) for later in newer)
 
     for path, owners in left.items():
         entry = owners[-1]
@@ -231,8 +233,12 @@ def _files(
 
 def _words(record: Evidence) -> tuple[object, ...]:
     """What a record says, to which question: as a case has it when it leaves out all but the newest that say it."""
-    scores = "mutation" in record.details
-    return record.obligation, record.method, record.key, effective(record), record.vacuous, scores
+    return record.obligation, record.method, record.key, effective(record), record.vacuous
+
+
+def _stands_on(record: Evidence) -> Mapping[str, object]:
+    """What decides besides its key whether it counts: of two that differ in it, the earlier may, and the later not."""
+    return {name: record.details[name] for name in STANDS_ON if name in record.details}
 
 
 def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:

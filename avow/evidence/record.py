@@ -30,6 +30,9 @@ OBSERVED = "observed"
 ISOLATION = "isolation"
 """Among a record's details: how far the subject was kept from its judge."""
 
+STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
+"""The details by which one of two records that say the same may count and the other not."""
+
 CASE = "case"
 """Among the details of a refutation: its inputs as data of the backend's own, to be tried first on every later run."""
 

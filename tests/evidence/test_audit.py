@@ -11,6 +11,7 @@ from avow.base.files import digest_file, sha256
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Fault, audit
 from avow.evidence.ledger import Ledger
+from avow.evidence.record import STANDS_ON
 
 
 @pytest.fixture
@@ -126,6 +127,16 @@ def test_of_several_that_say_the_same_the_newest_is_relied_upon(ledger: Ledger, 
     more("node.a", Verdict.REFUTED)
     (tmp_path / "third.log").unlink()
     assert (Fault.GONE, "third.log", True) in faults(ledger, tmp_path)
+
+
+@pytest.mark.parametrize("name", STANDS_ON)
+def test_what_stands_on_something_else_may_be_relied_upon_again(ledger: Ledger, tmp_path: Path, name: str) -> None:
+    """What the newer one saw may be gone, or its day over: then the status rests on the earlier one, and on its log."""
+    first = ledger.records()[0].evidence
+    for told, serious in (("another", True), ("another", True), (None, False)):
+        ledger.append(evidence("node.a", first.verdict, details={} if told is None else {name: told}))
+        (tmp_path / "a.log").unlink(missing_ok=True)
+        assert faults(ledger, tmp_path) == [(Fault.GONE, "a.log", serious)]
 
 
 def test_what_was_tried_in_between_makes_nothing_stale(ledger: Ledger, tmp_path: Path) -> None:
