@@ -7,11 +7,10 @@ import re
 from pathlib import Path
 
 _MOUNTS = Path("/proc/self/mountinfo")
-_KEEPING = frozenset(
-    {"ext2", "ext3", "ext4", "xfs", "btrfs", "tmpfs", "overlay", "zfs", "f2fs", "bcachefs", "jfs", "ramfs", "rootfs"}
-)
+_KEEPING = frozenset({"ext2", "ext3", "ext4", "xfs", "btrfs", "overlay", "zfs", "f2fs", "bcachefs", "jfs"})
 """Those of Linux that do, by their own clock's ticks. FAT has no such time, nor do many ways to somebody else's files
-(NFS, 9p, FUSE) show it as it is now."""
+(NFS, 9p, FUSE) show it as it is now. In memory (tmpfs, ramfs) what a process writes through a mapping moves it once and
+never again; on a disk, once for each time that the page is written back."""
 
 
 def keeps_changes(path: str, device: int) -> bool:

@@ -3,9 +3,9 @@
 After a complete run of everything, `keep` notes the identity (inode, size, times of change) of every file that the
 answer depends on: contracts, artifacts, reports, Avow's own code, and the folders in which tools and packages would
 appear; and the environment. While all that is the same, the next `doit verify` has nothing to do and says so. Times of
-*change* (ctime) cannot be set back, so an edit is never missed; a touched file only costs the long way. Where a file
-system has no such times, the bytes count (`files.identity`). No file is believed that changed within the tick of the
-clock in which it is looked at: a tick passes first.
+*change* (ctime) cannot be set back, so what editors and copies write is never missed; a touched file only costs the
+long way. Where a file system has no such times, the bytes count (`files.identity`). No file is believed that changed
+within the tick of the clock in which it is looked at: a tick passes first.
 """
 
 from __future__ import annotations

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import mmap
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Collection, Iterator
 from dataclasses import replace
@@ -149,6 +151,19 @@ def test_a_whole_second_that_is_over_tells_a_file(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
     monkeypatch.setattr(file_systems, "_known", {})
     assert looked_at(100)
+
+
+@pytest.mark.skipif(file_systems._kind("/dev/shm") != "tmpfs", reason="no file system in memory here")
+def test_what_is_written_through_a_mapping_in_memory_is_seen() -> None:
+    """The first change moves the file's times, the next does not."""
+    with tempfile.NamedTemporaryFile(dir="/dev/shm") as file:
+        path = Path(file.name)
+        path.write_text("text")
+        with path.open("r+b") as opened, mmap.mmap(opened.fileno(), 0) as mapped:
+            mapped[:1] = b"n"
+            first = files.identity(path.stat(), path)
+            mapped[:1] = b"w"
+            assert files.identity(path.stat(), path) != first
 
 
 def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
