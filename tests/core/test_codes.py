@@ -101,7 +101,7 @@ def test_codes_are_found_where_they_stand() -> None:
 
 
 def test_every_code_used_is_declared(where: dict[str, set[str]]) -> None:
-    assert sorted(set(where) - set(declared())) == []
+    assert sorted(set(where) - set(declared())) == [], "declare it (docs/architecture.md, a message)"
 
 
 def test_every_code_declared_is_used(where: dict[str, set[str]]) -> None:
@@ -156,4 +156,4 @@ def test_the_page_is_in_step() -> None:
         page += f"\n## {title}\n\n{head}" + "\n".join(page_rows(codes.values())) + "\n"
     if os.environ.get("AVOW_REFRESH"):
         PAGE.write_text(page, "utf-8")
-    assert PAGE.read_text("utf-8") == page
+    assert PAGE.read_text("utf-8") == page, "AVOW_REFRESH=1 .venv/bin/pytest tests/core/test_codes.py"

@@ -58,7 +58,8 @@ def test_its_page_has_every_option(name: str) -> None:
     own = (folder / f"{name}.md").read_text(encoding="utf-8")
     page = own + "".join((folder / other).read_text(encoding="utf-8") for other in re.findall(r"\((\w+\.md)", own))
     options = keys_of(backend(name).options_schema)
-    assert [option for option in options if not re.search(rf"\b{option}\b", page)] == []
+    missing = [option for option in options if not re.search(rf"\b{option}\b", page)]
+    assert missing == [], f"docs/backends/{name}.md says what it is"
 
 
 def test_the_page_for_those_who_write_one_has_every_member() -> None:

@@ -66,4 +66,4 @@ def test_every_code_is_listed() -> None:
     if os.environ.get("AVOW_REFRESH"):
         PAGE.write_text(head + page, "utf-8")
         found = page
-    assert found == page
+    assert found == page, "AVOW_REFRESH=1 .venv/bin/pytest tests/language/test_docs.py"

@@ -414,4 +414,4 @@ def test_every_format_says_that_it_is_of_an_earlier_state() -> None:
     """Of a system that cannot be read any more; a PDF's text is packed."""
     for made, said in ((as_of_earlier(rover_case()), True), (rover_case(), False)):
         texts = [(name, text) for name, text in formats(made) if isinstance(text, str)]
-        assert [name for name, text in texts if (EARLIER in text) != said] == []
+        assert [name for name, text in texts if (EARLIER in text) != said] == [], "it says EARLIER where case.earlier"

@@ -232,7 +232,7 @@ def test_published_schema_is_the_one_in_use() -> None:
     import json
 
     published = Path(__file__).parents[2] / "docs/schemas/plan.schema.json"
-    assert json.loads(published.read_text()) == plan_schema()
+    assert json.loads(published.read_text()) == plan_schema(), f"copy avow/system/plan.schema.json to {published}"
 
 
 def test_every_key_is_read_and_described() -> None:
