@@ -55,6 +55,7 @@ class Steering:
         """Cases to be tried, a few at a time."""
         every = list(bases)
         waiting = deque(base for base, seen in zip(every, self._looked(every), strict=True) if self._new(seen))
+        waiting.extend(every[: not waiting])  # nothing is compared of any: perhaps of what is beside one
         while waiting and self.left > 0 and len(self.ways) < STEERED_FROM:
             base = waiting.popleft()
             self.ways.append(base)
@@ -100,12 +101,33 @@ class Steering:
                     self._turned[knob.path] += 1
                     self._turned[knob.path, text] += 1
                     yield from (put(base, knob, other) for other in (text, *variants(text)))
+            yield put(base, knob, "1")  # what may be read as a number
+            yield from self._parts(base, knob, seen)
             longer = [int(n) for s in seen.values() for n in (s.left, s.right) if isinstance(n, Fraction)]
             for length in dict.fromkeys(n for n in longer if 2 < n <= 5000):
                 if self._turned[knob.path, length] == 0 and self._turned[knob.path, "long"] < STEERED_TEXTS:
                     self._turned[knob.path, length] += 1
                     self._turned[knob.path, "long"] += 1
                     yield from (put(base, knob, "x" * (length + more)) for more in (-1, 0, 1))
+                    yield from (put(base, knob, text) for text in _padded(f"{at(base, knob)}", length + 1))
+
+    def _parts(self, base: Inputs, knob: Knob, seen: Seen) -> Iterator[Inputs]:
+        """A part of a text that is compared by itself is put right where it stands, also one that is read as a
+        number."""
+        now = f"{at(base, knob)}"
+        pairs = [pair for s in seen.values() for pair in ((s.left, s.right), (s.right, s.left))]
+        for one, other in dict.fromkeys((_spelled(one), wanted) for one, wanted in pairs):
+            for part in _wanted(other):
+                for text in dict.fromkeys(_with_part(now, one, part)):
+                    turned = (knob.path, "part", text)
+                    if text != now and not self._turned[turned] and self._turned[turned[:2]] < STEERED_TEXTS:
+                        self._turned[turned] += 1
+                        self._turned[turned[:2]] += 1
+                        case = put(base, knob, text)
+                        yield case
+                        (then,) = self._looked([case])
+                        if _agreeing(then) > _agreeing(seen):  # on from here: other parts are yet to be put right
+                            yield from self._parts(case, knob, then)
 
     # -- numbers -----------------------------------------------------------------------------------------
 
@@ -121,6 +143,7 @@ class Steering:
                     self._turned[place[0]] += 1
                     self._turned[place, knob.path] += 1
                     yield from self._steered(base, knob, place, apart[place], slope)
+                    yield from _by_bits(base, knob, seen[place])
 
     def _moving(
         self, base: Inputs, numbers: list[Knob], apart: Mapping[Place, Fraction]
@@ -215,6 +238,47 @@ def constants(cases: Sequence[tuple[Sight, ...]]) -> tuple[frozenset[Fraction], 
     numbers = {value for value in steady if isinstance(value, Fraction)}
     numbers |= {Fraction(text) for text in texts if text.isdecimal() and len(text) < 20}
     return frozenset(numbers), frozenset(texts)
+
+
+def _agreeing(seen: Seen) -> int:
+    return sum(s.left == s.right or (s.what == "in" and f"{s.left}" in f"{s.right}") for s in seen.values())
+
+
+def _spelled(side: Any) -> str | None:
+    """As it stands in a text, if it can."""
+    if isinstance(side, Fraction):
+        return str(side.numerator) if side.denominator == 1 else None
+    return side if isinstance(side, str) else None
+
+
+def _wanted(side: Any) -> tuple[str, ...]:
+    """What is put in the place of a part; of a whole number its neighbours, too."""
+    spelled = _spelled(side)
+    if isinstance(side, Fraction) and spelled is not None:
+        return spelled, str(side.numerator - 1), str(side.numerator + 1)
+    return (spelled,) if spelled is not None else ()
+
+
+def _with_part(text: str, one: str | None, other: str) -> tuple[str, ...]:
+    """The text with another part, at its first place and at its last."""
+    if one is None or one not in text:
+        return ()
+    head, _, tail = text.rpartition(one) if one else (text, "", "")
+    return (text.replace(one, other, 1), head + other + tail)
+
+
+def _padded(text: str, length: int) -> tuple[str, str]:
+    return text.rjust(length, "x"), text.ljust(length, "x")
+
+
+def _by_bits(base: Inputs, knob: Knob, sight: Sight) -> Iterator[Inputs]:
+    """With the bits turned in which the two sides differ: where some are masked, or turned, by the subject."""
+    now, left, right = at(base, knob), sight.left, sight.right
+    if knob.whole and isinstance(now, int) and isinstance(left, Fraction) and isinstance(right, Fraction):
+        whole = left.denominator == right.denominator == 1
+        fitting = knob.fitting(Fraction(now ^ left.numerator ^ right.numerator)) if whole else None
+        if fitting is not None:
+            yield put(base, knob, fitting)
 
 
 def _difference(sight: Sight) -> Fraction | None:

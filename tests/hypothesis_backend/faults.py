@@ -80,6 +80,15 @@ FAULTS = (
     Fault("a text made of digits", "str(n) != '7' * 5"),
     Fault("digits of a number", "str(n)[-3:] != '777'"),
     Fault("bits", "n & MASK != MASK", before="MASK = 0b101000100010"),
+    Fault("turned bits", "n ^ 0x5A5A != 0x1234"),
+    Fault("a number in a text", "not (word.isdigit() and int(word) == 4711)"),
+    Fault(
+        "a text of two parts",
+        "parsed(word)",
+        before="def parsed(text):\n    left, _, right = text.partition('=')\n"
+        "    return not (left == 'mode' and right == 'off')",
+    ),
+    Fault("a long text that ends so", "not (word.endswith('.tmp') and len(word) > 12)"),
     Fault("a remainder", "n % 1021 != 1020"),
     Fault("a quotient", "n // 97 != 41"),
     Fault("wrapped", "n == n % 2 ** 20"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -112,6 +113,17 @@ def _side(value: Any) -> Fraction | str:
         (lambda c: [(0, sum(c["s"].items), 9)], lambda c: sum(c["s"].items) == 9),
         (lambda c: [(0, c["w"].strip(), "go")], lambda c: c["w"] != "go" and c["w"].strip() == "go"),
         (lambda c: [(0, len(c["w"]), 90)], lambda c: len(c["w"]) == 91),
+        (lambda c: [(0, c["n"] ^ 0x5A5A, 0x1234)], lambda c: c["n"] ^ 0x5A5A == 0x1234),
+        (lambda c: [(0, c["n"] & 0xFF, 0xA7)], lambda c: c["n"] & 0xFF == 0xA7),
+        (
+            lambda c: [(0, "=", c["w"]), *zip((1, 2), c["w"].split("=")[:2], ("mode", "off"), strict=False)],
+            lambda c: c["w"] == "mode=off",
+        ),
+        (lambda c: [(0, int(n), 4711) for n in re.findall("^[0-9]+$", c["w"])], lambda c: c["w"] == "4711"),
+        (
+            lambda c: [(0, c["w"][-4:], ".tmp"), *[(1, len(c["w"]), 12)] * c["w"].endswith(".tmp")],
+            lambda c: c["w"].endswith(".tmp") and len(c["w"]) > 12,
+        ),
         (
             lambda c: [
                 (0, c["n"], 50),
@@ -120,7 +132,7 @@ def _side(value: Any) -> Fraction | str:
             lambda c: c["n"] > 50 and c["k"] < -70 and c["a"] == c["n"],
         ),
     ],
-    ids=range(11),
+    ids=range(16),
 )
 def test_inputs_are_steered_to_where_two_sides_meet(compared: Any, met: Any) -> None:
     assert any(met(case) for case in steered(compared))
