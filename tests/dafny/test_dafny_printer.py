@@ -6,6 +6,7 @@ import json
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,8 +23,22 @@ from avow.base.verdict import Verdict
 from avow.isolation.outside import Outside
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.load import check_text, load_contract
+from avow.language.operators import OPERATORS
 from avow.language.sorts import BOOL, INTEGER, REAL, Constructor, DataSort, EnumSort, FunctionSort, OpaqueSort
-from avow.language.terms import FALSE, And, Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import (
+    FALSE,
+    And,
+    Builtin,
+    Compare,
+    Literal,
+    Not,
+    Operation,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+)
 from avow.solving.questions import entails
 
 MakeJob = Callable[..., Job]
@@ -364,3 +379,19 @@ def test_an_assumption_about_an_output_is_refused() -> None:
     assert contract is not None
     with pytest.raises(NotExpressible, match="assumption A1: it speaks of the output b"):
         generate(contract.nodes[0], ["G1"])
+
+
+def test_a_function_is_of_the_type_of_what_it_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And not of what it yields; one of three numbers is called once, one of any number two after two."""
+    r, x = Variable(Role.INPUT, "r", REAL), Variable(Role.INPUT, "x", INTEGER)
+
+    def said(name: Builtin, *parts: Variable) -> str:
+        term = Compare("==", Operation(name, parts, INTEGER), Literal(0, INTEGER))
+        return print_clause("c", term, Vocabulary(Names(), Names(), (r, x)))[0].body
+
+    assert said(Builtin.ABS, r) == "Types.AbsReal(in_r) == 0"
+    assert said(Builtin.ABS, x) == "Types.AbsInt(in_x) == 0"
+    assert said(Builtin.MAX, x, x, x) == "Types.MaxInt(Types.MaxInt(in_x, in_x), in_x) == 0"
+    of_three = {"max": replace(OPERATORS["max"], takes=(3, 3))}
+    monkeypatch.setattr("avow.backends.dafny.printer.OPERATORS", {**OPERATORS, **of_three})
+    assert said(Builtin.MAX, x, x, x) == "Types.MaxInt(in_x, in_x, in_x) == 0"
