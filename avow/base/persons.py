@@ -128,8 +128,9 @@ def _folded(name: str) -> str:
 
 def _plain(name: str) -> str:
     """In Latin letters, as far as an alphabet has letters that are named by their sound; two that look like one are
-    that one."""
-    return "".join(_sound(c) for c in _folded(name)).replace("rn", "m").replace("vv", "w")
+    that one, and two by which a letter with marks is written (ä, å, ö, ü) are the letter without."""
+    plain = "".join(_sound(c) for c in _folded(name)).replace("rn", "m").replace("vv", "w")
+    return plain.replace("ae", "a").replace("aa", "a").replace("oe", "o").replace("ue", "u")
 
 
 def _sound(letter: str) -> str:
