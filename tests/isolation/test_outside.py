@@ -205,3 +205,26 @@ def test_a_trace_that_ends_before_its_program_tells_nothing(tmp_path: Path) -> N
     child = next(line for line in whole.splitlines(keepends=True) if b"+++ exited" in line)
     os.truncate(trace._place, whole.index(child) + len(child))
     assert trace.read_all("/bin/sh", tmp_path) is None
+
+
+@pytest.mark.parametrize("number", [b"103", b"3"], ids=["in one count", "in a sandbox's own count"])
+def test_a_program_that_a_subject_starts_from_another_folder_is_known(number: bytes) -> None:
+    """Where nothing tells the folder, the file is an undeclared input, not one of the subject's folder."""
+    told = [
+        (101, b'access("/mark-begin", F_OK) = -1 ENOENT (No such file or directory)'),
+        (101, b"vfork() = 102"),
+        (102, b'chdir("/elsewhere") = 0'),
+        (103, b'execve("./prog", ["./prog"], 0x1 /* 2 vars */) = 0'),
+        (102, b"vfork() = " + number),
+        (103, b""),
+        (102, b""),
+        (101, b'access("/mark-end", F_OK) = -1 ENOENT (No such file or directory)'),
+    ]
+    found = tracing._read(told, "/mark", "/home", "/scratch")
+    assert found is not None
+    asked = [event for event in found.events if event[0] != "state"]
+    assert asked == [("read", "/elsewhere/prog") if number == b"103" else tracing._NOWHERE]
+    said = (103, b'openat(AT_FDCWD</elsewhere>, "/lib/libc.so.6", O_RDONLY) = 3</lib/libc.so.6>')
+    found = tracing._read([*told[:4], said, *told[4:]], "/mark", "/home", "/scratch")
+    assert found is not None
+    assert ("read", "/elsewhere/prog") in found.events
