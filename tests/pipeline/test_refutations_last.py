@@ -52,6 +52,28 @@ def case(place: Workspace) -> dict[str, object]:
     return found
 
 
+def test_data_of_before_a_run_failed_are_judged_again_when_they_are_put_back(tmp_path: Path) -> None:
+    folder = tmp_path / "contracts" / "s"
+    folder.mkdir(parents=True)
+    (folder / "s.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(
+        "system: s\nnodes: {n: {methods: [{experiment: {data: runs.csv, measure: d, within: 10, unit: m}}]}}\n"
+    )
+    place, clean = Workspace(tmp_path), "run,d\n" + "".join(f"{at},{at / 100}\n" for at in range(60))
+
+    def judged(data: str) -> Verdict:
+        (folder / "runs.csv").write_text(data)
+        found = survey(place.contracts / "s")
+        assert isinstance(found, Survey), found
+        for outcome in discharge(place, found.work("experiment"), RUN):
+            return outcome.verdict
+        raise AssertionError("nothing was asked: an earlier answer counts")
+
+    assert judged(clean) is Verdict.TESTED
+    assert judged(clean + "60,11\n") is Verdict.REFUTED
+    assert judged(clean) is Verdict.UNKNOWN
+
+
 @pytest.mark.slow
 def test_a_case_is_tried_first_whatever_the_plan_asks_for(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
