@@ -58,9 +58,9 @@ def _read(sight: Any) -> Sight | None:
     """None of what is no sight: it may be of the subject's making."""
     match sight:
         case [int(place), str(what), left, right]:
-            one = _simple(left)
-            if one is not None:
-                return Sight(place, what, one, _simple(right))
+            one, other = _simple(left), _simple(right)
+            if one is not None and (other is None or type(one) is type(other)):
+                return Sight(place, what, one, other)
     return None
 
 

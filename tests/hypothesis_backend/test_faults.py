@@ -21,6 +21,7 @@ from avow.backends.hypothesis.steer import Steering, constants, repeats
 from avow.base.verdict import Outcome, Verdict
 from avow.conformance.seeded import settle
 from avow.formulas.values import Data, FunctionValue, SequenceValue
+from avow.isolation import scout
 from avow.isolation.scout import Scout, Sight
 from avow.language.sorts import (
     BOOL,
@@ -78,6 +79,15 @@ def test_a_scout_that_is_lost_is_no_verdict(tmp_path: Path) -> None:
     before = "import builtins, os\nif hasattr(builtins, '__avow_see__'):\n    os._exit(3)"
     found = outcome_of(tmp_path, Fault("lost", "True", before=before), faulty=True)
     assert found.verdict is Verdict.TESTED, found.summary
+
+
+@pytest.mark.parametrize(
+    "sight",
+    [[0, "==", [1, 1], "1"], [0, "==", "1", [1, 1]], [0, "==", [1, 0], [1, 1]], [0, "=="], ["0", "==", "a", "a"], 7],
+)
+def test_a_sight_of_the_subjects_making_is_none(sight: object) -> None:
+    """Whoever compares its sides would fail."""
+    assert scout._read(sight) is None
 
 
 # -- what steers, by itself --------------------------------------------------------------------------------------------
