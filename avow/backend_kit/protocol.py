@@ -7,7 +7,10 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import inspect
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
@@ -15,7 +18,7 @@ from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
 from avow.base.codes import Code
-from avow.base.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.records import dataclass
 from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Isolation, Link, Object, Outcome, Verdict
@@ -36,6 +39,7 @@ __all__ = [
     "Report",
     "Tool",
     "Translated",
+    "asking",
     "lacks",
     "wired",
 ]
@@ -178,11 +182,50 @@ class NoModel(Exception):  # noqa: N818 - it names a state
     """There is no model to be run, or it has no answer."""
 
 
+_IN_WORKERS = frozenset({"discharge", "model", "steps"})
+"""Methods that only a worker's process asks: what they raise is the verdict `error`, with the traceback as its log."""
+
+_MADE_WHOLE: Mapping[str, Callable[[Any], Any]] = {"tools": tuple, "check": tuple, "files": tuple, "export": dict}
+"""Methods whose answer is gone through at once, so that what a generator raises is theirs, too."""
+
+
+@contextlib.contextmanager
+def asking(name: str, part: str) -> Iterator[None]:
+    """What a backend raises of itself where it is asked in Avow's own process, as its defect. Raises Rejected."""
+    try:
+        yield
+    except Rejected:
+        raise
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        why = f"{type(error).__name__}: {error}, at {place.filename}:{place.lineno}"
+        raise Rejected(Diagnostic("BACKEND008", f"the backend '{name}' failed in {part}: {why}")) from error
+
+
+def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of a backend, of which whoever calls it is told that what it raises is the backend's defect."""
+    whole = _MADE_WHOLE.get(name, lambda made: made)
+
+    @functools.wraps(method)
+    def told(tool: Backend, *arguments: Any, **named: Any) -> Any:
+        with asking(tool.name, name):
+            return whole(method(tool, *arguments, **named))
+
+    return told
+
+
 class Backend(ABC):
     """A verification method. What has no value here, a backend must say; the rest may stay as it is.
 
     See `docs/adding-a-backend.md`; `avow.conformance` holds a backend to all of this.
     """
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        for name in _asked() - _IN_WORKERS:
+            method = inspect.getattr_static(cls, name)
+            if not isinstance(method, staticmethod | classmethod):
+                setattr(cls, name, _told(name, method))
 
     name: str
     """As plans write it: a word of small letters, digits, `_` and `-`."""
@@ -296,6 +339,11 @@ class Backend(ABC):
         """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
         notation merely cannot say is `Translated.missing`."""
         raise NotImplementedError(notation)
+
+
+def _asked() -> frozenset[str]:
+    """The methods of a backend."""
+    return frozenset(name for name, one in vars(Backend).items() if inspect.isfunction(one) and name[0] != "_")
 
 
 @functools.cache

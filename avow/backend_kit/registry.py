@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
-import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 
@@ -116,19 +115,6 @@ def _plugin(module: str) -> Backend:
     except Exception as error:
         raise Rejected(Diagnostic("BACKEND003", f"the plugin module '{module}' does not load: {error}")) from error
     return _promise(found, module)
-
-
-@contextlib.contextmanager
-def asking(tool: Backend, part: str) -> Iterator[None]:
-    """What a backend raises of itself where it is asked in Avow's own process, as its defect. Raises Rejected."""
-    try:
-        yield
-    except Rejected:
-        raise
-    except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        why = f"{type(error).__name__}: {error}, at {place.filename}:{place.lineno}"
-        raise Rejected(Diagnostic("BACKEND008", f"the backend '{tool.name}' failed in {part}: {why}")) from error
 
 
 def _promise(found: object, where: str) -> Backend:

@@ -96,7 +96,7 @@ WORKSPACE_CODES = register(
     declare(
         "BACKEND008",
         "backend failed",
-        "Something of the backend that is asked before it runs (tools, files, check, export) raised an exception.",
+        "Something of the backend that Avow asks in its own process (all but the run itself) raised an exception.",
         "This is a defect of the backend: tell its authors. The message has its place.",
     ),
     declare(

@@ -12,8 +12,7 @@ from typing import Any
 from doit.exceptions import TaskError
 
 from avow.backend_kit import one_step
-from avow.backend_kit.protocol import COMMON_OPTIONS
-from avow.backend_kit.registry import asking
+from avow.backend_kit.protocol import COMMON_OPTIONS, asking
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
@@ -179,7 +178,7 @@ def _method(
         yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
         return
     whole = f"nodes.{node}: {method.id}"
-    with asking(tool, "options_schema"):
+    with asking(tool.name, "options_schema"):
         wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
     yield from wrong
     if any(d.is_error for d in wrong):
@@ -188,9 +187,7 @@ def _method(
             return  # without what is wrong they say nothing
     if node in [n.name for n in system.contract.nodes]:
         job = method_job(system, system.contract.node(node), method)
-        with asking(tool, "check"):
-            said = tuple(one_step.check(tool, job))
-        yield from (d for d in said if not follows(d))
+        yield from (d for d in one_step.check(tool, job) if not follows(d))
 
 
 def _right(schema: Mapping[str, Any], options: Located) -> Located:

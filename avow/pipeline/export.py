@@ -10,7 +10,6 @@ from dataclasses import field, replace
 from pathlib import Path, PurePosixPath
 
 from avow.backend_kit import one_step
-from avow.backend_kit.registry import asking
 from avow.base.codec import LATER
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import identity, is_intact, sha256, write
@@ -105,8 +104,7 @@ def generated(work: Work) -> Mapping[str, str]:
     tool = method_backend(work.system, planned_method(work))
     method = cut.system.plan.node(cut.node).methods[0]
     job = method_job(cut.system, cut.system.contract.node(cut.node), method)
-    with asking(tool, "export"):
-        return one_step.export(tool, job)
+    return one_step.export(tool, job)
 
 
 def export(workspace: Workspace, work: Work, key: str, beside: Beside | None = None) -> tuple[str, ...]:

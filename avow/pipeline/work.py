@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.linked import beside, models, unrun
 from avow.backend_kit.protocol import Backend, Job, Limits
-from avow.backend_kit.registry import asking, backend, names
+from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_or_missing, sha256
 from avow.base.programs import program_digest
@@ -174,10 +174,8 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
     job = method_job(system, node, method)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
     told = method_options(method)
-    with asking(tool, "tools"):
-        tools = tool_identities(tool, offered)
-    with asking(tool, "files"):
-        files = tool.files(job)
+    tools = tool_identities(tool, offered)
+    files = tool.files(job)
     parts = (
         tool.name,
         tool.version,

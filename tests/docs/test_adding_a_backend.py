@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from unittest import mock
 
 import pytest
+from helpers import avow
 
 from avow.backend_kit import one_step, registry
-from avow.backend_kit.protocol import Limits, Report
+from avow.backend_kit.protocol import Backend, Limits, Report
 from avow.base import process
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
@@ -105,39 +108,89 @@ def refused(folder: Path) -> Rejected:
     raise AssertionError("nothing is wrong with it")
 
 
+ODD = "        raise KeyError('odd')\n"
 BROKEN = {
-    "tools": ("    def tools(self):\n", "        raise KeyError('odd')\n"),
-    "files": ('    name = "coin"\n', "    def files(self, job):\n        raise KeyError('odd')\n"),
-    "check": ('    name = "coin"\n', "    def check(self, job):\n        raise KeyError('odd')\n"),
+    "tools": ("    def tools(self):\n", ODD),
+    "files": ('    name = "coin"\n', "    def files(self, job):\n" + ODD),
+    "check": ('    name = "coin"\n', "    def check(self, job):\n" + ODD + "        yield\n"),
     "options_schema": ('    name = "coin"\n', ""),
-    "export": ("    def export(self, job: Job):\n", "        raise KeyError('odd')\n"),
+    "export": ("    def export(self, job: Job):\n", ODD),
+    "unsaid": ('    name = "coin"\n', "    remembers = True\n    def unsaid(self, node, clause):\n" + ODD),
+    "answers_itself": ('    name = "coin"\n', "    remembers = True\n    def answers_itself(self, job):\n" + ODD),
+    "translate": ('    name = "coin"\n', "    translations = {'odd': ''}\n    def translate(self, *all):\n" + ODD),
+    "suits": ('    name = "coin"\n', "    def suits(self, node):\n" + ODD),
 }
+ASKED = [name for name, kind in vars(Backend).items() if inspect.isfunction(kind) and not name.startswith("_")]
+TOLD_BY_WORKERS = {"discharge", "model", "steps"}  # a crash there is a verdict: tests/pipeline/test_forks.py
 
 
-@pytest.mark.parametrize("part", BROKEN)
-def test_what_a_backend_raises_is_told_as_its_defect(
-    part: str, workspace: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Wherever Avow asks it in its own process: by its name and the place, and never as a traceback."""
+@pytest.fixture
+def broken(request: pytest.FixtureRequest, workspace: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A system whose plug-in fails in one part."""
     code = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
-    before, added = BROKEN[part]
+    before, added = BROKEN[request.param]
     assert before in code
     text = code.replace(before, before + added)
-    if part == "options_schema":
+    if request.param == "options_schema":
         text = text.replace('{"type": "boolean"}', '{"type": "truth"}')
-    (workspace / f"coin_{part}.py").write_text(text)
+    (workspace / f"coin_{request.param}.py").write_text(text)
     monkeypatch.syspath_prepend(str(workspace))
     monkeypatch.setattr(process.here, "trusts_plugins", True)
     folder = workspace / "contracts" / "toss"
     folder.mkdir()
     (folder / "system.rcl").write_text("node n { inputs() outputs(b : BOOL) topics() guarantee same (out.b) }\n")
     (folder / "plan.yaml").write_text(
-        f"plugins: [coin_{part}]\nnodes: {{n: {{methods: [{{coin: {{heads: true}}}}]}}}}\n"
+        f"plugins: [coin_{request.param}]\nnodes: {{n: {{methods: [{{coin: {{heads: true}}}}]}}}}\n"
     )
-    (told,) = refused(folder).diagnostics
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("broken", "part"), [(part, part) for part in BROKEN if part not in ("translate", "suits")], indirect=["broken"]
+)
+def test_what_a_backend_raises_is_told_as_its_defect(part: str, broken: Path) -> None:
+    """Wherever Avow asks it in its own process: by its name and the place, and never as a traceback."""
+    (told,) = refused(broken).diagnostics
     assert told.code == "BACKEND008"
     assert f"'coin' failed in {part}: " in told.message
     assert ".py:" in told.message
+
+
+@pytest.mark.parametrize(
+    ("broken", "part", "command"),
+    [
+        ("tools", "tools", "doctor"),
+        ("translate", "translate", "translate --to odd contracts/toss"),
+        ("suits", "suits", "report contracts/toss"),
+    ],
+    indirect=["broken"],
+)
+def test_what_an_installed_backend_raises_ends_a_command_with_a_message(
+    broken: Path, part: str, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is no plug-in is asked by commands that need no plan of it, too."""
+    (broken / "plan.yaml").write_text("nodes: {n: {methods: []}}\n")
+    everyone = {**registry.installed(), "coin": EntryPoint("coin", f"coin_{part}:BACKEND", registry.GROUP)}
+    monkeypatch.setattr(registry, "installed", lambda: everyone)
+    registry.backend.cache_clear()
+    done = avow(*command.split(), cwd=broken.parent.parent)
+    registry.backend.cache_clear()
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False), done.stderr
+    assert f"error[BACKEND008]: the backend 'coin' failed in {part}: KeyError: 'odd', at " in done.stderr
+
+
+@pytest.mark.parametrize("part", ASKED)
+def test_every_method_of_a_backend_tells_its_defects(part: str) -> None:
+    """Also one that is added to `Backend` tomorrow, whoever calls it."""
+
+    def method(self: object) -> object:
+        raise KeyError("odd")
+
+    named = {"name": "odd", "discharge": method}
+    inherited = type("Some", (), {part: method})
+    for made in (type("Odd", (Backend,), {**named, part: method}), type("Odd", (inherited, Backend), named)):
+        with pytest.raises(KeyError if part in TOLD_BY_WORKERS else Rejected, match="odd"):
+            getattr(made(), part)()
 
 
 def test_the_suite_reads_a_report_as_the_pipeline_does(tmp_path: Path) -> None:
