@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from avow.base.graphs import components
 from avow.base.records import dataclass
 from avow.calculus.variables import Frame
-from avow.formulas.formula import conjunction, negation, rename
+from avow.formulas.formula import conjunction, negation, substitute
 from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
 from avow.sanity.claims import triggers
@@ -77,6 +77,6 @@ def situations(frame: Frame, group: Sequence[str], node: str, clause: str) -> tu
 
 def _qualified(term: Term, node: str) -> Term:
     """A formula of a node over ``node.port``."""
-    return rename(
+    return substitute(
         term, {v: Variable(v.role, f"{node}.{v.name}", v.sort) for v in ports_of(term) if v.role is not Role.BOUND}
     )

@@ -14,7 +14,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Goal, Phase, SideCondition
 from avow.calculus.subsystem_contracts import carried, innermost
-from avow.formulas.formula import free_variables, rename, substitute
+from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import FunctionSort
 from avow.language.subterms import histories
@@ -103,7 +103,7 @@ def _whatever(term: Term, outputs: set[Variable]) -> Term:
     if not spoken or any(isinstance(v.sort, FunctionSort) for v in spoken):
         return term
     bound = {v: Variable(Role.BOUND, "any_" + re.sub(r"\W", "_", v.name), v.sort) for v in spoken}
-    return Quantified(Quantifier.FORALL, tuple(bound.values()), rename(term, bound))
+    return Quantified(Quantifier.FORALL, tuple(bound.values()), substitute(term, bound))
 
 
 class _Names:

@@ -15,7 +15,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame
-from avow.formulas.formula import free_variables, rename
+from avow.formulas.formula import free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
@@ -60,7 +60,7 @@ class Steps:
         if by == 0:
             return term
         changing = free_variables(term) - self.constant
-        return rename(term, {v: Variable(v.role, v.name + BEFORE * by, v.sort) for v in changing})
+        return substitute(term, {v: Variable(v.role, v.name + BEFORE * by, v.sort) for v in changing})
 
     def run(self, length: int) -> dict[str, Term]:
         """What is known of a run of so many steps from the initial values on."""

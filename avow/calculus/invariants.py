@@ -16,7 +16,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.induction import BEFORE, Deeper, Steps, deeper
 from avow.calculus.variables import Frame
-from avow.formulas.formula import free_variables, negation, rename
+from avow.formulas.formula import free_variables, negation, substitute
 from avow.formulas.temporal.cell import CELL, Cell
 from avow.kernel.statements import Claimed, Wiring
 from avow.language.contract import Contract
@@ -129,7 +129,7 @@ def write(frame: Frame, term: Term) -> Written | None:
         if v.role is not Role.BOUND and v not in named:
             return None
         short[v] = Variable(Role.BOUND, f"v{k}", v.sort)
-    return (show_term(rename(term, short), "rcl"), *names)
+    return (show_term(substitute(term, short), "rcl"), *names)
 
 
 def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
@@ -147,7 +147,7 @@ def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
         term = parse_formula(formula, None, contract, extra={name: v.sort for name, v in meant.items()})
     except Rejected:
         return None
-    return rename(term, {Variable(Role.BOUND, name, v.sort): v for name, v in meant.items()})
+    return substitute(term, {Variable(Role.BOUND, name, v.sort): v for name, v in meant.items()})
 
 
 def with_lemmas(told: Wiring, contract: Contract, lemmas: Iterable[Written]) -> Wiring:

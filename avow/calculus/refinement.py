@@ -19,10 +19,11 @@ from avow.calculus.entailment import implied
 from avow.calculus.questions import Answer
 from avow.calculus.refinement_certificate import established
 from avow.calculus.refinement_runs import answered
-from avow.formulas.formula import rename, sort_digest, transform
+from avow.formulas.formula import sort_digest, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.temporal.clock import one_step
+from avow.formulas.traversal import transform
 from avow.kernel.certificate import Certificate
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Node, Port
@@ -265,8 +266,8 @@ def renamed(node: Node, names: Mapping[str, str]) -> Node:
     given = {
         old.variable: new.variable for old, new in zip((*node.inputs, *node.outputs), (*inputs, *outputs), strict=True)
     }
-    assumptions = tuple(replace(a, formula=rename(a.formula, given)) for a in node.assumptions)
-    guarantees = tuple(replace(g, formula=rename(g.formula, given)) for g in node.guarantees)
+    assumptions = tuple(replace(a, formula=substitute(a.formula, given)) for a in node.assumptions)
+    guarantees = tuple(replace(g, formula=substitute(g.formula, given)) for g in node.guarantees)
     return replace(node, inputs=inputs, outputs=outputs, topics=(), assumptions=assumptions, guarantees=guarantees)
 
 

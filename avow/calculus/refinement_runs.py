@@ -17,7 +17,7 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.questions import Answer
 from avow.calculus.requirements import formula_question
 from avow.calculus.variables import framed
-from avow.formulas.formula import rename
+from avow.formulas.formula import substitute
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Contract, Node
@@ -78,7 +78,7 @@ def _of_inputs(clause: Clause, answer: Answer) -> Answer:
 def _placed(node: str, formula: Term) -> Term:
     """A clause's formula over ``node.port``, as a requirement's is."""
     ports: Mapping[Variable, Variable] = {v: replace(v, name=f"{node}.{v.name}") for v in ports_of(formula)}
-    return rename(formula, ports)
+    return substitute(formula, ports)
 
 
 def _alone(composition: Composition, answer: Answer) -> Answer:

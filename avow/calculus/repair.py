@@ -19,7 +19,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
 from avow.formulas.disjunctions import conjuncts
-from avow.formulas.formula import conjunction, disjunction, free_variables, rename, substitute
+from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
@@ -123,7 +123,7 @@ def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) ->
         found = (rewritten, False) if rewritten is not None else None
     if found is None:
         return None
-    formula = rename(found[0], place.ports)
+    formula = substitute(found[0], place.ports)
     if place.kind == "guarantee" and not _may_be_kept(frame, place.of, formula):
         return None
     return Offer(place.kind, place.of, formula, found[1])
@@ -203,7 +203,7 @@ def _may_be_kept(frame: Frame, name: str, further: Term) -> bool:
     meets = conjunction([*(clause.formula for clause in node.guarantees), further])
     outputs = tuple(port.variable for port in node.outputs)
     bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in outputs}
-    possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), rename(meets, bound)) if bound else meets
+    possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), substitute(meets, bound)) if bound else meets
     accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else TRUE
     return entails({}, Implies(accepted, possible), effort=OFFER_STEP_EFFORT).verdict is not Verdict.REFUTED
 

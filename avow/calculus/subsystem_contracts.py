@@ -20,7 +20,7 @@ from avow.base.records import dataclass
 from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame
-from avow.formulas.formula import conjunction, free_variables, rename
+from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
@@ -145,7 +145,7 @@ def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Nod
         for number, name in enumerate(names, start=1):
             original = frame.node(name.node).clause(name.clause)
             term = carried(frame, goal, name) if kind is ClauseKind.ASSUMPTION else frame.clause(name.node, name.clause)
-            formula = rename(term, ports)
+            formula = substitute(term, ports)
             clauses[kind].append(replace(original, kind=kind, name=str(name), position=number, formula=formula))
             used = _carrying(frame, goal, name) if kind is ClauseKind.ASSUMPTION else ()
             told = _under((_said(frame, name, said) for name in used), _said(frame, name, said))
@@ -161,7 +161,8 @@ def composed_node(frame: Frame, goal: Goal, face: Face, said: Said) -> tuple[Nod
     lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
     for verb, these in (("assumes", node.assumptions), ("guarantees", node.guarantees)):
         for clause in these:
-            lines += [f"  {verb} {clause.name}: {show_term(rename(said[ClauseName(node.name, clause.name)], ports))}"]
+            told = substitute(said[ClauseName(node.name, clause.name)], ports)
+            lines.append(f"  {verb} {clause.name}: {show_term(told)}")
     return node, tuple(lines)
 
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from avow.base.files import sha256
 from avow.base.records import dataclass
-from avow.formulas.formula import digest, free_variables, rename, substitute
+from avow.formulas.formula import digest, free_variables, substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
 from avow.formulas.temporal.cells import Records, compile_node, remembers
@@ -413,8 +413,8 @@ def observing(name: str, formula: Term, longest: Fraction | None, *, together: b
     for event in (v for v in spoken if is_arrival(v)):
         node, _, port = event.name.removeprefix("arrived ").partition(".")
         names[event] = replace(event, name=f"{node}.arrived {port}")
-    cells = (replace(cell, before=names[cell.before], now=rename(cell.now, names)) for cell in records.cells)
-    return Observed(rename(said, names), tuple(cells))
+    cells = (replace(cell, before=names[cell.before], now=substitute(cell.now, names)) for cell in records.cells)
+    return Observed(substitute(said, names), tuple(cells))
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:

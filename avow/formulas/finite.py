@@ -5,16 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from fractions import Fraction
 from itertools import product
 from math import prod
 
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation, substitute
 from avow.formulas.renaming import map_children
-from avow.formulas.values import Element, Value
-from avow.language.sorts import BOOL, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
-from avow.language.terms import Compare, EnumValue, Literal, Quantified, Quantifier, Term, Variable
+from avow.formulas.values import Value
+from avow.formulas.written import value_term
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
+from avow.language.terms import Compare, Quantified, Quantifier, Term, Variable
 from avow.tuning.bounds import VALUES_WRITTEN_OUT
 
 
@@ -63,21 +63,9 @@ class Ranges:
                 return disjunction(alone)
 
 
+_SIMPLE = BoolSort | EnumSort | IntegerSort | NaturalSort | RealSort | StringSort
+"""Sorts whose values are written out; any other keeps its range."""
+
+
 def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
-    """The values as terms; none if one of them has no simple term."""
-    found: list[Term] = []
-    for value in dict.fromkeys(values):
-        match sort, value:
-            case EnumSort(), Element(name=name):
-                found.append(EnumValue(name, sort))
-            case _, bool() if sort == BOOL:
-                found.append(Literal(value, sort))
-            case RealSort(), int() | Fraction():
-                found.append(Literal(Fraction(value), sort))
-            case IntegerSort() | NaturalSort(), int():
-                found.append(Literal(value, sort))
-            case StringSort(), str():
-                found.append(Literal(value, sort))
-            case _:  # no simple term: the sort keeps its range
-                return []
-    return found
+    return [value_term(value, sort) for value in dict.fromkeys(values)] if isinstance(sort, _SIMPLE) else []

@@ -13,7 +13,7 @@ from typing import assert_never
 
 from avow.base.remembered import by_identity
 from avow.formulas.flattening import flattened
-from avow.formulas.traversal import Steps, run, transform
+from avow.formulas.traversal import Steps, run
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPPOSITE
 from avow.language.sorts import (
@@ -68,25 +68,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-
-__all__ = [
-    "conjunction",
-    "digest",
-    "disjunction",
-    "equation",
-    "free_variables",
-    "has_nonlinear",
-    "meaning",
-    "negation",
-    "node_digest",
-    "normalise",
-    "opposite",
-    "rename",
-    "sort_digest",
-    "substitute",
-    "transform",
-]
-
 
 # -- building ----------------------------------------------------------------------------------------------------------
 
@@ -176,11 +157,6 @@ def substitute(term: Term, mapping: Mapping[Variable, Term]) -> Term:
         return current.rebuild(tuple(parts)) if parts else current
 
     return run(steps(term, dict(mapping)))
-
-
-def rename(term: Term, mapping: Mapping[Variable, Variable]) -> Term:
-    """`substitute`, for variables only."""
-    return substitute(term, mapping)
 
 
 def fresh(name: str, taken: Collection[str]) -> str:

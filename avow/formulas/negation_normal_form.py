@@ -22,7 +22,6 @@ from avow.language.terms import (
 )
 
 _DUAL = {Quantifier.FORALL: Quantifier.EXISTS, Quantifier.EXISTS: Quantifier.FORALL}
-_OPPOSITE = {"==": "!=", "!=": "=="}
 
 
 def push_negations(term: Term) -> Term:

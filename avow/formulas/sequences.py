@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from typing import Generic, TypeVar
 
 from avow.base.records import dataclass
-from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.formula import conjunction, free_variables, fresh
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth
 from avow.formulas.values import FunctionValue, SequenceValue, Value
@@ -163,7 +163,4 @@ def _item(s: Variable) -> Sort:
 
 def _position(within: Term) -> Variable:
     taken = {part.name for part in subterms(within) if isinstance(part, Variable)}
-    name = "k"
-    while name in taken:
-        name += "'"
-    return Variable(Role.BOUND, name, NATURAL)
+    return Variable(Role.BOUND, fresh("k", taken), NATURAL)

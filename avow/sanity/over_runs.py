@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from avow.base.verdict import Verdict
-from avow.formulas.formula import conjunction, disjunction, free_variables, negation, rename, substitute
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cells import Remembering
 from avow.formulas.temporal.clock import one_step
 from avow.language.contract import ClauseKind, Node
@@ -259,7 +259,7 @@ class OverRuns:
             facts[f"step {step}"] = self._at(kept, step)
             for cell in self.remembering.cells:
                 after = Variable(Role.INPUT, f"{cell.name} after", cell.sort)
-                moved = rename(self._at(cell.leaves(after), step), {after: self._named(cell.before, step + 1)})
+                moved = substitute(self._at(cell.leaves(after), step), {after: self._named(cell.before, step + 1)})
                 facts[f"{cell.name} {step}"] = moved
         return facts
 
@@ -273,7 +273,7 @@ class OverRuns:
     def _at(self, formula: Term, step: int) -> Term:
         """The formula at a step of a run."""
         own = {v for v in free_variables(formula) if v.role is not Role.BOUND and not v.name.endswith(" after")}
-        return rename(formula, {v: self._named(v, step) for v in own})
+        return substitute(formula, {v: self._named(v, step) for v in own})
 
     def _named(self, variable: Variable, step: int) -> Variable:
         return Variable(variable.role, f"{variable.name} at {step}", variable.sort)
