@@ -13,12 +13,12 @@ from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.persons import one_person
 from avow.base.plain import count
+from avow.base.tuning.shown import TOOL_WORDS
 from avow.base.verdict import Isolation, Link, Verdict
+from avow.evidence.currency import undeclared
 from avow.evidence.obligation import Kind
-from avow.evidence.record import ISOLATION, OBSERVED, SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
-from avow.isolation.observed import Seen
-from avow.tuning.shown import TOOL_WORDS
 
 
 def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
@@ -193,7 +193,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
     for item in view.counting:
         record = item.entry.evidence
-        if record.method in used and (record.verdict is Verdict.ERROR or _undeclared(record)):
+        if record.method in used and (record.verdict is Verdict.ERROR or undeclared(record)):
             return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
@@ -209,12 +209,6 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if record.method in used and record.verdict is Verdict.UNKNOWN and not record.vacuous:
             return replace(new, text=f"{new.text}; or see why `{record.method}` gave up: {_clipped(record.summary)}")
     return new
-
-
-def _undeclared(record: Evidence) -> bool:
-    """Whether what it used that cannot be recorded kept it from an answer."""
-    rows = record.details.get(OBSERVED, [])
-    return record.verdict is Verdict.UNKNOWN and any(row[0] == Seen.OUTSIDE for row in rows)
 
 
 def _clipped(text: str) -> str:

@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 from avow.assurance.naming import is_advice
 from avow.base.codec import canonical, plain, to_json
 from avow.base.records import dataclass
+from avow.base.tuning.shown import OLDER_RECORDS, TREND_RUNS
 from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import STANDS_ON, Evidence
 from avow.evidence.status import Status, roll_up, weigh
-from avow.tuning.shown import OLDER_RECORDS, TREND_RUNS
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from xml.parsers import expat
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import bare
-from avow.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
+from avow.base.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
 
 _BLOCKS = frozenset(
     (

@@ -16,11 +16,11 @@ from avow.backend_kit.protocol import Backend, Job, NoModel, wired
 from avow.backend_kit.registry import backend, judge_of_runs
 from avow.base.diagnostics import Rejected
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.formulas.values import Element, SequenceValue, Value, show
 from avow.system.plan import Method, System
-from avow.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 
 Step = Mapping[str, Value]
 """A step's inputs and outputs by qualified name."""

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import COUNTS_GUESSED
 from avow.formulas.formula import equation, free_variables, substitute
 from avow.formulas.temporal.cell import Cell, Unsaid
 from avow.formulas.temporal.cells import Records, written
@@ -41,7 +42,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.bounds import COUNTS_GUESSED
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 

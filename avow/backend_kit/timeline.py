@@ -20,7 +20,7 @@ from markupsafe import Markup, escape
 from avow.base.codec import Unreadable, called, from_json
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.tuning.shown import TIMELINE_COLUMNS
+from avow.base.tuning.shown import TIMELINE_COLUMNS
 
 KINDS: Mapping[str, tuple[str, str]] = {
     "broken": ("M-4 -4l8 8m0 -8l-8 8", "broken"),

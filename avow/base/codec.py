@@ -27,7 +27,7 @@ from enum import StrEnum
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
-from avow.tuning.shown import FAULTS
+from avow.base.tuning.shown import FAULTS
 
 T = TypeVar("T")
 Read = Callable[[Any], Any]

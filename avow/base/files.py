@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from avow.base.file_systems import keeps_changes
-from avow.tuning.running import READER_SECONDS, SETTLED_NS
+from avow.base.tuning.running import READER_SECONDS, SETTLED_NS
 
 PART = ".part"
 """How the name of a file ends that is still being written; one that stays was left by a killed process."""

@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from avow.tuning.running import FORK_LOOK
-from avow.tuning.sizes import OUTPUT_KEPT
+from avow.base.tuning.running import FORK_LOOK
+from avow.base.tuning.sizes import OUTPUT_KEPT
 
 _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGXFSZ})
 """How a tool ends that somebody ended: a person, or a system out of memory or room. A crash of its own is none of

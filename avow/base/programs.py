@@ -14,8 +14,8 @@ from avow.base import process
 from avow.base.files import digest_or_missing, identity, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.base.records import dataclass
-from avow.tuning.running import VERSION_SECONDS
-from avow.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
+from avow.base.tuning.running import VERSION_SECONDS
+from avow.base.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
 
 _SHARED = frozenset({"bin", "sbin", "lib", "lib64", "tmp", "etc", "dev"})
 """Folders of many programs: what lies in one says nothing of a program in it."""

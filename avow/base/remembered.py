@@ -21,7 +21,7 @@ from avow.base.diagnostics import Span
 from avow.base.files import PART, sha256, write
 from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.records import dataclass
-from avow.tuning.sizes import NOTED, SHELVES
+from avow.base.tuning.sizes import NOTED, SHELVES
 
 P = ParamSpec("P")
 T = TypeVar("T")

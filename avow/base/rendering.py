@@ -19,8 +19,8 @@ from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.tuning.shown import SOURCE_COLUMNS
-from avow.tuning.sizes import SOURCE_SHOWN
+from avow.base.tuning.shown import SOURCE_COLUMNS
+from avow.base.tuning.sizes import SOURCE_SHOWN
 
 _TAB = 4
 _COLOURS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.NOTE: "36"}

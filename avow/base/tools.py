@@ -18,7 +18,7 @@ from avow.base.files import sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.base.programs import kept_digest, program_digest
 from avow.base.records import dataclass
-from avow.tuning.running import VERSION_SECONDS
+from avow.base.tuning.running import VERSION_SECONDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from avow.base.tuning.bounds import CHOICES_FOUND
 from avow.calculus.scenario import CannotRun, Point
 from avow.formulas.formula import free_variables
 from avow.formulas.values import FunctionValue, Value
@@ -15,7 +16,6 @@ from avow.solving.checking import put
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import CHOICES_FOUND
 
 Values = dict[str, Value]
 

@@ -8,6 +8,7 @@ the scenario gives, are not.
 
 from __future__ import annotations
 
+from avow.base.tuning.effort import CUT_EFFORT
 from avow.calculus.choices import Values, by_variable
 from avow.calculus.node_outputs import Answerer, is_restricted, known_of
 from avow.calculus.open_values import is_open
@@ -21,7 +22,6 @@ from avow.solving.limits import spent
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import CUT_EFFORT
 
 
 def first_cut(node: Answerer, deadline: float) -> str:

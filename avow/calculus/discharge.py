@@ -15,6 +15,7 @@ from dataclasses import replace
 from avow.base.files import sha256
 from avow.base.graphs import components, cycle_in
 from avow.base.records import dataclass
+from avow.base.tuning.effort import NARROW_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
@@ -25,7 +26,6 @@ from avow.calculus.repair import Offer, environment, initial_values, offers, pro
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.tuning.effort import NARROW_EFFORT
 
 Hypotheses = dict[str, Term]
 

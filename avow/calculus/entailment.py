@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from avow.base.tuning.bounds import WITNESSES_TRIED
+from avow.base.tuning.effort import QUICK_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.kept_answers import entailed_before, keep_entailed
 from avow.formulas.formula import substitute
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
-from avow.tuning.bounds import WITNESSES_TRIED
-from avow.tuning.effort import QUICK_EFFORT
 
 
 def implied(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
+from avow.base.tuning.bounds import VALUES_TRIED
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
@@ -13,7 +14,6 @@ from avow.formulas.written import value_term
 from avow.language.sorts import SetSort
 from avow.language.terms import Compare, In, Not, SetTerm, Term, Variable
 from avow.solving.questions import entails, solve
-from avow.tuning.bounds import VALUES_TRIED
 
 
 def enumerated(

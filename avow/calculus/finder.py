@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
+from avow.base.tuning.effort import CERTIFICATE_NET_MS, CERTIFICATE_STEPS
 from avow.calculus.invariants import label
 from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
@@ -28,8 +30,6 @@ from avow.kernel.statements import Claimed, Statement, Statements
 from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
-from avow.tuning.effort import CERTIFICATE_NET_MS, CERTIFICATE_STEPS
 
 
 @dataclass(frozen=True, slots=True)

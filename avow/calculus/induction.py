@@ -12,6 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import DEEPEST_INDUCTION
+from avow.base.tuning.effort import QUICK_EFFORT
+from avow.base.tuning.shown import STEP_VARIABLES
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame
@@ -22,9 +25,6 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
-from avow.tuning.bounds import DEEPEST_INDUCTION
-from avow.tuning.effort import QUICK_EFFORT
-from avow.tuning.shown import STEP_VARIABLES
 
 BEFORE = "@before"
 """Ends the name of a value of the step before."""

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Rejected
+from avow.base.tuning.bounds import DEEPEST_INDUCTION, LONGEST_RUN, LONGEST_UNROLLING
+from avow.base.tuning.effort import DEEPER_EFFORT, INVARIANT_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.entailment import implied
 from avow.calculus.induction import BEFORE, Deeper, Steps, deeper
@@ -24,8 +26,6 @@ from avow.language.load import parse_formula
 from avow.language.printer import show_term
 from avow.language.terms import Past, Role, Term, Variable
 from avow.solving.invariants import Found, invariant
-from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_RUN, LONGEST_UNROLLING
-from avow.tuning.effort import DEEPER_EFFORT, INVARIANT_EFFORT
 
 Written = tuple[str, ...]
 """A formula, and the values of the system (``out.count.n``) that its names v0, v1, … stand for."""

@@ -18,12 +18,12 @@ from dataclasses import field
 from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import ANSWERS_KEPT
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest
 from avow.kernel.solvers import Said, ask_z3
 from avow.language.terms import Term
 from avow.solving.questions import Entailment
-from avow.tuning.sizes import ANSWERS_KEPT
 
 
 @dataclass(frozen=True, slots=True)

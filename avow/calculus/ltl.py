@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import assert_never
 
+from avow.base.tuning.effort import PRODUCT_STEPS
 from avow.formulas import ltl
 from avow.formulas.lasso import Lasso as Lasso
 from avow.formulas.lasso import accepted_run, monitor, rejected_prefix
 from avow.formulas.ltl import TooLarge
 from avow.solving.limits import spend, spent
 from avow.system.temporal import Operator, Property, State
-from avow.tuning.effort import PRODUCT_STEPS
 
 
 def normal(formula: Property, positive: bool = True) -> ltl.Normal[State]:

@@ -14,6 +14,8 @@ from dataclasses import field
 from random import Random
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
+from avow.base.tuning.shown import STEP_VARIABLES
 from avow.base.verdict import Counterexample, Verdict
 from avow.base.verdict import bound as named
 from avow.calculus.discharge import Bounds
@@ -30,8 +32,6 @@ from avow.formulas.values import Value
 from avow.language.terms import Term
 from avow.solving.limits import spent, tried, until
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
-from avow.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
-from avow.tuning.shown import STEP_VARIABLES
 
 _Memory = tuple[object, ...]
 

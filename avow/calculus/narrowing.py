@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import PARTIAL_ANSWERS, PARTIAL_ANSWERS_AGAIN
+from avow.base.tuning.effort import SEARCH_STEPS
 from avow.calculus.open_values import Holds, Lazy, Point, Undecided, Values, asking, decided, lazy_names, opened
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.formula import free_variables
@@ -20,8 +22,6 @@ from avow.language.contract import Clause
 from avow.language.sorts import FunctionSort
 from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
 from avow.solving.limits import spend
-from avow.tuning.bounds import PARTIAL_ANSWERS, PARTIAL_ANSWERS_AGAIN
-from avow.tuning.effort import SEARCH_STEPS
 
 # -- equations ---------------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 from avow.calculus.choices import Values, by_variable, definition, search
 from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
 from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
@@ -23,7 +24,6 @@ from avow.language.terms import Role, Term, Variable
 from avow.solving.checking import put
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,12 @@ import html
 from collections.abc import Iterator, Mapping
 
 from avow.base.records import dataclass
+from avow.base.tuning.shown import RULE_NODES
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.language.styles import latex_escape
 from avow.system.graph import Edge
-from avow.tuning.shown import RULE_NODES
 
 # -- a little mathematics ----------------------------------------------------------------------------------------------
 

@@ -12,12 +12,12 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
 from avow.evaluation.evaluate import Domains, NotEvaluable, finite_values
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import FunctionSort, SequenceSort
 from avow.language.terms import Term
-from avow.tuning.bounds import POINTS_OF_ARGUMENTS
 
 Values = dict[str, Value]
 Point = tuple[Value, ...]

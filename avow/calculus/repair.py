@@ -15,6 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
+from avow.base.tuning.effort import OFFER_STEP_EFFORT, OFFER_WRITING_STEPS, OFFERS_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
@@ -44,8 +46,6 @@ from avow.solving.limits import spend, spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
-from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
-from avow.tuning.effort import OFFER_STEP_EFFORT, OFFER_WRITING_STEPS, OFFERS_EFFORT
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from avow.base.tuning.bounds import COMPLETIONS
+from avow.base.tuning.effort import REPLAY_EFFORT
 from avow.calculus.node_outputs import Doubts, judge
 from avow.calculus.open_values import Undecided, closed, is_open
 from avow.calculus.scenario import CannotRun, key
@@ -23,8 +25,6 @@ from avow.language.terms import Role, Term
 from avow.solving.replay import replay
 from avow.system.formulas import initial_condition
 from avow.system.temporal import Operator, Property, State, states_of
-from avow.tuning.bounds import COMPLETIONS
-from avow.tuning.effort import REPLAY_EFFORT
 
 Truth = Mapping[State, bool]
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.base.tuning.effort import QUICK_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
@@ -31,7 +32,6 @@ from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, show_property
-from avow.tuning.effort import QUICK_EFFORT
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,8 @@ from itertools import product
 from avow.base.diagnostics import Rejected
 from avow.base.plain import listed
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
+from avow.base.tuning.shown import DOMAIN_VALUES
 from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
@@ -38,8 +40,6 @@ from avow.language.sorts import (
 from avow.language.terms import Literal
 from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
-from avow.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
-from avow.tuning.shown import DOMAIN_VALUES
 
 _SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
 

@@ -14,6 +14,8 @@ from random import Random
 
 from avow.base.graphs import components, cycles_in
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import NODE_ANSWERS
+from avow.base.tuning.effort import SEARCH_STEPS
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.cuts import another_first, first_cut
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
@@ -33,8 +35,6 @@ from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
 from avow.system.formulas import initial_condition
 from avow.system.plan import Endpoint
-from avow.tuning.bounds import NODE_ANSWERS
-from avow.tuning.effort import SEARCH_STEPS
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ import click
 
 from avow.base.codec import document, to_json
 from avow.base.plain import count
+from avow.base.tuning.shown import DIFF_REASONS
 from avow.cli.options import json_option
-from avow.tuning.shown import DIFF_REASONS
 
 if TYPE_CHECKING:
     from avow.assurance.compare import Change

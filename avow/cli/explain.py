@@ -10,8 +10,8 @@ import click
 
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tuning.shown import DIFF_REASONS
 from avow.cli.options import json_option
-from avow.tuning.shown import DIFF_REASONS
 
 if TYPE_CHECKING:
     from avow.assurance.model import Case, ObligationView

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
+from avow.base.tuning.sizes import CONTRACT_BYTES
 from avow.cli.options import ContractArgument, json_option
-from avow.tuning.sizes import CONTRACT_BYTES
 
 if TYPE_CHECKING:
     from avow.base.diagnostics import Diagnostic

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.tuning.running import DRAFT_MESSAGES
+from avow.base.tuning.running import DRAFT_MESSAGES
 
 if TYPE_CHECKING:
     from avow.ros.bags import Carried
@@ -81,10 +81,10 @@ _OPTION = (
 
 
 def _listing(graph: str) -> Listing:
+    from avow.base.tuning.sizes import ROS_GRAPH_BYTES
     from avow.ros.dds import LOOPBACK, ask_domain, domain_of
     from avow.ros.listing import NoListing, parse_listing
     from avow.ros.master import ask_master
-    from avow.tuning.sizes import ROS_GRAPH_BYTES
 
     try:
         if _MASTER.match(graph):

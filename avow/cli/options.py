@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from avow.base.tuning.sizes import LONGEST_TIMEOUT
 from avow.cli.paths import PathArgument
-from avow.tuning.sizes import LONGEST_TIMEOUT
 
 if TYPE_CHECKING:
     import os

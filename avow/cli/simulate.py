@@ -30,6 +30,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     from random import Random
 
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.tuning.bounds import WALKS
     from avow.base.workspace import system_folder
     from avow.calculus.scenario import CannotRun, world
     from avow.calculus.transition import Machine
@@ -37,7 +38,6 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     from avow.formulas.temporal.ages import CLOCK
     from avow.formulas.values import show
     from avow.system.load import load_path
-    from avow.tuning.bounds import WALKS
 
     loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     try:

@@ -17,6 +17,7 @@ from avow.backend_kit import registry
 from avow.backend_kit.protocol import COMMON_OPTIONS, Backend, Job, Limits, lacks
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import find_tool
+from avow.base.tuning.running import CONFORMANCE_PATIENCE
 from avow.base.verdict import Outcome, Verdict
 from avow.conformance.seeded import Seeded, settle, verdicts
 from avow.evidence.status import Status
@@ -27,7 +28,6 @@ from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.work import method_job
 from avow.solving.smtlib import end_cvc5
 from avow.system.plan import System
-from avow.tuning.running import CONFORMANCE_PATIENCE
 
 _HOSTILE = ("class", "ensures", "lambda", "None", "self", "exit", "con", "x" * 120)
 """Names that are plain words of the contract language, and something else to a tool, a file system or Python."""

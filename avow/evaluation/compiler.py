@@ -11,6 +11,7 @@ from itertools import product
 from typing import Any, Protocol, assert_never
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import VALUES_ENUMERATED
 from avow.formulas import values
 from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, Element, FunctionValue, Value
@@ -60,7 +61,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import VALUES_ENUMERATED
 
 Env = list[Any]
 Code = Callable[[Env], Any]

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from avow.base.records import dataclass
-from avow.tuning.bounds import CONSTRAINTS
+from avow.base.tuning.bounds import CONSTRAINTS
 
 
 class TooMany(Exception):  # noqa: N818 - it names what happened

@@ -11,6 +11,7 @@ from fractions import Fraction
 from itertools import product
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import LINEAR_CASES
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.disjunctions import Part, conjunction
@@ -32,7 +33,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.bounds import LINEAR_CASES
 
 Alternatives = Callable[[Env], list[tuple[Constraint, ...]]]
 """The formula as a disjunction of systems, given the other variables' values."""

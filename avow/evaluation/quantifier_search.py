@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from avow.base.tuning.bounds import DISJUNCTION_DEPTH, VALUES_ENUMERATED
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
 from avow.evaluation.patterns import pattern, patterns
 from avow.evaluation.table_rows import Lookup, Step, Unrestricted, table_rows
@@ -35,7 +36,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import DISJUNCTION_DEPTH, VALUES_ENUMERATED
 
 Doubt = NotEvaluable | None
 """What comes with a candidate: None where it surely satisfies the body, else why that could not be found out."""

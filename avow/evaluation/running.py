@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from avow.base.tuning.bounds import INSTANCES
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.tables import compile_table
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.values import FunctionValue, Value
-from avow.tuning.bounds import INSTANCES
 
 
 class Keeper:

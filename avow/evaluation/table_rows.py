@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import ROWS_WITHOUT_INDEX
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.patterns import Match, patterns
 from avow.formulas.disjunctions import Part
 from avow.formulas.formula import digest
 from avow.formulas.renaming import bound_names
 from avow.language.terms import Apply, Not, Quantified, Role, Term, Variable
-from avow.tuning.bounds import ROWS_WITHOUT_INDEX
 
 
 class Unrestricted(NotEvaluable):

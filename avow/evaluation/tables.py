@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import assert_never
 
+from avow.base.tuning.bounds import TABLE_ROUNDS
 from avow.evaluation.compiler import Compiler, NotEvaluable, finite_values
 from avow.evaluation.evaluate import SEARCHES, compile_term, filler, guarded
 from avow.evaluation.quantifier_search import Search
@@ -28,7 +29,6 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.terms import Apply, Conditional, Role, Term, Variable
-from avow.tuning.bounds import TABLE_ROUNDS
 
 Table = Callable[[Mapping[str, Value], Value | None], FunctionValue]
 """From a valuation, and the function's value before (a guess at its points), to its value."""

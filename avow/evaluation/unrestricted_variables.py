@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import REPRESENTATIVES
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.linear_search import linear_step
 from avow.formulas import values
@@ -44,7 +45,6 @@ from avow.language.terms import (
     TupleTerm,
     Variable,
 )
-from avow.tuning.bounds import REPRESENTATIVES
 
 
 def leftover_steps(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from avow.base.codec import from_json
 from avow.base.files import sha256
-from avow.base.verdict import Isolation
+from avow.base.verdict import Isolation, Verdict
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import ISOLATION, OBSERVED, Evidence
 from avow.isolation.level import wanted
@@ -79,6 +79,12 @@ def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
             continue
         found |= {(o.path, o.kind): o for o in seen if o.kind is not Seen.OUTSIDE}
     return tuple(Observed(o.kind, os.path.join(root, o.path), o.digest) for o in found.values())  # noqa: PTH118
+
+
+def undeclared(record: Evidence) -> bool:
+    """Whether what it used that cannot be recorded kept it from an answer."""
+    rows = record.details.get(OBSERVED, [])
+    return record.verdict is Verdict.UNKNOWN and any(row[0] == Seen.OUTSIDE for row in rows)
 
 
 def _apart(record: Evidence) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from avow.base.tuning.bounds import ATOMS_MADE
 from avow.formulas.traversal import Steps, run
 from avow.language.operators import definition
 from avow.language.sorts import BOOL
@@ -27,7 +28,6 @@ from avow.language.terms import (
     Quantified,
     Term,
 )
-from avow.tuning.bounds import ATOMS_MADE
 
 
 class TooManyCases(Exception):  # noqa: N818 - it names what the formula has

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from itertools import product
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import DISJUNCTIONS_MADE
+from avow.base.tuning.sizes import CONDITION_DEPTH
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth
@@ -34,8 +36,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.bounds import DISJUNCTIONS_MADE
-from avow.tuning.sizes import CONDITION_DEPTH
 
 
 @dataclass(frozen=True, slots=True)

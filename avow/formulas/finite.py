@@ -9,13 +9,13 @@ from itertools import product
 from math import prod
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import VALUES_WRITTEN_OUT
 from avow.formulas.formula import conjunction, disjunction, negation, substitute
 from avow.formulas.renaming import map_children
 from avow.formulas.values import Value
 from avow.formulas.written import value_term
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.terms import Compare, Quantified, Quantifier, Term, Variable
-from avow.tuning.bounds import VALUES_WRITTEN_OUT
 
 
 @dataclass(frozen=True, slots=True)

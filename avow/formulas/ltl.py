@@ -11,7 +11,7 @@ from collections.abc import Hashable, Iterable, Iterator
 from typing import Generic, TypeVar, assert_never
 
 from avow.base.records import dataclass
-from avow.tuning.bounds import AUTOMATON_NODES
+from avow.base.tuning.bounds import AUTOMATON_NODES
 
 A = TypeVar("A", bound=Hashable)
 

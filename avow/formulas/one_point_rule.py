@@ -14,6 +14,7 @@ from fractions import Fraction
 
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
+from avow.base.tuning.bounds import NUMBERS_WRITTEN_OUT, PARTS_SEARCHED
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite, substitute
 from avow.formulas.traversal import transform
@@ -37,7 +38,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import NUMBERS_WRITTEN_OUT, PARTS_SEARCHED
 
 
 @dataclass(frozen=True, slots=True)

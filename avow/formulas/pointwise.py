@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from avow.base.tuning.bounds import POINTWISE_PARTS
+from avow.base.tuning.sizes import CONDITION_DEPTH
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import map_children, rename_apart
@@ -18,8 +20,6 @@ from avow.formulas.traversal import depth
 from avow.language.sorts import FunctionSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import And, Apply, Compare, Implies, Or, Quantified, Quantifier, Role, Term, Variable
-from avow.tuning.bounds import POINTWISE_PARTS
-from avow.tuning.sizes import CONDITION_DEPTH
 
 Values = Mapping[Variable, Variable]
 

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Mapping
 from typing import Generic, TypeVar
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import SEQUENCE_SHOWN
+from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.formulas.formula import conjunction, free_variables, fresh
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth
@@ -38,8 +40,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.bounds import SEQUENCE_SHOWN
-from avow.tuning.sizes import REWRITTEN_DEPTH
 
 Label = TypeVar("Label")
 

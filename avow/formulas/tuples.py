@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.formulas.formula import conjunction, disjunction, substitute
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth
 from avow.formulas.values import Value
 from avow.language.sorts import TupleSort
 from avow.language.terms import Compare, In, Not, Quantified, SetTerm, Term, TupleTerm, Variable
-from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)

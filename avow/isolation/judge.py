@@ -19,8 +19,8 @@ from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 from avow.base.records import dataclass
-from avow.tuning.running import CHANNEL_PATIENCE
-from avow.tuning.sizes import CHANNEL_KEPT
+from avow.base.tuning.running import CHANNEL_PATIENCE
+from avow.base.tuning.sizes import CHANNEL_KEPT
 
 T = TypeVar("T")
 

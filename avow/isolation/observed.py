@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from avow.base.files import digest_file, identity, sha256
 from avow.base.module_path import absolute_only
-from avow.tuning.sizes import FOLDED
+from avow.base.tuning.sizes import FOLDED
 
 
 class Seen(StrEnum):

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.base.tuning.running import SIGHTS
 from avow.isolation.subject import SubjectProcess
-from avow.tuning.running import SIGHTS
 
 Simple = Fraction | str
 

@@ -20,7 +20,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 most: dict[str, int] = {}
-"""How much is told (`avow.tuning.running.SIGHTS`), which the host is given."""
+"""How much is told (`avow.base.tuning.running.SIGHTS`), which the host is given."""
 
 Sight = list[Any]
 Simple = list[int] | str

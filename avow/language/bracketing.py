@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from typing import Literal
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import ASSIGNMENTS_SAMPLED, LETTERS_EXHAUSTED, SAMPLES_BY_SIZE
+from avow.base.tuning.shown import FORMULA_PARTS
 from avow.language.syntax import (
     Connective,
     Negation,
@@ -22,8 +24,6 @@ from avow.language.syntax import (
     Truth,
     children,
 )
-from avow.tuning.bounds import ASSIGNMENTS_SAMPLED, LETTERS_EXHAUSTED, SAMPLES_BY_SIZE
-from avow.tuning.shown import FORMULA_PARTS
 
 
 @dataclass(frozen=True, slots=True)

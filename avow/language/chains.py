@@ -20,10 +20,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from avow.base.diagnostics import Span
+from avow.base.tuning.bounds import CHAIN, CHAIN_BLOCK
 from avow.language.conversions import widen
 from avow.language.sorts import INTEGER, NATURAL, REAL
 from avow.language.terms import And, Arithmetic, Iff, Implies, Term, Widen
-from avow.tuning.bounds import CHAIN, CHAIN_BLOCK
 
 _Place = Callable[[int, int], Span]
 _Item = TypeVar("_Item")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language.check_history import Histories
 from avow.language.contract import Definition
 from avow.language.definitions import expand
@@ -13,7 +14,6 @@ from avow.language.scope import Defined
 from avow.language.subterms import subterms
 from avow.language.syntax import Syntax, TermSyntax
 from avow.language.terms import History, Term
-from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 
 class Definitions(Histories):

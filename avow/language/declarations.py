@@ -12,6 +12,7 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean
@@ -61,7 +62,6 @@ from avow.language.syntax import (
     walk,
 )
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Term, Variable
-from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 
 @dataclass(slots=True)

@@ -13,6 +13,7 @@ from fractions import Fraction
 from itertools import combinations
 from typing import assert_never
 
+from avow.base.tuning.bounds import GUARDS
 from avow.language.bounds import constant
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import subterms
@@ -52,7 +53,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import GUARDS
 
 Facts = tuple[Term, ...]
 _ZERO = Literal(0, NATURAL)

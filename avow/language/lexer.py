@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from avow.base.tuning.sizes import DIGITS, TOKENS
 from avow.language.foreign import FOREIGN_TYPES, SIGNS, foreign, invisible, wide
 from avow.language.source import Reports
-from avow.tuning.sizes import DIGITS, TOKENS
 
 
 class Token(NamedTuple):

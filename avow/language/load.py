@@ -12,6 +12,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.remembered import Shelf
+from avow.base.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
@@ -28,7 +29,6 @@ from avow.language.sorts import Sort
 from avow.language.source import Reports, Source, in_order
 from avow.language.syntax import TermSyntax
 from avow.language.terms import Role, Term, Variable
-from avow.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 
 NOTHING = Contract((), (), (), ())
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Span
+from avow.base.tuning.sizes import CONTRACT_PARTS, NESTING
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
@@ -22,7 +23,6 @@ from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
 from avow.ros.calls import part_topic
 from avow.ros.names import is_name
-from avow.tuning.sizes import CONTRACT_PARTS, NESTING
 
 ROS_BUILTINS = (
     *("bool", "byte", "char", "string", "wstring", "time", "duration", "float32", "float64"),

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, overload
 
 from avow.base.grammars import lark_of
+from avow.base.tuning.bounds import CHAIN
+from avow.base.tuning.sizes import NESTING
 from avow.language.lexer import Token
 from avow.language.source import Reports
 from avow.language.syntax import (
@@ -68,8 +70,6 @@ from avow.language.syntax import (
 )
 from avow.language.terms import Quantifier
 from avow.language.topic_names import topic_names
-from avow.tuning.bounds import CHAIN
-from avow.tuning.sizes import NESTING
 
 QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
 STARTS = ("declaration", "ports", "topics", "formula")

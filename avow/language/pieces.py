@@ -14,6 +14,8 @@ from itertools import pairwise
 from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, Stretch
+from avow.base.tuning.shown import DIAGNOSTICS
+from avow.base.tuning.sizes import CONTRACT_PARTS, TOKENS
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.file_syntax import FileSyntax
@@ -22,8 +24,6 @@ from avow.language.lints import LintedFile, allows, of_all, of_node, spoken, tel
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import read
 from avow.language.source import Reports, Source, in_order
-from avow.tuning.shown import DIAGNOSTICS
-from avow.tuning.sizes import CONTRACT_PARTS, TOKENS
 
 _BEGINS = re.compile(r"^[ \t]*node\b", re.MULTILINE)
 

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 
 from avow.base.records import dataclass
+from avow.base.tuning.shown import SENTENCE_CHARACTERS
+from avow.base.tuning.sizes import SENTENCE
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
 from avow.language.english import Comparison, both_ways, comparisons, is_one_way, mentions
@@ -33,8 +35,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.shown import SENTENCE_CHARACTERS
-from avow.tuning.sizes import SENTENCE
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.tuning.shown import DIAGNOSTICS
+from avow.base.tuning.shown import DIAGNOSTICS
 
 _LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")
 

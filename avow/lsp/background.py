@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 from avow.base.codec import canonical, from_text, to_json
 from avow.base.process import die_with, kill_tree, unwatch, watch
+from avow.base.tuning.running import NODES_REMEMBERED, SANITY_LINE
 from avow.language.contract import Contract, Node
 from avow.language.load import check_in_part, sound_nodes
 from avow.language.source import Source
 from avow.lsp.names import taken_apart
 from avow.sanity.claims import node_key
-from avow.tuning.running import NODES_REMEMBERED, SANITY_LINE
 
 _NEUTRAL = "/"
 """Where it runs: nothing of a workspace is found from there."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from avow.base.diagnostics import Diagnostic, Span
-from avow.tuning.running import FIXES_TRIED
+from avow.base.tuning.running import FIXES_TRIED
 
 _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
 _MEANT = re.compile(r"did you mean ['`]([^'`\n]+)['`]\?")

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 from avow.formulas.formula import digest
 from avow.language.contract import Contract, Node, Port
 from avow.language.lexer import KEYWORDS, LIMITED
@@ -28,7 +29,6 @@ from avow.lsp.names import CLAUSES, OWNED, PORTS, Meaning, Occurrence, What, occ
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.project import Project, faults_of_plan
 from avow.system.load import PLAN_FILE
-from avow.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 
 _WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices"}
 """Words of the language, operators among them that a name may shadow: a name that is one of these is read twice."""

@@ -14,6 +14,7 @@ from pygls.lsp.server import LanguageServer
 
 from avow import __version__
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS, SANITY_PAUSE
 from avow.language.format import format_text
 from avow.language.load import check_in_part, clean_text
 from avow.lsp import features, protocol
@@ -28,7 +29,6 @@ from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
 from avow.lsp.quick_fixes import fixes
 from avow.lsp.renaming import Refused, elsewhere, is_renameable, rename
-from avow.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS, SANITY_PAUSE
 
 
 def _nothing(file: str) -> StatusLookup:

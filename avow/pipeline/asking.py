@@ -14,6 +14,7 @@ from typing import Any
 from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tuning.running import WORKER_GRACE
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
@@ -24,7 +25,6 @@ from avow.pipeline.mutant_systems import Altered
 from avow.pipeline.requests import Request, Unanswered, read_response
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, is_portable, method_backend, planned_method
-from avow.tuning.running import WORKER_GRACE
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 

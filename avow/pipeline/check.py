@@ -19,12 +19,12 @@ from avow.base.notes import read_note, write_note
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf
+from avow.base.tuning.shown import WARNINGS
 from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
 from avow.system.plan import Located, Method, System
-from avow.tuning.shown import WARNINGS
 
 
 @dataclass(frozen=True, slots=True)

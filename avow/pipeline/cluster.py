@@ -25,9 +25,7 @@ from types import FrameType
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.pipeline.cluster_worker import needs, own_code, perform, tools_of
-from avow.pipeline.executors import Asked, Came
-from avow.tuning.running import (
+from avow.base.tuning.running import (
     CLUSTER_ANSWER,
     CLUSTER_CONNECT,
     CLUSTER_LOOK,
@@ -35,6 +33,8 @@ from avow.tuning.running import (
     CLUSTER_RETRIES,
     WORKER_GRACE,
 )
+from avow.pipeline.cluster_worker import needs, own_code, perform, tools_of
+from avow.pipeline.executors import Asked, Came
 
 _TLS = {"ca": "AVOW_TLS_CA", "cert": "AVOW_TLS_CERT", "key": "AVOW_TLS_KEY"}
 """Environment: files of the certificate authority, of this side's certificate and of its key."""

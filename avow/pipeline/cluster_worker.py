@@ -23,12 +23,12 @@ from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import sha256
 from avow.base.tools import package_version
+from avow.base.tuning.running import CLUSTER_CONNECT
 from avow.pipeline.engine_code import backend_digest, code_mark, reading_digest
 from avow.pipeline.executors import answered
 from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Request
 from avow.pipeline.work import ENGINES, engine_identity, is_portable, tool_identities
-from avow.tuning.running import CLUSTER_CONNECT
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Address

@@ -14,6 +14,7 @@ from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.codec import canonical, to_json
 from avow.base.files import digest_file, is_intact, sha256, write
+from avow.base.tuning.bounds import CASES_KEPT
 from avow.base.verdict import Isolation, Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
@@ -27,7 +28,6 @@ from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
-from avow.tuning.bounds import CASES_KEPT
 
 Intact = Callable[[str, str], bool]
 

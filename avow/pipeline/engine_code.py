@@ -13,9 +13,6 @@ from avow.backend_kit.protocol import Backend
 from avow.base.files import digest_file, identity, sha256
 
 _ROOMS = (
-    "tuning/effort.py",
-    "tuning/bounds.py",
-    "tuning/sizes.py",
     "base",
     "isolation",
     "ros",

@@ -16,9 +16,9 @@ from typing import Protocol
 
 from avow.base.process import Completed
 from avow.base.records import dataclass
+from avow.base.tuning.running import QUEUE_PATIENCE, WORKER_GRACE
 from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Request, request_bytes, request_digest
-from avow.tuning.running import QUEUE_PATIENCE, WORKER_GRACE
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,12 +16,12 @@ from avow.base.files import identity, is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
+from avow.base.tuning.running import SETTLED_NS
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
 from avow.pipeline.beside import Beside
 from avow.pipeline.slices import MethodSlice, whole_node
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
-from avow.tuning.running import SETTLED_NS
 
 STAMP = ".export.json"
 

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from avow.base.process import die_with, forget_orphans, kill_tree
+from avow.base.tuning.running import FORK_MESSAGE
 from avow.pipeline import worker
-from avow.tuning.running import FORK_MESSAGE
 
 PRELOADED = (
     "avow.calculus.interpretation",

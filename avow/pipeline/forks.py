@@ -35,8 +35,8 @@ from typing import NoReturn
 from avow.base import process
 from avow.base.module_path import absolute_only, is_led_here
 from avow.base.process import Completed
-from avow.tuning.running import COLLECTED_IN_WORKS, FORK_LOOK, FORK_START, FORK_STOP
-from avow.tuning.sizes import OUTPUT_KEPT
+from avow.base.tuning.running import COLLECTED_IN_WORKS, FORK_LOOK, FORK_START, FORK_STOP
+from avow.base.tuning.sizes import OUTPUT_KEPT
 
 WORKER = "avow.pipeline.worker"
 PLAIN = "AVOW_PLAIN_WORKERS"

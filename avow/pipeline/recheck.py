@@ -17,6 +17,7 @@ from avow.assurance.certification import KernelRun
 from avow.base.codec import Unreadable, from_text, to_json
 from avow.base.files import sha256
 from avow.base.records import dataclass
+from avow.base.tuning.effort import KERNEL_SECOND_ALL
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
@@ -32,7 +33,6 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, texts_digest
 from avow.solving.apart import Apart, Both, versions
 from avow.system.plan import System
-from avow.tuning.effort import KERNEL_SECOND_ALL
 
 FILE = "certificates.json"
 

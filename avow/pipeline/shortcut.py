@@ -26,12 +26,12 @@ from avow.base.notes import read_note, write_note
 from avow.base.programs import program_files
 from avow.base.records import dataclass
 from avow.base.tools import LIBRARIES, package_digest
+from avow.base.tuning.running import TICK_SECONDS
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, look, marks
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
-from avow.tuning.running import TICK_SECONDS
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)

@@ -9,9 +9,9 @@ from typing import IO
 
 from avow.base.codec import Unreadable, document, from_text
 from avow.base.files import read_regular
+from avow.base.tuning.shown import GATE_REASON
 from avow.base.verdict import said
 from avow.pipeline.results import Result
-from avow.tuning.shown import GATE_REASON
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from avow.base.module_path import leave_here
+from avow.base.tuning.running import BYTE_CODE_ROOM, COLLECTED
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
 from avow.pipeline.run_info import FRESH, new_run
 from avow.pipeline.state import State
-from avow.tuning.running import BYTE_CODE_ROOM, COLLECTED
 
 if TYPE_CHECKING:
     from avow.pipeline.executors import Elsewhere

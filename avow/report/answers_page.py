@@ -16,11 +16,11 @@ from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import kept_apart, word
 from avow.base.plain import count, listed
+from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.page import asset, environment
-from avow.tuning.shown import NODE_BOXES, SHEET_LETTERS
 
 TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)

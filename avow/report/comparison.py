@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from avow.assurance.compare import ORDER, Change
+from avow.base.tuning.shown import CHANGES_UNFOLDED
 from avow.evidence.status import Status
 from avow.report.page import asset, environment
-from avow.tuning.shown import CHANGES_UNFOLDED
 
 _HEADINGS = {
     "gate": "Gates of the policy",

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from avow.base.records import dataclass
+from avow.base.tuning.shown import ROWS_LEFT_OUT, RUN_ROWS
 from avow.base.verdict import Counterexample
-from avow.tuning.shown import ROWS_LEFT_OUT, RUN_ROWS
 
 ANOTHER = " (another)"
 """Ends the name of a second value that the contract allows just as well."""

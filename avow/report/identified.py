@@ -10,11 +10,11 @@ from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
 from avow.assurance.naming import short
 from avow.base.files import sha256
+from avow.base.tuning.shown import RECORDS
 from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.report.exchange import render_json
 from avow.report.wording import MEANINGS
-from avow.tuning.shown import RECORDS
 
 Told = tuple[str, list[str]]
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 
 from avow.assurance.model import Case, DerivationView, ObligationView, SourceView
 from avow.assurance.naming import short
+from avow.base.tuning.shown import CONTRACT_LINES
 from avow.report.exchange import headline
 from avow.report.source import plain_lines
 from avow.report.wording import clean, verdict_line, worth
-from avow.tuning.shown import CONTRACT_LINES
 
 
 def _read(table: str) -> dict[str, str]:

@@ -14,9 +14,9 @@ from markupsafe import Markup, escape
 
 from avow.assurance.model import MapView
 from avow.base.records import dataclass
+from avow.base.tuning.shown import MAP_STEPS
 from avow.base.verdict import Counterexample
 from avow.report.example import is_small
-from avow.tuning.shown import MAP_STEPS
 
 _NUMBER = r"[-+−]?\d{1,12}(?:[./]\d{1,12})?"
 _COORDINATES = re.compile(rf"\(\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\)")

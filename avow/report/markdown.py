@@ -8,13 +8,13 @@ from collections.abc import Iterable, Sequence
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
+from avow.base.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.report.short import escaped, markdown_head
 from avow.report.source import plain_lines
 from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
-from avow.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
 
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 """What these say is worth as much as their bounds."""

@@ -21,6 +21,13 @@ from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.plain import count
+from avow.base.tuning.shown import (
+    ARGUMENT_ELEMENTS,
+    FINDING_CHARACTERS,
+    GUARANTEE_ROWS,
+    OBLIGATIONS_IN_FULL,
+    ROWS_UNFOLDED,
+)
 from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -30,7 +37,6 @@ from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
 from avow.report.support_counts import resting
 from avow.report.wording import history
-from avow.tuning.shown import ARGUMENT_ELEMENTS, FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
 

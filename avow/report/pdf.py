@@ -14,6 +14,7 @@ from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.plain import listed
+from avow.base.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -22,7 +23,6 @@ from avow.report.answers_page import TONE_MARKS, full_reason, others, worded
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
-from avow.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 
 _GATE = {
     "passes": {"word": "passes", "tone": "good"},

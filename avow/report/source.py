@@ -17,11 +17,11 @@ from pygments.token import Comment, Keyword, Name, Number, Operator, String, _To
 
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.base.diagnostics import Span
+from avow.base.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.language.pygments_lexer import RclLexer
 from avow.report.wording import MARKS, anchor, clean, tone
-from avow.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 
 _COLOURS: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),

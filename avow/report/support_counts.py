@@ -6,8 +6,8 @@ from collections import Counter
 
 from avow.assurance.model import Case
 from avow.assurance.naming import derivation_claim, requirement_claim
+from avow.base.tuning.bounds import SUPPORT_STEPS
 from avow.evidence.status import Status
-from avow.tuning.bounds import SUPPORT_STEPS
 
 
 def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:

@@ -10,10 +10,10 @@ from urllib.parse import quote
 
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.base.plain import count
+from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS
 from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
-from avow.tuning.shown import DETAILS, FORMULA_COLUMNS
 
 MARKS = {
     Status.PROVED: "✔",

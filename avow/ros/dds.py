@@ -15,8 +15,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from avow.base.tuning.running import DDS_NAMES, DDS_PAUSE, DDS_SECONDS, LAST_DOMAIN
 from avow.ros.listing import Listed, Listing, NoListing
-from avow.tuning.running import DDS_NAMES, DDS_PAUSE, DDS_SECONDS, LAST_DOMAIN
 
 LOOPBACK = ("127.0.0.1", "localhost")
 

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, assert_never
 
+from avow.base.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
 from avow.ros.bags import message_of
 from avow.ros.calls import is_part, named
 from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 from avow.ros.listing import Listed, Listing
-from avow.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
 
 Path = tuple[str, ...]
 

@@ -8,9 +8,9 @@ from http.client import HTTPConnection, HTTPException
 from typing import Any
 from xml.parsers.expat import ExpatError
 
+from avow.base.tuning.running import MASTER_SECONDS
 from avow.ros.definitions import canonical
 from avow.ros.listing import Listing, NoListing, listed
-from avow.tuning.running import MASTER_SECONDS
 
 
 class _Bounded(xmlrpc.client.Transport):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.tuning.sizes import DEFINITION_BYTES
 from avow.ros.definitions import (
     OTHER_NAMES,
     STANDARD,
@@ -24,7 +25,6 @@ from avow.ros.definitions import (
     parse_message,
     parse_parts,
 )
-from avow.tuning.sizes import DEFINITION_BYTES
 
 SUFFIXES = (".msg", ".srv", ".action", ".idl")
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, assert_never
 
 from avow.base.diagnostics import Severity
+from avow.base.tuning.effort import CONSISTENT_EFFORT
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.formulas.finite import Ranges
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
@@ -26,7 +27,6 @@ from avow.sanity.claims import Claim, Property, claims, node_key, triggers
 from avow.sanity.examples import meets
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
-from avow.tuning.effort import CONSISTENT_EFFORT
 
 if TYPE_CHECKING:
     from avow.sanity.over_runs import OverRuns

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from avow.base.tuning.bounds import CONFLICTS
+from avow.base.tuning.effort import CONFLICT_EFFORT, CONFLICT_SEARCH_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Data, Value, show
@@ -26,8 +28,6 @@ from avow.solving.limits import effort_left, spent, until
 from avow.solving.questions import Unsupported, solve
 from avow.solving.replay import replay
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import CONFLICTS
-from avow.tuning.effort import CONFLICT_EFFORT, CONFLICT_SEARCH_EFFORT
 
 
 @dataclass(frozen=True, slots=True)

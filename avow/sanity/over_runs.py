@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import assert_never
 
+from avow.base.tuning.bounds import RUN_TO_AN_EXAMPLE, VIABILITY_ROUNDS
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cells import Remembering
@@ -21,7 +22,6 @@ from avow.sanity.results import Bounds, Finding, listing
 from avow.sanity.viability import Viability, steps_of, told_apart, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted, doubted
-from avow.tuning.bounds import RUN_TO_AN_EXAMPLE, VIABILITY_ROUNDS
 
 _TRIGGER = "trigger"
 

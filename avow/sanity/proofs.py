@@ -23,6 +23,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
@@ -49,7 +50,6 @@ from avow.solving.questions import Translator, Unsupported, check, entails, solv
 from avow.solving.replay import replay
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
-from avow.tuning.sizes import REWRITTEN_DEPTH
 
 Formulas = Mapping[str, Term]
 

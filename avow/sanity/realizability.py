@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from avow.base.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.pointwise import pointwise
@@ -26,7 +27,6 @@ from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Varia
 from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import budget, effort_left, spent
-from avow.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
 
 __all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
 

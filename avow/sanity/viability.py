@@ -13,6 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
+from avow.base.tuning.bounds import AHEAD_SIZE, GAME_ANSWERS, GAME_MEMORIES, INPUTS_AHEAD, VIABILITY_ROUNDS
+from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.evaluation.running import Keeper
@@ -40,8 +42,6 @@ from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
 from avow.solving.questions import entails, solve
 from avow.solving.second import CONTRADICTED, contradicted
-from avow.tuning.bounds import AHEAD_SIZE, GAME_ANSWERS, GAME_MEMORIES, INPUTS_AHEAD, VIABILITY_ROUNDS
-from avow.tuning.effort import DEFEAT_EFFORT
 
 _Memory = tuple[Value, ...]
 _Move = tuple[Mapping[str, Value], tuple[tuple[Mapping[str, Value], _Memory], ...]]

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from avow.base.tuning.bounds import NUMBERS_PAIRED
+from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.traversal import depth
@@ -52,8 +54,6 @@ from avow.language.terms import (
     Widen,
 )
 from avow.sanity.extremes import Extreme, bounded, measures
-from avow.tuning.bounds import NUMBERS_PAIRED
-from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)

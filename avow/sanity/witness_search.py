@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from avow.base.tuning.bounds import WITNESS_REFUTATIONS
+from avow.base.tuning.effort import WITNESS_PATIENT_EFFORT, WITNESS_STEPS
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.values import Value
@@ -21,8 +23,6 @@ from avow.solving.questions import Translator, Unsupported, check, entails, sear
 from avow.solving.replay import replay
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import WITNESS_REFUTATIONS
-from avow.tuning.effort import WITNESS_PATIENT_EFFORT, WITNESS_STEPS
 
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]

@@ -16,6 +16,8 @@ from fractions import Fraction
 from itertools import chain, islice, pairwise, product
 from typing import assert_never
 
+from avow.base.tuning.bounds import WITNESS_ARGUMENTS, WITNESSES, WITNESSES_PER_OUTPUT
+from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import rename_apart
@@ -62,8 +64,6 @@ from avow.language.terms import (
 from avow.sanity.witness_candidates import Candidates, Definition
 from avow.solving.translation import Expr, Meaning, Translator
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import WITNESS_ARGUMENTS, WITNESSES, WITNESSES_PER_OUTPUT
-from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)

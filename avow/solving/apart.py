@@ -9,10 +9,10 @@ import math
 from dataclasses import dataclass, field
 from importlib import metadata, util
 
+from avow.base.tuning.effort import KERNEL_SECOND_STEPS
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
 from avow.solving.cvc5_process import answer
 from avow.solving.question_process import Answering, NoAnswer, serve
-from avow.tuning.effort import KERNEL_SECOND_STEPS
 
 
 @dataclass(slots=True)

@@ -8,13 +8,13 @@ from typing import Any, assert_never
 from typing import Literal as OneOf
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import SMALL_NUMBER
+from avow.base.tuning.effort import QUESTION_EFFORT, QUESTION_STEPS, SMALLER_MODEL_EFFORT
 from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps, watchdog
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Sorts
-from avow.tuning.bounds import SMALL_NUMBER
-from avow.tuning.effort import QUESTION_EFFORT, QUESTION_STEPS, SMALLER_MODEL_EFFORT
 
 Status = OneOf["sat", "unsat", "unknown"]
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from avow.base.plain import ALLOWS_MORE
-from avow.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
+from avow.base.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
 
 _NO_ANSWER = "no answer with"
 NO_ANSWER = f"{_NO_ANSWER} the effort allowed"

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import TABLE_POINTS
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import (
     BoolSort,
@@ -33,7 +34,6 @@ from avow.language.sorts import (
 from avow.language.terms import Variable
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import TABLE_POINTS
 
 _ESCAPE = re.compile(r"\\u\{([0-9a-fA-F]+)\}|\\u([0-9a-fA-F]{4})|\\x([0-9a-fA-F]{2})")
 

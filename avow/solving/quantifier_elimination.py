@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from fractions import Fraction
 
 from avow.base.records import dataclass
+from avow.base.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS, STEPS
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
@@ -49,7 +50,6 @@ from avow.solving.limits import watchdog
 from avow.solving.questions import entails, solve
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS, STEPS
 
 
 @dataclass(frozen=True, slots=True)

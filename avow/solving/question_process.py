@@ -21,7 +21,7 @@ from typing import Any
 
 from avow.base import process
 from avow.base.files import sha256
-from avow.tuning.sizes import ANSWERED_BY_ONE
+from avow.base.tuning.sizes import ANSWERED_BY_ONE
 
 
 class NoAnswer(Exception):  # noqa: N818 - it says what it is

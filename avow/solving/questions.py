@@ -18,6 +18,15 @@ from typing import Literal as OneOf
 from typing import assert_never
 
 from avow.base.records import dataclass
+from avow.base.tuning.effort import (
+    ANOTHER_SOLVER_EFFORT,
+    FIRST_LOOK_EFFORT,
+    QUESTION_EFFORT,
+    QUESTION_SHARE,
+    RESTART,
+    RESTARTS,
+    ROUNDS,
+)
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.sequences import flatten
@@ -38,15 +47,6 @@ from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import (
-    ANOTHER_SOLVER_EFFORT,
-    FIRST_LOOK_EFFORT,
-    QUESTION_EFFORT,
-    QUESTION_SHARE,
-    RESTART,
-    RESTARTS,
-    ROUNDS,
-)
 
 __all__ = [
     "Answer",

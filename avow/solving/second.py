@@ -9,12 +9,12 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Iterable, Mapping
 
+from avow.base.tuning.effort import SECOND_OPINION_EFFORT
 from avow.formulas.formula import conjunction, disjunction
 from avow.language.terms import FALSE, Term
 from avow.solving import smtlib
 from avow.solving.questions import Solution
 from avow.solving.translation import Unsupported
-from avow.tuning.effort import SECOND_OPINION_EFFORT
 
 CONTRADICTED = "two solvers contradict each other: Z3 says that there are no such values, and cvc5 that there are"
 

@@ -3,7 +3,7 @@
 What follows from formulas follows whatever the set (a solver's `unsat` speaks of all of them). But a solver that finds
 values chooses how many elements a type ``{}`` has, and whoever keeps the contract may not: that there are such values
 counts only if there are whatever the number of elements. That is asked of few elements and of many: of each number that
-`avow.tuning` names, and of more than these, in different types alike and apart.
+`avow.base.tuning` names, and of more than these, in different types alike and apart.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
+from avow.base.tuning.bounds import SIZES_COMBINED, SIZES_TRIED
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction
 from avow.language.sorts import OpaqueSort
@@ -18,7 +19,6 @@ from avow.language.terms import TRUE, Compare, Not, Quantified, Quantifier, Role
 from avow.solving.questions import solve
 from avow.solving.replay import opaque_sorts
 from avow.solving.second import CONTRADICTED, doubted
-from avow.tuning.bounds import SIZES_COMBINED, SIZES_TRIED
 
 _MORE = max(SIZES_TRIED) + 1
 """Stands for at least so many."""

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
 
+from avow.base.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
 from avow.solving.limits import net
@@ -17,7 +18,6 @@ from avow.solving.question_process import Answering, NoAnswer
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Sorts
-from avow.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 
 
 def formulas_script(

@@ -11,7 +11,7 @@ from typing import Any
 
 from avow.base.grammars import lark_of
 from avow.base.records import dataclass
-from avow.tuning.sizes import ROS_GRAPH_ARCS
+from avow.base.tuning.sizes import ROS_GRAPH_ARCS
 
 
 class Malformed(Exception):  # noqa: N818 - it names what the text is

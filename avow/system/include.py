@@ -13,12 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tuning.sizes import INCLUDED_NODES
 from avow.language.contract import Contract
 from avow.ros.names import Placed, Resolver
 from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
 from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
-from avow.tuning.sizes import INCLUDED_NODES
 
 Load = Callable[[Path], System]
 

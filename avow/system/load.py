@@ -7,6 +7,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.remembered import Shelf
+from avow.base.tuning.sizes import SYSTEMS_WITHIN
 from avow.language.contract import Contract
 from avow.system.faults import every_fault
 from avow.system.formulas import check_formulas
@@ -20,7 +21,6 @@ from avow.system.plan_file import bare_plan, fill_methods, read_plan
 from avow.system.strict_yaml import Piece
 from avow.system.subsystems import check_subsystems, resolved
 from avow.system.topics import heard
-from avow.tuning.sizes import SYSTEMS_WITHIN
 
 PLAN_FILE = "plan.yaml"
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.tuning.bounds import VALUES_LOOKED_AT
 from avow.language.contract import Contract
 from avow.language.load import parse_term
 from avow.language.printer import show_type
@@ -24,7 +25,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.tuning.bounds import VALUES_LOOKED_AT
 
 BASE_SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
 

@@ -14,9 +14,9 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic
 from avow.base.remembered import Shelf
 from avow.base.tools import package_version
+from avow.base.tuning.sizes import REPAIR_ROUNDS
 from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
-from avow.tuning.sizes import REPAIR_ROUNDS
 
 
 @cache

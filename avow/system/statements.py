@@ -8,9 +8,9 @@ from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.persons import unreadable
 from avow.base.plain import identifiers, is_blank
+from avow.base.tuning.sizes import STATEMENT_WORDS
 from avow.system.plan import Plan, Statement, System
 from avow.system.strict_yaml import Piece
-from avow.tuning.sizes import STATEMENT_WORDS
 
 _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
 

@@ -18,8 +18,8 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import invisible
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 from avow.system.plan import Located
-from avow.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 
 _INTEGER = re.compile(r"-?(0|[1-9][0-9]*)\Z")
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]{1,3})?\Z")

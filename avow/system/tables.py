@@ -10,10 +10,10 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.files import read_regular
+from avow.base.tuning.sizes import RANGE_VALUES, TABLE_CELLS
 from avow.system.plan import Table
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
-from avow.tuning.sizes import RANGE_VALUES, TABLE_CELLS
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
 _CELL = re.compile(r"\b([A-Za-z_][A-Za-z0-9_-]*)\.([A-Za-z_][A-Za-z0-9_]*)")

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
 from avow.language.contract import Contract, Node, Port
 from avow.language.definedness import unless_without_value, with_value
 from avow.language.syntax import Ahead, Connective, Lasting, Name, Negation, Sign, unparenthesised, walk
 from avow.language.terms import TRUE, Term
-from avow.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
 
 if TYPE_CHECKING:
     from avow.language.lexer import Token

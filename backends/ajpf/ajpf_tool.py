@@ -17,9 +17,9 @@ from avow.base.process import Completed, ToolMissing, run
 from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.tools import Tool
+from avow.base.tuning.running import VERSION_SECONDS
 from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside
-from avow.tuning.running import VERSION_SECONDS
 
 INSTALL = (
     "apt-get install git ant openjdk-17-jdk-headless && git clone --depth 1 https://github.com/mcapl/mcapl "

@@ -8,7 +8,7 @@ import shutil
 
 from avow.base.process import ToolMissing, run
 from avow.base.tools import Tool
-from avow.tuning.running import VERSION_SECONDS
+from avow.base.tuning.running import VERSION_SECONDS
 
 
 @functools.cache

@@ -10,13 +10,13 @@ import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
+from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.subterms import histories
 from avow.language.terms import Variable
-from avow.tuning.effort import JUDGE_EFFORT
 
 from .names import Names
 from .printer import Vocabulary

@@ -19,13 +19,13 @@ from typing import Any, assert_never
 
 from avow.base import process
 from avow.base.codec import Unreadable, from_text
+from avow.base.tuning.running import SUBJECT_PATIENCE
 from avow.base.verdict import Isolation
 from avow.isolation import judge
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed
 from avow.isolation.program import Program
 from avow.isolation.subject import Message, SubjectFailed
-from avow.tuning.running import SUBJECT_PATIENCE
 
 _OPTIONS = {
     "ASAN_OPTIONS": "detect_leaks=0:symbolize=1:handle_abort=0:allocator_may_return_null=0",

@@ -26,6 +26,7 @@ from hypothesis.internal.conjecture import providers
 from avow.base.codec import from_text
 from avow.base.files import text_or_nothing
 from avow.base.process import adopt_orphans
+from avow.base.tuning.running import SUBJECT_PATIENCE
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
 from avow.formulas.values import Value
@@ -33,7 +34,6 @@ from avow.isolation import judge
 from avow.isolation.scout import Scout, Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
-from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import seek, wire
 from .beside import kept_inputs, system_root, table_rows

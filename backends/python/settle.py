@@ -18,6 +18,7 @@ from avow.backend_kit.programs.samples import Drawing, beside, leaves, numbers_o
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.process import ToolMissing
+from avow.base.tuning.bounds import CASES_KEPT
 from avow.base.verdict import Counterexample, Isolation, Object, Outcome, Verdict
 from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
@@ -30,7 +31,6 @@ from avow.language.terms import Variable
 from avow.solving.limits import from_seconds, until
 from avow.solving.questions import z3_version
 from avow.solving.settling import Settler
-from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found
 from .machine import fraction, run

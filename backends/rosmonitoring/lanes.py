@@ -18,11 +18,11 @@ from avow.backend_kit.timeline import (
     joined_stretches,
     runs,
 )
+from avow.base.tuning.shown import TIMELINE_PORTS
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort
-from avow.tuning.shown import TIMELINE_PORTS
 
 from .bags import Origin
 from .judged import as_float

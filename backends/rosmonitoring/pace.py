@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from avow.base.tuning.bounds import INSTANCES
 from avow.formulas.values import show
-from avow.tuning.bounds import INSTANCES
 
 from .pairing import time_of
 from .tuning import GRACE, JITTER, RATE_MESSAGES

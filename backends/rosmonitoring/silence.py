@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
 
+from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.evaluation.tables import unnamed
 from avow.formulas.formula import free_variables
@@ -14,7 +15,6 @@ from avow.formulas.temporal.ages import ELAPSED, Side
 from avow.formulas.values import FunctionValue, Value
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Role, Term, Variable
-from avow.tuning.bounds import POINTS_OF_ARGUMENTS
 
 from .pace import Leeway
 

@@ -8,13 +8,13 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
-from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
 from .numbers import Decimal, NotANumber, exact

@@ -13,6 +13,7 @@ from avow.assurance.codec import from_json, to_json
 from avow.assurance.facts import facts_of_case, facts_of_system
 from avow.assurance.history import history
 from avow.assurance.model import Case
+from avow.base.tuning.shown import OLDER_RECORDS
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since
 from avow.evidence.ledger import Entry, Ledger
@@ -20,7 +21,6 @@ from avow.evidence.record import CASE, OBSERVED, Evidence
 from avow.evidence.status import weigh
 from avow.pipeline.report_check import _ledger
 from avow.system.plan import System
-from avow.tuning.shown import OLDER_RECORDS
 
 from .sample import RUN, TODAY, case, chain, evidence, guarantee, node_plan, system
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from helpers import some
 
+from avow.base.tuning.effort import OFFERS_EFFORT
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.discharge import would_hold
 from avow.cli.compose import command
 from avow.solving.limits import spent
-from avow.tuning.effort import OFFERS_EFFORT
 
 from .make import make, node, outcomes, settled
 from .test_commands import invoke

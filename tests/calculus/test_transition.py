@@ -7,13 +7,13 @@ from random import Random
 
 import pytest
 
+from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.verdict import Verdict
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import frame
 from avow.formulas.values import show
 from avow.system.plan import System
-from avow.tuning.bounds import NODE_ANSWERS
 
 from .make import make, node, outcomes
 

@@ -83,9 +83,9 @@ def test_every_file_that_the_map_names_is_there() -> None:
             assert (ROOT / "avow" / room / door).is_file() or (ROOT / door).is_file(), (room, door)
 
 
-UNASKED = {"tuning", "evidence", "backends"}
-"""Rooms that engines import and whose code changes no answer: numbers that only show or time (the others are listed one
-by one), what answers are written down as, and a backend's own folder, which is in its own keys."""
+UNASKED = {"evidence", "backends"}
+"""Rooms that engines import and whose code changes no answer: what answers are written down as, and a backend's own
+folder, which is in its own keys."""
 
 
 @pytest.mark.parametrize(("kept", "own"), [(_ROOMS, ()), (_ROOMS_OF_BACKENDS, (ROOT / "backends",))])

@@ -11,7 +11,7 @@ import pytest
 from helpers import alive
 
 from avow.base import process
-from avow.tuning.sizes import OUTPUT_KEPT
+from avow.base.tuning.sizes import OUTPUT_KEPT
 
 
 def test_output_and_code_are_the_tools() -> None:

@@ -15,11 +15,11 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "limits.md"
 
 ROOMS = {
-    "avow/tuning/effort.py": "Effort",
-    "avow/tuning/bounds.py": "Searches",
-    "avow/tuning/sizes.py": "Inputs",
-    "avow/tuning/running.py": "Runs",
-    "avow/tuning/shown.py": "What is shown",
+    "avow/base/tuning/effort.py": "Effort",
+    "avow/base/tuning/bounds.py": "Searches",
+    "avow/base/tuning/sizes.py": "Inputs",
+    "avow/base/tuning/running.py": "Runs",
+    "avow/base/tuning/shown.py": "What is shown",
     "avow/kernel/solvers.py": "The kernel",
 }
 
@@ -92,8 +92,8 @@ def pages() -> dict[Path, str]:
 HEAD = """# Limits
 
 Every number by which Avow is tuned, and why it is what it is. This page is written from the code
-(`avow/tuning/`, and each backend's `tuning.py`), where they are changed. A limit that is met is said: in a verdict's
-reason, in a diagnostic, or on the page. The options of a plan's methods (`timeout`, `states`, …) are in
+(`avow/base/tuning/`, and each backend's `tuning.py`), where they are changed. A limit that is met is said: in a
+verdict's reason, in a diagnostic, or on the page. The options of a plan's methods (`timeout`, `states`, …) are in
 [plan.md](plan.md) and on the backends' pages.
 """
 
@@ -115,7 +115,7 @@ def test_every_number_stands_there() -> None:
         for path in set(files()) - set(pages())
         for name, _, _ in numbers(path.read_text("utf-8"))
     }
-    assert found == NOT_TUNED, "in avow/tuning/ or in the backend's tuning.py, with its reason"
+    assert found == NOT_TUNED, "in avow/base/tuning/ or in the backend's tuning.py, with its reason"
 
 
 @pytest.mark.parametrize("path", pages(), ids=lambda p: p.relative_to(ROOT).as_posix())

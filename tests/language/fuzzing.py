@@ -24,13 +24,13 @@ from avow.base.codec import to_json
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.rendering import render, to_sarif, told
+from avow.base.tuning.shown import DIAGNOSTICS
 from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
 from avow.solving.contract_smtlib import to_smtlib
-from avow.tuning.shown import DIAGNOSTICS
 
 SECONDS = 10.0
 """CPU time for all that is done with one text (of some 10 kB at most)."""

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from helpers import some
 
+from avow.base.tuning.bounds import CHAIN
 from avow.language.format import format_text
 from avow.language.load import check_text, parse_formula, parse_term
 from avow.language.printer import show_term
@@ -33,7 +34,6 @@ from avow.language.terms import (
     Widen,
 )
 from avow.language.translate import FORMATS
-from avow.tuning.bounds import CHAIN
 
 MANY = 5_000
 FRAME = """\

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from helpers import some
 
+from avow.base.tuning.sizes import NESTING
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.formula import conjunction
 from avow.formulas.values import SequenceValue
@@ -18,7 +19,6 @@ from avow.language.definedness import defined, unless_without_value, with_value
 from avow.language.load import check_text, parse_formula
 from avow.language.printer import show_term
 from avow.language.terms import TRUE
-from avow.tuning.sizes import NESTING
 
 TEXT = "node n { inputs( x : REAL, i : INTEGER, k : NATURAL, s : <INTEGER>, b : BOOL ) outputs() topics() "
 TEXT += "guarantee ( b or not b ) }"

@@ -8,6 +8,7 @@ import pytest
 from drawn.contracts import small_contract
 from helpers import some
 
+from avow.base.tuning.effort import STEPS
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.sorts import BOOL, INTEGER, TupleSort
@@ -16,7 +17,6 @@ from avow.sanity.analysis import Bounds, SanityResult, analyse, claims
 from avow.solving.limits import spent
 from avow.solving.questions import Solution, solve
 from avow.solving.translation import translating_once
-from avow.tuning.effort import STEPS
 
 
 def generated(seed: int) -> Node:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.tuning.effort import MOST_STEPS, STEPS
 from avow.base.verdict import Verdict
 from avow.sanity.analysis import Bounds, analyse
 from avow.solving.checking import check
@@ -31,7 +32,6 @@ from avow.solving.limits import (
 )
 from avow.solving.translation import Translator
 from avow.system.load import load_path
-from avow.tuning.effort import MOST_STEPS, STEPS
 
 
 def busy(seconds: float) -> None:

@@ -8,13 +8,13 @@ import pytest
 
 from avow.backend_kit.protocol import Report
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.tuning.shown import WARNINGS
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.pipeline.check import _tell
 from avow.pipeline.remarks import remarked
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
-from avow.tuning.shown import WARNINGS
 
 CONTRACT = "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"
 PLAN = "system: s\ncontract: system.rcl\nnodes:\n  n: {methods: [{hoare: {program: p.imp}}]}\n"

@@ -29,11 +29,11 @@ from avow.backend_kit.timeline import (
 )
 from avow.backends.rosmonitoring import BACKEND, lanes
 from avow.base.codec import to_json
+from avow.base.tuning.shown import TIMELINE_COLUMNS
 from avow.cli import main
 from avow.report.page import environment
 from avow.system.load import load_system
 from avow.system.plan import System
-from avow.tuning.shown import TIMELINE_COLUMNS
 
 from .conftest import ARRIVAL, job_for
 

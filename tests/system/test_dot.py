@@ -12,9 +12,9 @@ import pytest
 from helpers import some
 
 from avow.base.diagnostics import Rejected
+from avow.base.tuning.sizes import ROS_GRAPH_ARCS
 from avow.system.dot import Malformed, parse
 from avow.system.rosgraph import RosGraph, read_ros_graph
-from avow.tuning.sizes import ROS_GRAPH_ARCS
 
 IDS = [
     "a",

@@ -11,6 +11,7 @@ from drawn.formulas import Formulas, checked
 from helpers import some
 from oracle.values import Meaning, Step, plain
 
+from avow.base.tuning.bounds import INSTANCES
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evaluation.running import Keeper
 from avow.formulas.temporal.cells import Records
@@ -19,7 +20,6 @@ from avow.language.load import check_text, parse_formula
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
 from avow.language.terms import Term
-from avow.tuning.bounds import INSTANCES
 from temporal import test_cells
 
 PORTS = "a : BOOL, n : NATURAL, f : NATURAL --> BOOL, g : NATURAL --> NATURAL, p : NATURAL x NATURAL --> BOOL"

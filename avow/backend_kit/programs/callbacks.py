@@ -16,6 +16,7 @@ from avow.backend_kit.programs.cpython import Subject, Told, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.process import ToolMissing
+from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
 from avow.language.contract import Node
 from avow.language.sorts import DataSort, EnumSort
@@ -28,7 +29,6 @@ from avow.system.paths import inside
 from avow.system.plan import Driving, Source, System
 from avow.system.schema import suggest
 from avow.system.topics import whole_name
-from avow.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 
 SECOND = 10**9
 STEP = SECOND // 10

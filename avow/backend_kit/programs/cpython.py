@@ -84,7 +84,7 @@ def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
 
 def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: int) -> Told:
     """Run the cases, each on an object of its own. Raises ToolMissing."""
-    from avow.tuning.running import SUBJECT_BATCH
+    from avow.base.tuning.running import SUBJECT_BATCH
 
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         place = Path(scratch) / "cases.json"
@@ -109,8 +109,8 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
 
 def main() -> None:
     from avow.base.process import adopt_orphans
+    from avow.base.tuning.running import SUBJECT_PATIENCE
     from avow.isolation.subject import SubjectFailed, SubjectProcess
-    from avow.tuning.running import SUBJECT_PATIENCE
 
     channel = int(sys.argv[1])
     os.set_inheritable(channel, False)

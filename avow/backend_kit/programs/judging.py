@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.base.verdict import Counterexample
 from avow.drive.steps import plain
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
@@ -19,7 +20,6 @@ from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.language.terms import Term
-from avow.tuning.effort import JUDGE_EFFORT
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,11 @@ from types import CodeType
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.base.tuning.running import SAMPLE_LENGTHS, SAMPLE_TRIES, SAMPLES_SHIFTED
 from avow.language.bounds import constant
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Term
-from avow.tuning.running import SAMPLE_LENGTHS, SAMPLE_TRIES, SAMPLES_SHIFTED
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from dataclasses import field, replace
 from fractions import Fraction
 
 from avow.base.records import dataclass
+from avow.base.tuning.bounds import CLOCKED_SIZE, LIMITS_NESTED
 from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
 from avow.formulas.temporal.ages import (
     CLOCK,
@@ -60,7 +61,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.tuning.bounds import CLOCKED_SIZE, LIMITS_NESTED
 
 _EVER = (Past.ONCE, Past.HISTORICALLY, Past.SINCE)
 GOES_ON = Compare("<", NO_TIME, CLOCK)

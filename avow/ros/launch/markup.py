@@ -7,8 +7,8 @@ from xml.parsers import expat
 import yaml
 
 from avow.base.diagnostics import Span
+from avow.base.tuning.sizes import LAUNCH_DEPTH, LAUNCH_ELEMENTS
 from avow.ros.launch.elements import Element, Parsed, Text, WrongLaunch, place, unread
-from avow.tuning.sizes import LAUNCH_DEPTH, LAUNCH_ELEMENTS
 
 
 def from_xml(text: str, file: str) -> Parsed:

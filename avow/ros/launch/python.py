@@ -13,8 +13,8 @@ from dataclasses import field
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import LAUNCH_ELEMENTS
 from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
-from avow.tuning.sizes import LAUNCH_ELEMENTS
 
 _NODES = {
     "Node": "node",

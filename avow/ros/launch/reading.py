@@ -16,10 +16,10 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
 from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
 from avow.ros.launch.python import from_python
 from avow.ros.names import is_name
-from avow.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
 
 
 @dataclass(frozen=True, slots=True)

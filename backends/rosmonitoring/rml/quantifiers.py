@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.tuning.bounds import ATOMS_MADE
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.disjunctions import Part, alternatives, conjunction
@@ -52,7 +53,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.tuning.bounds import ATOMS_MADE
 
 from ..tuning import COMPARISONS
 from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
