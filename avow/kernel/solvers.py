@@ -42,14 +42,13 @@ def ask_z3(script: str, budget: int) -> Said:
 class Solvers:
     """Each question is asked once. Both solvers may be other processes (`avow.solving.apart`)."""
 
-    budget: int = BUDGET
     z3: Callable[[str, int], Said] = ask_z3
     second: Callable[[str], Said] | None = None
     known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
     def ask(self, script: str, wanted: Said) -> tuple[Said, int]:
         """What is said; how many solvers say what is wanted: 0 where Z3 does not, or the second says the opposite."""
-        if (said := self.first(script, self.budget)) is not wanted or self.second is None:
+        if (said := self.first(script, BUDGET)) is not wanted or self.second is None:
             return said, int(said is wanted)
         second = self.second(script)
         return (second, 0) if {wanted, second} == {Said.SAT, Said.UNSAT} else (said, 1 + (second is wanted))

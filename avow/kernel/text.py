@@ -19,10 +19,14 @@ FORMS: dict[type, str] = {t.Not: "not", t.And: "and", t.Or: "or", t.Implies: "=>
 FORMS |= {t.Negative: "-", t.Widen: "to_real", t.Length: "seq.len"}
 SORTS: dict[s.Sort, str] = {s.BOOL: "Bool", s.REAL: "Real", s.INTEGER: "Int", s.NATURAL: "Int", s.STRING: "String"}
 BUILTINS: dict[t.Builtin, Callable[..., str]] = {
+    t.Builtin.XOR: lambda a, b: f"(xor {a} {b})",
+    t.Builtin.MOD: lambda a, b: f"(mod {a} {b})",  # here and below the divisor is positive and written down
+    t.Builtin.DIV: lambda a, b: f"(div {a} {b})",
     t.Builtin.ABS: lambda a: f"(ite (< {a} 0) (- {a}) {a})",
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
     t.Builtin.MAX: lambda *all_: reduce(lambda a, b: f"(ite (> {b} {a}) {b} {a})", all_),
 }
+assert BUILTINS.keys() == set(t.Builtin), "each operator has its text"
 
 # what a free variable is called, with its sort (an INTEGER input may read a NATURAL output); what a bound one is
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]
@@ -38,7 +42,6 @@ class Text:
 
     def __init__(self) -> None:
         self.declarations, self.free, self._sorts = dict[str, str](), dict[str, s.Sort](), dict[str, s.Sort]()
-        self._bound = 0
 
     def formula(self, term: t.Term, symbols: Symbols, bound: Bound | None = None) -> str:
         """The formula's text; its bound variables are numbered from the first on. Raises Untranslatable."""
@@ -162,8 +165,6 @@ class Text:
                 return ("{}" if operator == "==" else "(not {})").format(self.same(left, right, bound))
             case t.Compare(operator=head) | t.Arithmetic(operator=head):
                 return form(head, term.children)
-            case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD | t.Builtin.DIV as head, arguments=arguments):
-                return form(head, arguments)  # the divisor is positive and written down
             case t.Operation(operator=builtin, arguments=arguments):
                 return BUILTINS[builtin](*(self.say(a, bound) for a in arguments))
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):

@@ -166,7 +166,7 @@ class Applications(Names):
         return SequenceRange(Literal(0, NATURAL, span), last, SequenceSort(NATURAL), span)
 
     def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
-        formulas = OPERATORS[name].typing.startswith("formulas")
+        formulas = OPERATORS[name].typing.takes_formulas
         made = [self.formula(a) if formulas else self.term(a) for a in arguments]
         terms = [m for m in made if m is not None]
         if len(terms) != len(made):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from fractions import Fraction
 from functools import reduce
 from typing import Any, assert_never
@@ -46,6 +46,25 @@ class Level(IntEnum):
     ATOM = 10
 
 
+class Typing(StrEnum):
+    """What an operator takes and yields, as people are told."""
+
+    FORMULA = "formula → formula"
+    FORMULAS = "formulas → formula"
+    EQUALS = "terms of one type → formula"
+    ORDER = "numbers → formula"
+    NUMBER = "number → number"
+    NUMBERS = "numbers → number"
+    QUOTIENT = "numbers → REAL"
+    WHOLE = "whole number, positive literal → whole number"
+    BRANCHES = "formula, two terms of one type → that type"
+
+    @property
+    def takes_formulas(self) -> bool:
+        """Whether all that it is of are formulas."""
+        return self in (Typing.FORMULA, Typing.FORMULAS)
+
+
 @dataclass(frozen=True, slots=True)
 class Why:
     """In the place of an entry: the reason why there is none. A backend refuses the operator by name with it."""
@@ -60,8 +79,7 @@ class Operator:
     name: str
     """As RCL writes it; in a table of operators, its key."""
     level: Level
-    typing: str
-    """What it takes and yields, for people."""
+    typing: Typing
     text: str
     unicode: str
     latex: str
@@ -101,7 +119,7 @@ _ARITHMETIC = Why("it is arithmetic: no form of the terms says it")
 def _infix(
     name: str,
     level: Level,
-    typing: str,
+    typing: Typing,
     words: tuple[str, str, str],
     evaluate: Callable[..., Any] | Why,
     z3: Callable[..., Any],
@@ -117,7 +135,7 @@ def _infix(
 
 def _function(
     name: Builtin,
-    typing: str,
+    typing: Typing,
     evaluate: Callable[..., Any],
     z3: Callable[..., Any],
     smtlib: str,
@@ -159,46 +177,46 @@ def _better(sign: str) -> Callable[[Operation], Term]:
     return choice
 
 
-_FORMULAS, _NUMBERS, _WHOLE = "formulas → formula", "numbers → number", "whole number, positive literal → whole number"
 _ROWS = (
-    _infix("<=>", Level.IFF, _FORMULAS, ("if and only if", "↔", r"\Leftrightarrow"), operator.eq,
+    _infix("<=>", Level.IFF, Typing.FORMULAS, ("if and only if", "↔", r"\Leftrightarrow"), operator.eq,
            lambda z, a, b: a == b, "=", "<==>", LIFTED),
-    _infix("->", Level.IMPLIES, _FORMULAS, ("implies", "→", r"\Rightarrow"), _IN_PARTS,
+    _infix("->", Level.IMPLIES, Typing.FORMULAS, ("implies", "→", r"\Rightarrow"), _IN_PARTS,
            lambda z, a, b: z.Implies(a, b), "=>", "==>", LIFTED),
-    _infix("or", Level.OR, _FORMULAS, ("or", "∨", r"\lor"), _IN_PARTS,
+    _infix("or", Level.OR, Typing.FORMULAS, ("or", "∨", r"\lor"), _IN_PARTS,
            lambda z, *parts: z.Or(parts), "or", "||", "||"),
-    _infix("and", Level.AND, _FORMULAS, ("and", "∧", r"\land"), _IN_PARTS,
+    _infix("and", Level.AND, Typing.FORMULAS, ("and", "∧", r"\land"), _IN_PARTS,
            lambda z, *parts: z.And(parts), "and", "&&", "&&"),
-    Operator("not", Level.NOT, "formula → formula", "not ", "¬", r"\lnot ", operator.not_,
+    Operator("not", Level.NOT, Typing.FORMULA, "not ", "¬", r"\lnot ", operator.not_,
              lambda z, a: z.Not(a), "not", "!", LIFTED, "not", _A_FORM, _A_FORM),
-    _infix("==", Level.COMPARE, "terms of one type → formula", ("is", "=", "="), operator.eq,
+    _infix("==", Level.COMPARE, Typing.EQUALS, ("is", "=", "="), operator.eq,
            lambda z, a, b: a == b, "=", "==", "=="),
-    _infix("!=", Level.COMPARE, "terms of one type → formula", ("is not", "≠", r"\neq"), operator.ne,
+    _infix("!=", Level.COMPARE, Typing.EQUALS, ("is not", "≠", r"\neq"), operator.ne,
            lambda z, a, b: a != b, "distinct", "!=", "!="),
-    _infix("<", Level.COMPARE, "numbers → formula", ("<", "<", "<"), operator.lt, lambda z, a, b: a < b, "<", "<", "<"),
-    _infix("<=", Level.COMPARE, "numbers → formula", ("<=", "≤", r"\leq"), operator.le,
+    _infix("<", Level.COMPARE, Typing.ORDER, ("<", "<", "<"), operator.lt, lambda z, a, b: a < b, "<", "<", "<"),
+    _infix("<=", Level.COMPARE, Typing.ORDER, ("<=", "≤", r"\leq"), operator.le,
            lambda z, a, b: a <= b, "<=", "<=", "<="),
-    _infix(">", Level.COMPARE, "numbers → formula", (">", ">", ">"), operator.gt, lambda z, a, b: a > b, ">", ">", ">"),
-    _infix(">=", Level.COMPARE, "numbers → formula", (">=", "≥", r"\geq"), operator.ge,
+    _infix(">", Level.COMPARE, Typing.ORDER, (">", ">", ">"), operator.gt, lambda z, a, b: a > b, ">", ">", ">"),
+    _infix(">=", Level.COMPARE, Typing.ORDER, (">=", "≥", r"\geq"), operator.ge,
            lambda z, a, b: a >= b, ">=", ">=", ">="),
-    _infix("+", Level.SUM, _NUMBERS, ("+", "+", "+"), operator.add, lambda z, a, b: a + b, "+", "+", "+"),
-    _infix("-", Level.SUM, _NUMBERS, ("-", "-", "-"), operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
-    _infix("*", Level.PRODUCT, _NUMBERS, ("*", "·", r"\cdot"), operator.mul, lambda z, a, b: a * b, "*", "*", "*"),
-    _infix("/", Level.PRODUCT, "numbers → REAL", ("/", "/", "/"), _exact,
+    _infix("+", Level.SUM, Typing.NUMBERS, ("+", "+", "+"), operator.add, lambda z, a, b: a + b, "+", "+", "+"),
+    _infix("-", Level.SUM, Typing.NUMBERS, ("-", "-", "-"), operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
+    _infix("*", Level.PRODUCT, Typing.NUMBERS, ("*", "·", r"\cdot"), operator.mul,
+           lambda z, a, b: a * b, "*", "*", "*"),
+    _infix("/", Level.PRODUCT, Typing.QUOTIENT, ("/", "/", "/"), _exact,
            lambda z, a, b: a / b, "/", "Types.Divide", "/"),
-    _function(Builtin.XOR, _FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
+    _function(Builtin.XOR, Typing.FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
               _differing, (2, 2)),
-    _function(Builtin.ABS, "number → number", abs, lambda z, a: z.If(a < 0, -a, a), "ite", "Types.Abs", LIFTED,
+    _function(Builtin.ABS, Typing.NUMBER, abs, lambda z, a: z.If(a < 0, -a, a), "ite", "Types.Abs", LIFTED,
               _without_sign, (1, 1)),
-    _function(Builtin.MIN, _NUMBERS, min, lambda z, *all: reduce(lambda a, b: z.If(b < a, b, a), all), "ite",
+    _function(Builtin.MIN, Typing.NUMBERS, min, lambda z, *all: reduce(lambda a, b: z.If(b < a, b, a), all), "ite",
               "Types.Min", LIFTED, _better("<"), (2, None)),
-    _function(Builtin.MAX, _NUMBERS, max, lambda z, *all: reduce(lambda a, b: z.If(b > a, b, a), all), "ite",
+    _function(Builtin.MAX, Typing.NUMBERS, max, lambda z, *all: reduce(lambda a, b: z.If(b > a, b, a), all), "ite",
               "Types.Max", LIFTED, _better(">"), (2, None)),
-    _function(Builtin.MOD, _WHOLE, operator.mod, lambda z, a, b: a % b, "mod", "%", _NO_WHOLE_DIVISION,
+    _function(Builtin.MOD, Typing.WHOLE, operator.mod, lambda z, a, b: a % b, "mod", "%", _NO_WHOLE_DIVISION,
               _ARITHMETIC, (2, 2)),
-    _function(Builtin.DIV, _WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION,
+    _function(Builtin.DIV, Typing.WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION,
               _ARITHMETIC, (2, 2)),
-    Operator("if", Level.LOOSEST, "formula, two terms of one type → that type", "if ", "if ", r"\mathbf{if}\ ",
+    Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", r"\mathbf{if}\ ",
              _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
 # Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor.
@@ -261,13 +279,14 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
     counted = _wrong_count(name, len(arguments))
     if counted is not None:
         return counted
-    match name:
-        case Builtin.XOR:
+    typing = OPERATORS[name].typing
+    match typing:
+        case Typing.FORMULA | Typing.FORMULAS:
             for k, argument in enumerate(arguments):
                 if argument.sort != BOOL:
-                    return Mistyped("RCL301", "`xor` is of formulas, and this is of type {}", k)
+                    return Mistyped("RCL301", f"`{name}` is of formulas, and this is of type {{}}", k)
             return Operation(name, tuple(arguments), BOOL, span)
-        case Builtin.ABS | Builtin.MIN | Builtin.MAX:
+        case Typing.NUMBER | Typing.NUMBERS:
             for k, argument in enumerate(arguments):
                 if not isinstance(argument.sort, NUMERIC):
                     return Mistyped("RCL308", f"`{name}` is of numbers, and this is of type {{}}", k)
@@ -277,7 +296,7 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
             if name is Builtin.ABS:
                 sort = REAL if sort == REAL else NATURAL
             return Operation(name, tuple(made), sort, span)
-        case Builtin.MOD | Builtin.DIV:
+        case Typing.WHOLE:
             for k, argument in enumerate(arguments):
                 if not isinstance(argument.sort, WHOLE):
                     hint = None if k else "reals have no remainder; `/` divides them"
@@ -288,8 +307,10 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
                 return Mistyped("RCL311", f"`{name}` divides by a positive whole number that is written down", 1, hint)
             whole: Sort = NATURAL if name is Builtin.MOD or dividend.sort == NATURAL else INTEGER
             return Operation(name, (dividend, divisor), whole, span)
+        case Typing.EQUALS | Typing.ORDER | Typing.QUOTIENT | Typing.BRANCHES:
+            raise AssertionError(f"`{name}` is written like a function, and typed as no function is")
         case _:
-            assert_never(name)
+            assert_never(typing)
 
 
 def conditional(condition: Term, then: Term, otherwise: Term, span: Span | None) -> Term | None:

@@ -52,7 +52,7 @@ def _complete() -> None:
         f"{row.dafny.removeprefix('Types.')}{kind}"
         for row in OPERATORS.values()
         if row.level is Level.ATOM and row.dafny.startswith("Types.")
-        for kind in (("Bool",) if row.typing.startswith("formula") else ("Int", "Real"))
+        for kind in (("Bool",) if row.typing.takes_formulas else ("Int", "Real"))
     }
     missing = wanted - set(_FUNCTIONS)
     unkept = set(_FUNCTIONS) - RESERVED

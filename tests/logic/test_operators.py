@@ -55,7 +55,7 @@ GRID = [
 ]
 
 
-LOGICAL = [name for name in Builtin if OPERATORS[name].typing.startswith("formulas")]
+LOGICAL = [name for name in Builtin if OPERATORS[name].typing.takes_formulas]
 
 
 SAMPLES = {
