@@ -10,6 +10,7 @@ from avow.assurance.model import Case
 from avow.base import codec
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular
 from avow.evidence.ledger import Line
 
 SCHEMA = "https://avow.invalid/schemas/case-4"
@@ -38,7 +39,7 @@ def read_case(path: Path) -> Case:
     """The case of a report (its folder, or report.json). Raises Rejected."""
     file = path / "report.json" if path.is_dir() else path
     try:
-        return from_json(codec.parsed(file.read_bytes()))
+        return from_json(codec.parsed(read_regular(file)))
     except OSError as error:
         raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
     except ValueError as error:

@@ -36,6 +36,12 @@ def read_regular(path: Path) -> bytes:
     return path.read_bytes()
 
 
+def read_text(path: Path, encoding: str = "utf-8", errors: str = "strict") -> str:
+    """A file's text, its line ends as `\\n`. Raises OSError as `read_regular`, and UnicodeDecodeError."""
+    _must_be_regular(path)
+    return path.read_text(encoding, errors)
+
+
 def _must_be_regular(path: Path) -> None:
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # opening a folder fails by itself
@@ -108,16 +114,22 @@ def _open_special(path: Path) -> int:
             time.sleep(0.01)
 
 
-def write(path: Path, content: str | bytes) -> bool:
-    """Put `content` in place of the file in one step; says whether that changed anything. A device or a pipe is written
-    to, and stays what it is."""
-    data = content.encode() if isinstance(content, str) else content
+def write_out(path: Path, content: str) -> None:
+    """Put `content` where the user asked for it: as `write`, but a device or a pipe is written to, and stays what it
+    is. Raises OSError."""
     if path.exists() and not path.is_file() and not path.is_dir():
         descriptor = _open_special(path)
         os.set_blocking(descriptor, True)
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(data)
-        return True
+        with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
+            stream.write(content)
+    else:
+        write(path, content)
+
+
+def write(path: Path, content: str | bytes) -> bool:
+    """Put `content` in place of the file in one step, whatever stands there but a folder; says whether that changed
+    anything. Raises OSError."""
+    data = content.encode() if isinstance(content, str) else content
     if path.is_file() and path.read_bytes() == data:
         return False
     path.parent.mkdir(parents=True, exist_ok=True)

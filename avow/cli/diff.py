@@ -71,11 +71,11 @@ def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change
     from pathlib import Path
 
     from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.files import write
+    from avow.base.files import write_out
     from avow.report.comparison import render_comparison
 
     text = render_comparison(old, new or "the workspace as it is", changes)
     try:
-        write(Path(page), text.encode("utf-8", "replace").decode())
+        write_out(Path(page), text.encode("utf-8", "replace").decode())
     except OSError as error:
         raise Rejected(Diagnostic("DIFF002", f"{page} cannot be written: {error.strerror}")) from None

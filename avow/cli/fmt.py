@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
+from avow.base.files import read_regular
 from avow.base.tuning.sizes import CONTRACT_BYTES
 from avow.cli.options import ContractArgument, json_option
 
@@ -51,7 +52,7 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
         if str(path) == "-" and not (check or diff or as_json):
             click.echo(formatted, nl=False)
             continue
-        before = source.text if str(path) == "-" else path.read_bytes().decode("utf-8")
+        before = source.text if str(path) == "-" else read_regular(path).decode("utf-8")
         if formatted == before:
             continue
         changed.append(printable(str(path)))

@@ -159,14 +159,14 @@ def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:
 
 def put(text: str, output: Path | None) -> None:
     """To a file, or to the terminal."""
-    from avow.base.files import write
+    from avow.base.files import write_out
 
     if output is None:
         click.echo(text, nl=False)
     elif output.is_dir():
         raise click.UsageError(f"{output} is a folder; name a file")
     else:
-        write(output, text)
+        write_out(output, text)
 
 
 def _files(paths: tuple[Path, ...]) -> list[Path]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+from avow.base.files import read_regular
+
 _NAMES = {
     "the clock": "clock_gettime gettimeofday time ftime timespec_get clock getrusage "
     "_ZNSt6chrono3_V212system_clock3nowEv _ZNSt6chrono3_V212steady_clock3nowEv",
@@ -39,7 +41,7 @@ def asks(path: str) -> tuple[str, ...]:
     if file.name.startswith(_OF_THE_SYSTEM):
         return ()
     try:
-        data = file.read_bytes()
+        data = read_regular(file)
     except OSError:
         return ()
     if data[:6] != b"\x7fELF\x02\x01":

@@ -9,6 +9,7 @@ from pathlib import Path
 from pygls.uris import to_fs_path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_text
 from avow.language.contract import Contract
 from avow.language.load import check_in_part, clean_text, read_source
 from avow.language.source import Source
@@ -61,7 +62,7 @@ def project_of(file: str, texts: Mapping[str, str]) -> Project:
     name, text = by_path.get(beside.resolve(), (str(beside), None))
     try:
         plan = read_plan(beside, text)[0]
-        shown = text if text is not None else beside.read_text("utf-8")
+        shown = text if text is not None else read_text(beside, "utf-8")
     except (Rejected, OSError, UnicodeError):
         return _project(alone, frozenset(), None)
     names = [f.resolve() for f in plan.contract_files]

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.files import read_text
 from avow.base.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 from avow.formulas.formula import digest
 from avow.language.contract import Contract, Node, Port
@@ -101,7 +102,7 @@ def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
     found = [f"{PLAN_FILE}:{line}" for line in sorted({lines.place(at)[0] for at in left})[:LINES_NAMED]]
     for path in folder.parent.glob(f"*/{PLAN_FILE}"):
         try:
-            text = path.read_text("utf-8") if path.parent.resolve() != folder.resolve() else ""
+            text = read_text(path, "utf-8") if path.parent.resolve() != folder.resolve() else ""
         except (OSError, UnicodeError):
             continue  # no text
         if folder.resolve().name in text and word.search(text):
@@ -110,7 +111,7 @@ def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
         try:
             if path.is_symlink() or not path.is_file() or path.resolve() in known:
                 continue
-            if path.stat().st_size <= BYTES_LOOKED_THROUGH and word.search(path.read_text("utf-8")):
+            if path.stat().st_size <= BYTES_LOOKED_THROUGH and word.search(read_text(path, "utf-8")):
                 found.append(str(path.relative_to(folder)))
         except (OSError, UnicodeError):
             continue  # no text

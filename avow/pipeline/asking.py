@@ -14,6 +14,7 @@ from typing import Any
 from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular
 from avow.base.tuning.running import WORKER_GRACE
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
@@ -109,7 +110,7 @@ def request_of(
     root = work.system.plan.root.absolute()
     tool = None if work.is_engine else method_backend(work.system, planned_method(work))
     portable = tool is None or is_portable(tool)
-    files = {path.absolute().relative_to(root).as_posix(): path.read_bytes() for path in work.files if path.is_file()}
+    files = {path.absolute().relative_to(root).as_posix(): read_regular(path) for path in work.files if path.is_file()}
     return Request(
         work.system.name,
         work.node,

@@ -17,7 +17,7 @@ from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest_file, is_intact, sha256
+from avow.base.files import digest_file, is_intact, read_regular, sha256
 from avow.base.git import head
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
@@ -140,7 +140,7 @@ def build(assessment: Assessment) -> Case:
     # read once, so that the texts that the report shows are those whose digests it names
     files = (*plan.contract_files, plan.path, *plan.included)
     entries = counting_now(ledger, workspace.root, system, assessment.run)
-    texts = {workspace.relative(path): path.read_bytes() for path in files}
+    texts = {workspace.relative(path): read_regular(path) for path in files}
     return conclude(
         facts_of_system(
             system,

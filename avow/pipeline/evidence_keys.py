@@ -22,6 +22,7 @@ from typing import Any
 from avow.backend_kit.linked import connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
+from avow.base.files import read_regular
 from avow.base.records import dataclass
 from avow.formulas.formula import digest, sort_digest
 from avow.language.contract import Contract, Definition, Node
@@ -73,7 +74,7 @@ def _words(sort: Sort) -> Iterable[str]:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError:
         return b""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest_file, is_intact, write
+from avow.base.files import digest_file, is_intact, read_text, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.pipeline.assess import case_of
@@ -77,6 +77,6 @@ def _mark_pages(folder: Path) -> None:
 
     mark = environment().get_template("earlier.html.j2").render()
     for page in sorted(folder.glob("*.html")):
-        before, body, after = page.read_text(encoding="utf-8", errors="replace").partition("<body>")
+        before, body, after = read_text(page, "utf-8", errors="replace").partition("<body>")
         if body and not after.lstrip().startswith(mark):
             write(page, before + body + mark + after)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from avow.assurance.certification import KernelRun
 from avow.base.codec import Unreadable, from_text, to_json
-from avow.base.files import sha256
+from avow.base.files import read_text, sha256
 from avow.base.records import dataclass
 from avow.base.tuning.effort import KERNEL_SECOND_ALL
 from avow.base.verdict import Verdict
@@ -124,7 +124,7 @@ def _kept(record: Evidence) -> str:
 def _kept_text(record: Evidence, root: Path) -> str:
     path = _kept(record)
     try:
-        return (root / path).read_text() if path else ""
+        return read_text(root / path) if path else ""
     except (OSError, UnicodeDecodeError):
         return ""
 

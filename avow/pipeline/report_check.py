@@ -22,7 +22,7 @@ from avow.assurance.signed import KEYS
 from avow.base import codec
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest_file, sha256
+from avow.base.files import digest_file, read_regular, sha256
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
@@ -41,7 +41,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     Without a ledger only the report's own consistency is checked, and that is said.
     """
     try:
-        case = from_json(codec.parsed((folder / "report.json").read_bytes()))
+        case = from_json(codec.parsed(read_regular(folder / "report.json")))
     except (OSError, ValueError) as error:
         return (f"report.json cannot be read: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
@@ -131,7 +131,7 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
             continue
         data = content.encode() if isinstance(content, str) else content
         try:
-            found = path.read_bytes()
+            found = read_regular(path)
             same = found == data
             if not same and name == ATTESTATION:  # signed: what stands in the envelopes
                 same = unseal_lines(found.decode("utf-8", "replace"), keys).encode() == data

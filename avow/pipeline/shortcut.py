@@ -21,7 +21,7 @@ from datetime import datetime
 from pathlib import Path
 
 import avow.backends
-from avow.base.files import identity
+from avow.base.files import identity, read_regular
 from avow.base.notes import read_note, write_note
 from avow.base.programs import program_files
 from avow.base.records import dataclass
@@ -105,7 +105,7 @@ class Shortcut:
 def _reads_elsewhere(workspace: Workspace) -> bool:
     """Whether a plan may read files outside ``contracts/``: `launch` stands in it beside comments, or what may spell it
     otherwise. Raises OSError."""
-    plans = (path.read_bytes() for path in workspace.contracts.rglob("plan.yaml"))
+    plans = (read_regular(path) for path in workspace.contracts.rglob("plan.yaml"))
     lines = [line.lstrip() for plan in plans for line in plan.splitlines()]
     said = (line for line in lines if not (line.startswith(b"#") and line.isascii()))  # YAML has further ends of lines
     return any(b"launch" in line or b"\\" in line for line in said)

@@ -11,7 +11,7 @@ from pathlib import Path
 from avow import __version__
 from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest_file, sha256, write
+from avow.base.files import digest_file, read_regular, sha256, write
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
 from avow.base.workspace import Workspace
@@ -92,7 +92,7 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     text = _listed(workspace, surveyed)
     path = workspace.artifacts / surveyed.system.name / "obligations.json"
     if dry:
-        return path.is_file() and path.read_bytes() == text.encode()
+        return path.is_file() and read_regular(path) == text.encode()
     return write(path, text)
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from avow.base.files import read_text
 from avow.base.records import dataclass
 from avow.ros.calls import Calls, as_message, parts_of, with_parts
 from avow.ros.definitions import Message, canonical
@@ -200,7 +201,7 @@ def _types(origin: Origin) -> Any:
     for file in message_files(origin.messages):
         if file.suffix == ".msg":
             package = file.parent.parent.name if file.parent.name == "msg" else file.parent.name
-            store.register(get_types_from_msg(file.read_text(encoding="utf-8"), f"{package}/msg/{file.stem}"))
+            store.register(get_types_from_msg(read_text(file, "utf-8"), f"{package}/msg/{file.stem}"))
     return store
 
 

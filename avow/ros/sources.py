@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_text
 from avow.base.tuning.sizes import DEFINITION_BYTES
 from avow.ros.definitions import (
     OTHER_NAMES,
@@ -121,7 +122,7 @@ def _of_file(path: Path, faults: list[Diagnostic]) -> tuple[Message, ...]:
     try:
         if path.stat().st_size > DEFINITION_BYTES:
             raise ValueError(f"it has more than {DEFINITION_BYTES} bytes")
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, "utf-8")
         if kind == "idl":
             return _of_idl(text, str(path))
         return parse_parts(text, name, kind, str(path)) if kind != "msg" else (parse_message(text, name, str(path)),)

@@ -12,6 +12,7 @@ from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
+from avow.base.files import read_regular
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.programs import program_digest
@@ -128,7 +129,7 @@ def _revision(home: Path) -> str:
             return said.stdout.strip()
     compiled = home / "bin" / "ajpf" / "MCAPLcontroller.class"
     return (
-        f"with classes {sha256(compiled.read_bytes()).hexdigest()[:10]}" if compiled.is_file() else "without a version"
+        f"with classes {sha256(read_regular(compiled)).hexdigest()[:10]}" if compiled.is_file() else "without a version"
     )
 
 

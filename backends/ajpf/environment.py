@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_regular
 from avow.system.plan import Located
 from avow.system.schema import violations
 from avow.system.strict_yaml import read_yaml
@@ -148,7 +149,7 @@ def read_environment(path: Path, shown: str | None = None) -> Environment:
     """Raises Rejected with every problem, located."""
     name = shown or str(path)
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         span = Span(name, 1, 1, 1, 2)
         raise Rejected(Diagnostic("AJPF110", f"cannot be read: {error.strerror or error}", span)) from None

@@ -12,6 +12,7 @@ from typing import Any
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_text
 from avow.formulas.renaming import bound_names
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
@@ -113,7 +114,7 @@ class _OptionsReader:
             programs,
             self.options.get("agent", programs[0].name),
             program_path,
-            program_path.read_text(encoding="utf-8-sig"),
+            read_text(program_path, "utf-8-sig"),
             environment,
             environment_path,
             rows,

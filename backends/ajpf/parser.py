@@ -11,6 +11,7 @@ from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, 
 from lark.exceptions import VisitError
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_regular
 from avow.base.grammars import lark_of
 
 from .syntax import (
@@ -53,7 +54,7 @@ def read_system(path: Path, shown: str | None = None) -> tuple[Program, ...]:
     """The agents of a file; `shown` is how messages call the file. Raises Rejected."""
     name = shown or str(path)
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise Rejected(Diagnostic("AJPF101", f"cannot be read: {error.strerror or error}", _at(name, 1, 1))) from None
     if len(data) > PROGRAM_BYTES:

@@ -12,6 +12,7 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
+from avow.base.files import read_text
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
@@ -264,7 +265,7 @@ class _Run:
                     reason = f"the plan wants Spin's opinion: {error.reason} ({spin_tool.tool().install})"
                     self.results = {key: replace(r, verdict=verdict, reason=reason) for key, r in self.results.items()}
                 return
-            self.logs["spin.pml"] = (Path(temporary) / "agent.pml").read_text()
+            self.logs["spin.pml"] = read_text(Path(temporary) / "agent.pml")
         self.observed.update(dict.fromkeys(outside.observed()))
         for key, holds in answers.items():
             self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)

@@ -15,6 +15,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Transl
 from avow.backend_kit.runs import unsaid
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.files import read_regular
 from avow.base.plain import one_line
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.contract import Clause, Node
@@ -174,7 +175,7 @@ def _implementation(job: Job) -> tuple[Path, str]:
     hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
     path = existing_file(job, "implementation", name, wrong="DFY101", absent="DFY102", hint=hint)
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
         if len(data) > PROGRAM_BYTES:
             raise Rejected(
                 Diagnostic("DFY102", f"'{name}' has {len(data)} bytes; at most {PROGRAM_BYTES} are read", place)

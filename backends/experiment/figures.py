@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.files import read_regular
 from avow.base.records import dataclass
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -37,7 +38,7 @@ class Figures:
 def read_figures(path: Path, unit: str) -> Figures:
     """Raises Rejected. `unit` is that of the plan; the file's own `unit` is that of its figures without one."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise Rejected(
             Diagnostic("EXP102", f"cannot be read: {error.strerror or error}", Span(str(path), 1, 1, 1, 2))

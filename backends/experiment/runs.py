@@ -11,6 +11,7 @@ from pathlib import Path
 
 from avow.base.alike import alike
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.files import read_regular
 from avow.base.records import dataclass
 
 from .expression import Expression, Interval
@@ -71,7 +72,7 @@ class _RunsReader:
     def rows(self) -> list[tuple[int, list[str]]]:
         try:
             size = self.path.stat().st_size
-            data = self.path.read_bytes() if size <= TABLE_BYTES else b""
+            data = read_regular(self.path) if size <= TABLE_BYTES else b""
         except OSError as error:
             raise self.fail(1, "EXP102", f"cannot be read: {error.strerror or error}") from None
         if size > TABLE_BYTES:

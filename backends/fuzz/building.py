@@ -6,6 +6,7 @@ import os
 import re
 from pathlib import Path
 
+from avow.base.files import read_text
 from avow.base.process import Completed, ToolMissing
 from avow.base.records import dataclass
 from avow.base.tools import Tool
@@ -179,7 +180,7 @@ def plainly(said: str, reading: Reading, folder: Path) -> str:
 def _listed(path: Path, folder: Path) -> list[Path]:
     """What a build read: as make writes it, beside what we generated."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = read_text(path, "utf-8", errors="replace")
     except OSError:
         return []
     words = re.findall(r"(?:\\.|\$\$|[^\s\\])+", text.partition(": ")[2].replace("\\\n", " "))

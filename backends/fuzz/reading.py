@@ -10,6 +10,7 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular, read_text
 from avow.base.graphs import reached
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
@@ -145,7 +146,7 @@ def files(job: Job) -> tuple[Path, ...]:
 
 def _included(file: Path, folders: list[Path]) -> Iterator[Path]:
     try:
-        text = file.read_bytes()
+        text = read_regular(file)
     except OSError:
         return
     for name in _INCLUDED.findall(text):
@@ -164,7 +165,7 @@ def texts(reading: Reading) -> str:
     found = []
     for path in files(reading.job):
         try:
-            found.append(path.read_text(encoding="utf-8", errors="replace"))
+            found.append(read_text(path, "utf-8", errors="replace"))
         except OSError:
             continue
     return "\n".join(found)

@@ -12,6 +12,7 @@ from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Stepping
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_text
 from avow.language.terms import TRUE
 from avow.solving.settling import Settler
 
@@ -95,7 +96,7 @@ def load(job: Job) -> Work:
     """Read program and table. Raises Rejected with all that is wrong."""
     path = program_file(job)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         message = f"{path.name} cannot be read: {error}"
         raise Rejected(Diagnostic("HOARE400", message, job.method.options.at("program"))) from error

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_regular
 from avow.drive.steps import coded
 from avow.formulas.formula import free_variables
 from avow.language.sorts import (
@@ -50,7 +51,7 @@ def subject(job: Job) -> SubjectFile:
     found = locate(job)
     place = job.method.options.at("subject")
     try:
-        tree = ast.parse(found.path.read_bytes(), filename=found.path.name)
+        tree = ast.parse(read_regular(found.path), filename=found.path.name)
     except SyntaxError as error:
         line, column = error.lineno or 1, error.offset or 1
         span = Span(str(found.path), line, column, line, column + 1)
@@ -206,7 +207,7 @@ def modules(path: Path) -> tuple[Path, ...]:
             continue
         found[file] = None
         try:
-            tree = ast.parse(file.read_bytes())
+            tree = ast.parse(read_regular(file))
         except (OSError, ValueError, SyntaxError, RecursionError):
             continue
         for node in ast.walk(tree):

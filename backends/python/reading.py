@@ -13,6 +13,7 @@ from typing import Any
 from avow.backend_kit.programs.cpython import Subject
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.files import read_regular
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Numbers, Source
@@ -82,7 +83,7 @@ def load(job: Job) -> Reading:
     text, encoding, tree = "", "", None
     try:
         assert path is not None
-        data = path.read_bytes()
+        data = read_regular(path)
         tree = ast.parse(data, filename=path.name)  # of the bytes, as CPython reads them
         encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
         text = data.decode(encoding)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_regular
 from avow.base.persons import unreadable
 from avow.base.records import dataclass
 from avow.system.schema import suggest
@@ -94,7 +95,7 @@ def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
 def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
     """The record's YAML. Raises Rejected."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         place = Span(str(path), 1, 1, 1, 2)
         raise Rejected(Diagnostic("REV102", f"cannot be read: {error.strerror or error}", place)) from None

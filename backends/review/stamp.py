@@ -14,7 +14,7 @@ from pathlib import Path
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import write
+from avow.base.files import read_regular, write
 from avow.language.contract import Node
 from avow.system.load import load_system
 from avow.system.paths import inside
@@ -67,7 +67,7 @@ def stamp_record(
     piece, problems = load(path)
     if problems or piece.entries is None:
         raise Rejected(*(problems or [Diagnostic("REV111", "expected keys and values", piece.span)]))
-    editor = _Editor(path.read_bytes().decode("utf-8-sig"))
+    editor = _Editor(read_regular(path).decode("utf-8-sig"))
     said: list[str] = []
     changed: list[tuple[str, Span]] = []
     for item in (piece.entries.get("read") or piece).items or ():

@@ -53,7 +53,7 @@ def command(
     is not driven, or where what it publishes hangs on a clock or on chance.
     """
     from avow.backend_kit.programs.callbacks import driver, unusable
-    from avow.base.files import write
+    from avow.base.files import write_out
     from avow.base.workspace import system_folder
     from avow.system.load import load_system
 
@@ -72,7 +72,7 @@ def command(
             raise unusable(f"{trace} has no message on a topic that {node} subscribes to: {topics}")
     run = found.run(events, *((times[0], times[-1]) if times else (0, 0)))
     if output is not None:
-        write(output, "".join(f"{line}\n" for line in _lines(found, run.beside(events))))
+        write_out(output, "".join(f"{line}\n" for line in _lines(found, run.beside(events))))
     raised = (
         (f"raised at message {run.after}: {run.wrong}" if run.after else f"raised: {run.wrong}",) if run.wrong else ()
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -43,3 +44,17 @@ def test_a_failed_write_leaves_the_old_content(tmp_path: Path, monkeypatch: pyte
 def test_digest_of_text_and_file_agree(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("grün", encoding="utf-8")
     assert files.sha256("grün") == files.digest_file(tmp_path / "a") == files.sha256("grün".encode())
+
+
+def test_a_pipe_in_a_file_s_place_is_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a")
+    assert files.write(tmp_path / "a", "x")
+    assert (tmp_path / "a").read_text() == "x"
+
+
+def test_what_goes_where_the_user_asked_for_it_goes_into_a_pipe(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a")
+    with os.fdopen(os.open(tmp_path / "a", os.O_RDONLY | os.O_NONBLOCK)) as reader:
+        files.write_out(tmp_path / "a", "x")
+        assert reader.read() == "x"
+    assert not (tmp_path / "a").is_file()

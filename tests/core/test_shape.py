@@ -248,3 +248,43 @@ def test_a_constant_is_none() -> None:
             "TABLE = {1: 2}\n_NAMES = ('a',)\nPair = tuple[int, str]\ndef f():\n    found = []\n    found.append(1)"
         )
     )
+
+
+GIVEN = {
+    "avow/base/file_systems.py",  # /proc/self/mountinfo
+    "avow/base/files.py",
+    "avow/cli/from_ros.py",  # a listing may come through a pipe, as what the next three read
+    "avow/assurance/requirements_import.py",
+    "avow/evidence/signing.py",
+    "avow/fretish/project.py",
+}
+"""Files that may be read with what could be a pipe: of the system, or given by the user on the command line."""
+OWN = {
+    "avow/cli/init.py",
+    "avow/pipeline/engine_code.py",
+    "avow/pipeline/executors.py",
+    "avow/pipeline/worker.py",
+    "avow/backend_kit/programs/cpython.py",
+    "avow/conformance/suite.py",
+    "backends/ajpf/spin.py",
+    "backends/fuzz/runner.py",
+    "backends/fuzz/tables.py",
+    "backends/hypothesis/beside.py",
+    "backends/hypothesis/bench.py",
+}
+"""These read what Avow brought, or wrote a moment ago in a folder that nobody else knows."""
+
+
+def test_files_of_a_workspace_are_read_so_that_nobody_waits_for_a_pipe() -> None:
+    """`read_regular` and `read_text` refuse what is no file; `Path.read_bytes` waits for its end."""
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for folder in ("avow", "backends")
+        for path in (ROOT / folder).rglob("*.py")
+        for call in nodes(parsed(path.read_text()))
+        if isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr in ("read_bytes", "read_text")
+        and "resources" not in ast.unparse(call)
+    }
+    assert found - {"avow/base/grammars.py"} == GIVEN | OWN

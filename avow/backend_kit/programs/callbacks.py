@@ -15,6 +15,7 @@ from typing import Any
 from avow.backend_kit.programs.cpython import Subject, Told, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import read_text
 from avow.base.process import ToolMissing
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
@@ -179,7 +180,7 @@ class Driver:
     @property
     def text(self) -> str:
         """The program's own, of which only constants are looked at."""
-        return self.subject.file.read_text(encoding="utf-8", errors="replace")
+        return read_text(self.subject.file, "utf-8", errors="replace")
 
 
 def driver(system: System, name: str) -> Driver:
@@ -279,7 +280,7 @@ def unusable(text: str) -> Rejected:
 
 def _messages(node: Node, file: Path, known: Definitions, kind: Driving) -> dict[str, Any]:
     """The types of the contract's topics, and of the packages that the source's folder names, with what they hold."""
-    text = "".join(path.read_text(encoding="utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
+    text = "".join(read_text(path, "utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
     wanted = [canonical(topic.ros_type) for topic in node.topics]
     wanted += [name for name in known.messages if name.partition("/")[0] in text]
     found: dict[str, Any] = {}

@@ -15,6 +15,7 @@ from dataclasses import field, replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Span
+from avow.base.files import read_regular, read_text
 from avow.base.records import dataclass
 from avow.base.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
 from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
@@ -435,7 +436,7 @@ def _parsed(path: Path) -> Parsed:
     try:
         if path.stat().st_size > LAUNCH_BYTES:
             raise WrongLaunch(f"it has more than {LAUNCH_BYTES} bytes", 1)
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise WrongLaunch(f"it cannot be read: {error}", 1) from None
     from avow.ros.launch.markup import from_xml, from_yaml  # PyYAML is not light
@@ -468,7 +469,7 @@ def _packages(root: Path) -> Iterator[tuple[str, Path]]:
             return
         inside[:] = sorted(n for n in inside if not n.startswith(".") and n not in ("build", "install", "node_modules"))
         if "package.xml" in files:
-            text = Path(folder, "package.xml").read_bytes()[:LAUNCH_BYTES].decode("utf-8", "replace")
+            text = read_regular(Path(folder, "package.xml"))[:LAUNCH_BYTES].decode("utf-8", "replace")
             found = re.search(r"<name>\s*([\w.-]+)\s*</name>", text)
             if found:
                 yield found[1], Path(folder)
