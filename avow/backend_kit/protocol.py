@@ -13,7 +13,7 @@ import inspect
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
@@ -23,8 +23,10 @@ from avow.base.records import dataclass
 from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Isolation, Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
+from avow.evidence.record import RETRY
 from avow.formulas.values import Value
-from avow.isolation.observed import Observed
+from avow.isolation.level import Unavailable
+from avow.isolation.observed import Observed, sandbox
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Driving, Method, Source, System
 
@@ -136,6 +138,17 @@ class Report:
     def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:
         """The same answer for every obligation and claim of the job: the tool is missing, an input is at fault, …"""
         return cls(tuple(Outcome(o.id, verdict, summary) for o in job.every), tool, tool_version)
+
+    @classmethod
+    def unanswered(cls, job: Job, verdict: Verdict, why: str, tool: str, tool_version: str) -> Report:
+        """Where the process that was to answer did not: what it hung on nobody knows, and the next run asks again."""
+        outcomes = (Outcome(o.id, verdict, why, details={RETRY: True}) for o in job.every)
+        return cls(tuple(outcomes), tool, tool_version)
+
+    @classmethod
+    def unsealed(cls, job: Job, why: Unavailable, tool: str, tool_version: str) -> Report:
+        """Where a sandbox is required, and there is none: asked again as soon as there is, or as none is required."""
+        return replace(cls.alike(job, Verdict.NOT_RUN, str(why), tool, tool_version), observed=(sandbox(),))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import stat
 import sys
 import sysconfig
@@ -18,9 +19,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from avow.base.files import digest_file, identity, sha256
+from avow.base.files import digest_file, identity, sha256, text_or_nothing
 from avow.base.module_path import absolute_only
+from avow.base.programs import program_digest
 from avow.base.tuning.sizes import FOLDED
+from avow.base.verdict import Isolation
+from avow.isolation.level import Unavailable, available, wanted
 
 
 class Seen(StrEnum):
@@ -43,7 +47,9 @@ class Seen(StrEnum):
     VARIABLE = "variable"
     """One of the environment that is not always the same (`variables`); the digest is of its value."""
     TRACER = "tracer"
-    """Whether system calls are traced here (`tracing.traces`): what nothing could tell then, something may tell now."""
+    """Who traces system calls here; the digest is of the programs, or of why nothing does."""
+    SANDBOX = "sandbox"
+    """How subjects are kept here; the digest is of the level and of the program that seals them."""
     OUTSIDE = "outside"
     """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
 
@@ -63,9 +69,12 @@ def look(kind: Seen, path: str) -> str:
     if kind is Seen.PLACE:
         return sha256(os.path.realpath(path))
     if kind is Seen.TRACER:
-        from avow.isolation.tracing import traces  # not in a run with nothing to do: its patterns take their time
+        from avow.isolation.tracing import remedy, traces  # not in a run with nothing to do: it runs strace
 
-        return sha256(str(traces()))
+        return sha256(program_digest(guards(kind)) if traces() else remedy())
+    if kind is Seen.SANDBOX:
+        level = _level()
+        return sha256(f"{level} {program_digest(guards(kind)) if level is Isolation.SEALED else ''}")
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
         match kind:
@@ -89,6 +98,36 @@ def look(kind: Seen, path: str) -> str:
         return _link(path) if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
 
 
+_GUARDS = {Seen.TRACER: ("strace", "setpriv"), Seen.SANDBOX: ("bwrap",)}
+
+
+def guards(kind: Seen) -> tuple[str, ...]:
+    """Where the programs are that watch or keep a subject."""
+    return tuple(place for name in _GUARDS.get(kind, ()) if (place := shutil.which(name)) is not None)
+
+
+def _level() -> Isolation:
+    try:
+        return available()
+    except Unavailable:
+        return Isolation.NONE
+
+
+_GRANTS = (
+    "/proc/sys/kernel/yama/ptrace_scope",
+    "/proc/sys/kernel/unprivileged_userns_clone",
+    "/proc/sys/kernel/apparmor_restrict_unprivileged_userns",
+    "/proc/sys/user/max_user_namespaces",
+)
+
+
+def _granted() -> tuple[str, ...]:
+    """What this machine, or its container, lets a process do: whether these programs work hangs on it."""
+    lines = text_or_nothing(Path("/proc/self/status")).splitlines()
+    told = (line for line in lines if line.startswith(("Uid", "Cap", "NoNewPrivs", "Seccomp")))
+    return (*told, *(text_or_nothing(Path(name)) for name in _GRANTS))
+
+
 def _names(folder: str) -> list[str]:
     return sorted(name for name in os.listdir(folder) if name != "__pycache__")  # noqa: PTH208
 
@@ -101,6 +140,9 @@ def marks(observed: Observed) -> tuple[object, ...] | None:
     """What tells, without reading, that the bytes which a row stands for are as they were a moment ago; None where to
     look again costs no more."""
     try:
+        if observed.kind in _GUARDS:
+            places = guards(observed.kind)
+            return (*places, *(identity(os.stat(place), place) for place in places), wanted(), _granted())  # noqa: PTH116
         if observed.kind is Seen.READ:
             return identity(os.stat(observed.path), observed.path)  # noqa: PTH116
         if observed.kind is Seen.FOLDER:
@@ -219,16 +261,21 @@ def _of_python(path: str) -> bool:
     )
 
 
-def untold(what: str) -> tuple[Observed, Observed]:
-    """Of what read files while nothing traced: that they are not known, and that this is so for want of a tracer."""
+def untold(what: str) -> Observed:
+    """Of what read files while nothing traced: that they are not known."""
     from avow.isolation.tracing import remedy
 
-    return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})"), tracer()
+    return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})")
 
 
 def tracer() -> Observed:
-    """What is asked otherwise where nothing traces is asked again once something does."""
+    """What is seen by another, or by nobody, is asked again."""
     return Observed(Seen.TRACER, "strace", look(Seen.TRACER, "strace"))
+
+
+def sandbox() -> Observed:
+    """What is kept otherwise is asked again."""
+    return Observed(Seen.SANDBOX, "bwrap", look(Seen.SANDBOX, "bwrap"))
 
 
 def interpreter() -> Observed:

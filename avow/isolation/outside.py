@@ -18,7 +18,7 @@ from avow.base import process
 from avow.base.process import Completed, ToolMissing
 from avow.base.programs import program_files, program_folders
 from avow.base.tools import Tool
-from avow.isolation.observed import Observed, folded, recorded, untold
+from avow.isolation.observed import Observed, folded, recorded, tracer, untold
 from avow.isolation.tracing import Trace, traces
 
 _SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin", "/bin")
@@ -64,7 +64,7 @@ class Outside:
         return Completed(tuple(command), done.code, done.stdout, done.stderr, done.seconds)
 
     def observed(self) -> tuple[Observed, ...]:
-        """What they looked at so far that is in no key."""
+        """What they looked at so far that is in no key, and who told it."""
         places = [place for tool in self.tools for place in tool.places]
         known = {str(file) for place in places for file in program_files(place)}
         within = tuple(f"{folder}{os.sep}" for place in places for folder in program_folders(place))
@@ -74,7 +74,7 @@ class Outside:
             return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
 
         seen = recorded((event, path) for event, path in list(self._events) if told(event, path))
-        return folded((*seen, *(row for name in list(self._untraced) for row in untold(name))))
+        return folded((*seen, *map(untold, list(self._untraced)), tracer()))
 
     def _path(self, program: str) -> str:
         places = (program, *(place for tool in self.tools for place in tool.places))

@@ -20,7 +20,7 @@ from avow.base.codec import LATER, Unreadable, from_text
 from avow.base.records import dataclass
 from avow.base.verdict import Isolation
 from avow.isolation.level import available, sealed
-from avow.isolation.observed import Observed, interpreter, recorded, untold, variables
+from avow.isolation.observed import Observed, interpreter, recorded, sandbox, tracer, untold, variables
 from avow.isolation.tracing import Trace, traces
 
 _SCRATCH = "/tmp/avow-scratch"
@@ -95,11 +95,17 @@ class SubjectProcess:
         return [self._reply(reply) for reply in replies]
 
     def observed(self) -> tuple[Observed, ...]:
-        """What it has looked at so far, the interpreter first. A program that it started is told by what the trace
-        tells of it, where there is one of all that ran."""
+        """What it has looked at so far, the interpreter first, who watched it and kept it last. A program that it
+        started is told by what the trace tells of it, where there is one of all that ran."""
         programs = [what for event, what in self._events if event == "program"]
-        untraced = (row for what in programs for row in untold(what)) if self._untraced else ()
-        return (interpreter(), *recorded(e for e in self._events if e[0] != "program"), *dict.fromkeys(untraced))
+        untraced = map(untold, dict.fromkeys(programs)) if self._untraced else ()
+        return (
+            interpreter(),
+            *recorded(e for e in self._events if e[0] != "program"),
+            *untraced,
+            tracer(),
+            sandbox(),
+        )
 
     def close(self) -> str:
         """End it, with all that it started; what it did that no subject may do, in words."""

@@ -29,7 +29,7 @@ from avow.base.tools import LIBRARIES, package_digest
 from avow.base.tuning.running import TICK_SECONDS
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Observed, Seen, look, marks
+from avow.isolation.observed import Observed, Seen, guards, look, marks
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 
@@ -94,8 +94,10 @@ class Shortcut:
             sources = _sources(self.workspace)
             if self._begun != sources or _reads_elsewhere(self.workspace):
                 return
-            tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
-            observed = (*_observed(self.workspace), *dict.fromkeys(tools))
+            seen = _observed(self.workspace)
+            places = (*programs, *(place for kind in dict.fromkeys(o.kind for o in seen) for place in guards(kind)))
+            tools = (Observed(Seen.READ, str(file)) for path in places for file in program_files(path))
+            observed = (*seen, *dict.fromkeys(tools))
             identity = _identity(self.workspace, sources, observed)
             write_note(_stamp(self.workspace), _Settled(sources, identity, observed, tuple(results)))
         except OSError:

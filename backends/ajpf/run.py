@@ -16,7 +16,7 @@ from avow.base.files import read_text
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
-from avow.isolation.observed import Observed, tracer
+from avow.isolation.observed import Observed, Seen, tracer
 from avow.isolation.outside import Outside
 from avow.isolation.tracing import remedy, traces
 
@@ -259,6 +259,9 @@ class _Run:
                     seconds = max(0.0, deadline - time.monotonic())
                     answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds, outside)
             except spin.NoOpinion as error:
+                # not what cannot be recorded: no answer of ours rests on it
+                looked = (o for o in outside.observed() if o.kind is not Seen.OUTSIDE)
+                self.observed.update(dict.fromkeys(looked))
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":
                     verdict = Verdict.NOT_RUN if spin_tool.version() is None else Verdict.UNKNOWN

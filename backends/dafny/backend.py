@@ -145,7 +145,7 @@ class DafnyBackend(Backend):
         try:
             settled = settle(job.node, generated, scanned, path.name, limits, outside)
         except (process.ToolMissing, OSError) as error:
-            return all_alike(Verdict.ERROR, f"dafny could not be run: {error}")
+            return Report.unanswered(job, Verdict.ERROR, f"dafny could not be run: {error}", "dafny", version)
         uncovered = dict(generated.uncovered)
         outcomes = []
         for obligation in job.obligations:

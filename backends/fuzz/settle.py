@@ -24,6 +24,7 @@ from avow.base.process import ToolMissing
 from avow.base.verdict import Isolation, Object, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import ProgramClaim
+from avow.evidence.record import RETRY
 from avow.isolation import judge
 from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
@@ -53,10 +54,10 @@ def settle(job: Job, limits: Limits) -> Report:
     try:
         available()
         if not tool.present:
-            raise ToolMissing(f"clang++ is not here: {tool.install}")
+            return Report.alike(job, Verdict.NOT_RUN, f"clang++ is not here: {tool.install}", TOOL, version)
         reading = load(job)
-    except (Unavailable, ToolMissing) as missing:
-        return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
+    except Unavailable as missing:
+        return Report.unsealed(job, missing, TOOL, version)
     except Rejected as rejected:
         return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
     with tempfile.TemporaryDirectory(prefix="avow-fuzz-") as scratch:
@@ -69,6 +70,8 @@ def settle(job: Job, limits: Limits) -> Report:
             outcomes = work.alike(Verdict.ERROR, str(error))
         except Unanswered as error:
             outcomes = work.alike(error.verdict, str(error))
+            if error.silent:
+                outcomes = tuple(replace(o, details={RETRY: True}) for o in outcomes)
         except ToolMissing as missing:
             outcomes = work.alike(Verdict.NOT_RUN, str(missing))
     what = {"of": Object.BINARY, "numbers": reading.source.numbers.value}
@@ -77,11 +80,12 @@ def settle(job: Job, limits: Limits) -> Report:
 
 
 class Unanswered(Exception):  # noqa: N818 - it names what happened
-    """The judge gave no answer, or the subject did what no subject may do: of nothing anything is concluded."""
+    """The judge gave no answer (`silent`: what it hung on nobody knows), or the subject did what no subject may do: of
+    nothing anything is concluded."""
 
-    def __init__(self, verdict: Verdict, why: str) -> None:
+    def __init__(self, verdict: Verdict, why: str, silent: bool = False) -> None:
         super().__init__(why)
-        self.verdict = verdict
+        self.verdict, self.silent = verdict, silent
 
 
 @dataclass(slots=True)
@@ -111,13 +115,13 @@ class Work:
         reading = self.reading
         made = drawable(reading)
         building.write(reading, made, self.folder)
-        built = [
-            building.fuzzed(reading, self.folder, self._outside, self._left()),
-            building.plain(reading, self.folder, self._outside, self._left()),
-            building.filled(reading, self.folder, self._outside, self._left()),
-        ]
-        unseen = building.looked_into(reading, self.folder, self._outside, built[1].linked, self._left())
-        self.observed.update(dict.fromkeys(building.observed(reading, tuple(built), self._outside)))
+        built: list[building.Built] = []
+        try:
+            for build in (building.fuzzed, building.plain, building.filled):
+                built.append(build(reading, self.folder, self._outside, self._left()))
+            unseen = building.looked_into(reading, self.folder, self._outside, built[1].linked, self._left())
+        finally:  # also of what cannot be built: it may be once a library is there
+            self.observed.update(dict.fromkeys(building.observed(reading, tuple(built), self._outside)))
         bench = Bench(reading)
         kept = self.folder / "kept"
         seeds = self._seeds(kept / "corpus")
@@ -166,9 +170,11 @@ class Work:
         )
         if answer is None:
             if done.timed_out:
-                raise Unanswered(Verdict.UNKNOWN, f"it did not end within {self.limits.seconds:g} s; {ALLOWS_MORE}")
+                raise Unanswered(
+                    Verdict.UNKNOWN, f"it did not end within {self.limits.seconds:g} s; {ALLOWS_MORE}", True
+                )
             last = done.stderr.strip().splitlines()[-1:] or ["no message"]
-            raise Unanswered(Verdict.ERROR, f"its judge ended without an answer: {last[0][:200]}")
+            raise Unanswered(Verdict.ERROR, f"its judge ended without an answer: {last[0][:200]}", True)
         return answer
 
     def _seeds(self, corpus: Path) -> list[bytes]:
@@ -198,7 +204,7 @@ class Work:
             raise Unanswered(Verdict.ERROR, answer.fault)
         if answer.code is None:
             why = f"libFuzzer did not make its {self.reading.runs} runs in the time given; {ALLOWS_MORE}"
-            raise Unanswered(Verdict.UNKNOWN, why)
+            raise Unanswered(Verdict.UNKNOWN, why, True)
         return answer
 
     def _kept_apart(self, isolation: Isolation) -> None:
@@ -213,7 +219,7 @@ class Work:
         self._kept_apart(answer.isolation)
         self.observed.update(dict.fromkeys(answer.observed))
         if answer.fault:
-            raise Unanswered(Verdict.UNKNOWN if answer.silent else Verdict.ERROR, answer.fault)
+            raise Unanswered(Verdict.UNKNOWN if answer.silent else Verdict.ERROR, answer.fault, answer.silent)
         return answer
 
     def _earlier(self) -> Iterator[list[Step]]:

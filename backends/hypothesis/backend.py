@@ -61,7 +61,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     try:
         available()
     except Unavailable as missing:
-        return Report.alike(job, Verdict.NOT_RUN, str(missing), "hypothesis", version)
+        return Report.unsealed(job, missing, "hypothesis", version)
     found = problems(job)
     if found:
         return Report.alike(job, Verdict.ERROR, told(job, found), "hypothesis", version)
@@ -80,9 +80,9 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     if answer is None:
         why = _silence(done, limits)
         verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
-        return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
+        return replace(Report.unanswered(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     if answer.guarantees.keys() != {o.name for o in job.obligations}:
-        return Report.alike(job, Verdict.ERROR, "the judge's answer is of other guarantees", "hypothesis", version)
+        return Report.unanswered(job, Verdict.ERROR, "the judge's answer is of other guarantees", "hypothesis", version)
     refuting = export.numbers(job) == ANY
     exact = export.numbers(job) == EXACT
     outcomes = tuple(

@@ -87,7 +87,7 @@ def settle(job: Job, limits: Limits, version: str) -> Report:
     try:
         available()
     except Unavailable as missing:
-        return Report.alike(job, Verdict.NOT_RUN, str(missing), "hypothesis", version)
+        return Report.unsealed(job, missing, "hypothesis", version)
     backend = judge_of_runs()
     if backend is None:
         return Report.alike(job, Verdict.NOT_RUN, "no installed method judges runs of messages", "hypothesis", version)

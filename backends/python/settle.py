@@ -50,7 +50,7 @@ def settle(job: Job, limits: Limits) -> Report:
         available()
         reading = load(job)
     except Unavailable as missing:
-        return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
+        return Report.unsealed(job, missing, TOOL, version)
     except Rejected as rejected:
         return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
     if not job.every:

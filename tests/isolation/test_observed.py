@@ -6,6 +6,7 @@ import importlib.util
 import py_compile
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -116,7 +117,7 @@ LINKS = {"models/chosen": "mode.txt", "models/dangling": "nowhere"}
 
 
 @pytest.fixture(scope="module")
-def settled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, Work]:
+def settled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Workspace, Work]]:
     root = tmp_path_factory.mktemp("observed")
     workspace = Workspace(root)
     folder = root / "contracts" / "robot"
@@ -131,9 +132,9 @@ def settled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, Work]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(SANDBOX, "off")  # a sealed one would not see the file outside, which lies under /tmp
         outcomes = discharge(workspace, work, Run("first", False))
-    assert [o.verdict for o in outcomes] == [Verdict.TESTED], outcomes
-    assert not open_obligations(workspace, work, Run("second", False))
-    return workspace, work
+        assert [o.verdict for o in outcomes] == [Verdict.TESTED], outcomes
+        assert not open_obligations(workspace, work, Run("second", False))
+        yield workspace, work
 
 
 def method(folder: Path) -> Work:

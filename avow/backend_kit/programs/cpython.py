@@ -103,7 +103,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         why = "took too long" if done.timed_out else f"ended without an answer (code {done.code})"
         last = done.stderr.strip().splitlines()[-1:]
         fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
-        return Told((), fault, (), Isolation.NONE, done.timed_out)
+        return Told((), fault, (), Isolation.NONE, True)
     return replace(answer, replies=tuple(json.loads(r) if isinstance(r, str) else r for r in answer.replies))
 
 
