@@ -34,7 +34,12 @@ def changed(record: Evidence, root: Path) -> tuple[str, ...]:
         seen = from_json(tuple[Observed, ...], record.details[OBSERVED])
     except ValueError:
         return ("what was observed cannot be read",)
-    return tuple(o.path for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
+    return tuple(o.path for o in differing(seen, root))
+
+
+def differing(seen: Iterable[Observed], root: Path) -> tuple[Observed, ...]:
+    """Those that are not so on this machine; relative paths are under `root`, the workspace."""
+    return tuple(o for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
 
 
 def outlived(entry: Entry, refutations: Sequence[Entry]) -> bool:

@@ -6,7 +6,7 @@ answered whole is handed on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,19 @@ from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular
+from avow.base.plain import one_line
 from avow.base.tuning.running import WORKER_GRACE
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.currency import differing
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
-from avow.isolation.observed import Seen
+from avow.isolation.observed import Observed, Seen
 from avow.pipeline.executors import Asked, Came, Desk, Elsewhere, Executor, answered
 from avow.pipeline.mutant_systems import Altered
 from avow.pipeline.requests import Request, Unanswered, read_response
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, is_portable, method_backend, planned_method
+from avow.pipeline.work import Work, is_portable, method_backend, planned_method, tool_identities
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 
@@ -48,15 +50,23 @@ def settle(
         request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {}, earlier=earlier)
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
-    asked, came = _answer(workspace, request, run)
-    log = {"worker.log": came.log} if came.log.strip() else {}
-    if came.data is None:
-        return _failed(obligations, work, Verdict.UNKNOWN if came.timed_out else Verdict.ERROR, came.failure, log)
-    report = judged(work, obligations, asked.data, came.data, log)
     if run.elsewhere is None or request.root:
+        return _here(workspace, work, obligations, request, run)
+    asked, came = run.elsewhere.desk.ask(request)
+    report = _told(work, obligations, asked, came)
+    others = unlike_here(report.observed, workspace.root)
+    if not others:
         return report
-    # What a tool looked at on another machine cannot be looked at here; its programs' digests are in the key.
-    return replace(report, observed=tuple(o for o in report.observed if o.kind is Seen.OUTSIDE))
+    worker = one_line(read_response(came.data, asked.data).worker)[:64]
+    if not _has_its_tools(work):
+        return _undeclared(report, others, worker)
+    what = f"{work.engine} used {_on(worker, others[0])}, which {_UNLIKE}"
+    run.elsewhere.tell(f"{what}: what depends on the like is done again here")
+    with run.elsewhere.again:
+        return _here(workspace, work, obligations, request, run)
+
+
+_UNLIKE = "is not so on this machine, or cannot be recorded"
 
 
 def elsewhere(executor: Executor) -> Elsewhere:
@@ -71,14 +81,35 @@ def elsewhere(executor: Executor) -> Elsewhere:
     return Elsewhere(Desk(executor, _said), chosen)
 
 
-def _answer(workspace: Workspace, request: Request, run: Run) -> tuple[Asked, Came]:
-    if run.elsewhere is not None and not request.root:
-        return run.elsewhere.desk.ask(request)
+def unlike_here(observed: Iterable[Observed], root: Path) -> tuple[Observed, ...]:
+    """What a worker saw that is not so on this machine, or that none can record. A record is held against this
+    machine: of what lies on another it could not tell later that it changed."""
+    rows = tuple(observed)
+    recorded = (o for o in rows if o.kind is not Seen.OUTSIDE)
+    return (*(o for o in rows if o.kind is Seen.OUTSIDE), *differing(recorded, root))
+
+
+def _here(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], request: Request, run: Run) -> Report:
+    """Settle them in a process of their own on this machine."""
     asked = Asked.of(request)
     try:
-        return asked, answered(run.forks, asked.data, asked.key, request.seconds + WORKER_GRACE, workspace.root)
+        came = answered(run.forks, asked.data, asked.key, request.seconds + WORKER_GRACE, workspace.root)
     except OSError as error:
-        return asked, Came(asked.key, failure=f"{type(error).__name__}: {error}")
+        came = Came(asked.key, failure=f"{type(error).__name__}: {error}")
+    report = _told(work, obligations, asked, came)
+    return replace(report, outcomes=tuple(_declared(outcome, report) for outcome in report.outcomes))
+
+
+def _told(work: Work, obligations: tuple[Obligation, ...], asked: Asked, came: Came) -> Report:
+    log = {"worker.log": came.log} if came.log.strip() else {}
+    if came.data is None:
+        return _failed(obligations, work, Verdict.UNKNOWN if came.timed_out else Verdict.ERROR, came.failure, log)
+    return judged(work, obligations, asked.data, came.data, log)
+
+
+def _has_its_tools(work: Work) -> bool:
+    """Whether this machine has the tools of its keys."""
+    return not work.is_engine and tool_identities(method_backend(work.system, planned_method(work))) == work.tools
 
 
 def _lacking(work: Work, run: Run) -> tuple[str, ...]:
@@ -150,7 +181,7 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
     for obligation in obligations:
         match answers.get(obligation.id, []):
             case [outcome]:
-                outcomes.append(_declared(outcome, report))
+                outcomes.append(outcome)
             case []:
                 outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
             case _:  # more than one
@@ -160,13 +191,26 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
     return replace(report, outcomes=tuple(outcomes))
 
 
-def _declared(outcome: Outcome, report: Report) -> Outcome:
+def _declared(outcome: Outcome, report: Report, why: str = "that cannot be recorded") -> Outcome:
     """What was answered from something that cannot be recorded could come out otherwise tomorrow, unnoticed."""
     outside = [o.path for o in report.observed if o.kind is Seen.OUTSIDE]
     if not outside or not outcome.verdict.supports or outcome.vacuous:  # what is vacuous supports nothing
         return outcome
-    summary = f"undeclared input: it used {', '.join(outside[:3])}; that cannot be recorded"
+    summary = f"undeclared input: it used {', '.join(outside[:3])}; {why}"
     return replace(outcome, verdict=Verdict.UNKNOWN, summary=f"{summary} (else: {outcome.summary})")
+
+
+def _undeclared(report: Report, others: Sequence[Observed], worker: str) -> Report:
+    """What a tool that is not here answered where something is not as here. The next run asks again."""
+    rows = dict.fromkeys(Observed(Seen.OUTSIDE, _on(worker, o)) for o in others)
+    told = replace(report, observed=(*(o for o in report.observed if o not in others), *rows))
+    why = f"that {_UNLIKE}; have the same packages there as here, or the tool here"
+    outcomes = (_declared(outcome, told, why) for outcome in report.outcomes)
+    return replace(told, outcomes=tuple(replace(o, details={**o.details, RETRY: True}) for o in outcomes))
+
+
+def _on(worker: str, row: Observed) -> str:
+    return f"{one_line(row.path)} (on {worker})"
 
 
 def _failed(

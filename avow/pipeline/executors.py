@@ -6,6 +6,7 @@ the process that asked writes ledger, artifacts and reports.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import threading
@@ -152,6 +153,17 @@ class Elsewhere:
     desk: Desk
     tools: Mapping[str, tuple[str, str]]
     """Tool → version and program's digest there: what is settled there is of these."""
+    again: threading.BoundedSemaphore = field(
+        default_factory=lambda: threading.BoundedSemaphore(os.cpu_count() or 1), repr=False
+    )
+    """For what is done again on this machine: not as much at once as a cluster does."""
+    _told: set[str] = field(default_factory=set, repr=False)
+
+    def tell(self, text: str) -> None:
+        """On standard error, once."""
+        if text not in self._told:
+            self._told.add(text)
+            print(f"warning: {text}", file=sys.stderr)
 
 
 @dataclass(slots=True)

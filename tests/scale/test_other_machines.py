@@ -1,0 +1,150 @@
+"""What is looked at on a cluster's worker: it counts where it is as on this machine, or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from avow.backend_kit.protocol import Report
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
+from avow.evidence.record import RETRY
+from avow.isolation import tracing
+from avow.isolation.observed import Observed, Seen, look
+from avow.pipeline import asking, worker
+from avow.pipeline import work as work_module
+from avow.pipeline.discharge import discharge, open_obligations
+from avow.pipeline.executors import Asked, Came
+from avow.pipeline.requests import read_response, response_bytes
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import Work
+from avow.pipeline.worker import answer
+
+from .test_executors import Odd, one, place, works
+
+__all__ = ["place"]  # a fixture
+
+
+class Seeing(Odd):
+    """A worker on another machine, whose answers tell what was looked at there."""
+
+    def __init__(self, observed: Sequence[Observed]) -> None:
+        super().__init__()
+        self.observed = tuple(observed)
+
+    def submit(self, asked: Asked) -> None:
+        with pytest.MonkeyPatch.context() as there:
+            for module in (work_module, worker):
+                there.setattr(module, "tool_identities", lambda tool, offered=None: asked.request.tools)
+            good = read_response(answer(asked.data), asked.data)
+        assert good.report is not None
+        seen = dataclasses.replace(good.report, observed=self.observed)
+        self.came.put(Came(asked.key, response_bytes(dataclasses.replace(good, report=seen, worker="wk\x1b1"))))
+
+
+def as_it_is(kind: Seen, path: Path) -> Observed:
+    return Observed(kind, str(path), "" if kind is Seen.MISSING else look(kind, str(path)))
+
+
+def test_what_a_worker_saw_is_held_against_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rule alone, for every kind of row: as it is, and as it is not."""
+    (tmp_path / "folder").mkdir()
+    file = tmp_path / "folder" / "file"
+    file.write_text("1")
+    gone = tmp_path / "gone"
+    monkeypatch.setattr(tracing, "traces", lambda: True)
+    rows = {
+        Seen.READ: file,
+        Seen.MISSING: gone,
+        Seen.LISTING: file.parent,
+        Seen.FOLDER: file.parent,
+        Seen.STATE: file,
+        Seen.KIND: file,
+        Seen.PLACE: tmp_path,
+        Seen.VARIABLE: Path("PATH"),
+        Seen.TRACER: Path("strace"),
+        Seen.SANDBOX: Path("bwrap"),
+    }
+    for kind, path in rows.items():
+        row = as_it_is(kind, path)
+        assert not asking.unlike_here([row], tmp_path), kind
+        other = row._replace(digest="0" * 64) if kind is not Seen.MISSING else as_it_is(kind, file)
+        assert asking.unlike_here([row, other], tmp_path) == (other,)
+    outside = Observed(Seen.OUTSIDE, "the network")
+    assert asking.unlike_here([outside], tmp_path) == (outside,)
+    assert {*rows, Seen.OUTSIDE} == set(Seen)
+    relative = as_it_is(Seen.READ, file)._replace(path="folder/file")  # of the workspace
+    assert not asking.unlike_here([relative], tmp_path)
+    assert asking.unlike_here([relative], tmp_path / "other") == (relative,)
+
+
+def first_of(place: Workspace, run: Run) -> tuple[Work, Report]:
+    work = next(w for w in works(place, run.elsewhere) if w.engine == "hoare")
+    return work, asking.settle(place, work, work.obligations, place.root, run)
+
+
+def test_what_holds_here_too_stays_on_record_and_goes_stale_here(place: Workspace, tmp_path: Path) -> None:
+    header = tmp_path / "header"
+    header.write_text("1")
+    rows = (as_it_is(Seen.READ, header), as_it_is(Seen.MISSING, tmp_path / "settings"))
+    run = Run("a", False, elsewhere=asking.elsewhere(Seeing(rows)))
+    work, report = first_of(place, run)
+    assert report.observed == rows
+    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}
+    discharge(place, work, run)
+    assert not open_obligations(place, work, Run("b", False))
+    header.write_text("2")
+    assert open_obligations(place, work, Run("b", False))
+    header.write_text("1")
+    assert not open_obligations(place, work, Run("b", False))
+    (tmp_path / "settings").touch()
+    assert open_obligations(place, work, Run("b", False))
+
+
+@pytest.mark.parametrize("kind", [Seen.READ, Seen.MISSING, Seen.OUTSIDE])
+def test_what_is_otherwise_on_a_worker_never_counts_unseen(
+    place: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kind: Seen
+) -> None:
+    """Done again where its tools are here; else an undeclared input, until something is done about it."""
+    header = tmp_path / "header"
+    header.write_text("1")
+    same, other = as_it_is(Seen.READ, place.contracts / "made" / "system.rcl"), Observed(kind, str(header), "")
+    seeing = Seeing([same, other])
+    _, report = first_of(place, Run("a", False, elsewhere=asking.elsewhere(seeing)))
+    assert not report.observed, "it was done here, where nothing was looked at"
+    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}
+    said = capsys.readouterr().err
+    assert f"{header} (on wk 1)" in said
+    assert "done again here" in said
+    # a tool that only the workers have
+    theirs = ("z3", "9.9", "x")
+    monkeypatch.setattr(Seeing, "offers", lambda self: {"wk1": frozenset([theirs])})
+    seeing = Seeing([same, other])  # another desk, which alone listens to it
+    run = Run("b", False, elsewhere=asking.elsewhere(seeing))
+    work, report = first_of(place, run)
+    for outcome in report.outcomes:
+        assert outcome.verdict is Verdict.UNKNOWN
+        assert outcome.summary.startswith("undeclared input: ")
+        assert f"{header} (on wk 1)" in outcome.summary
+    assert same in report.observed
+    assert not {o.digest for o in report.observed if o.kind is Seen.OUTSIDE} - {""}
+    discharge(place, work, run)
+    assert open_obligations(place, work, Run("c", False, elsewhere=run.elsewhere)), "the next run asks again"
+    seeing.observed = (same,)
+    run = Run("c", False, elsewhere=run.elsewhere)
+    assert {o.verdict for o in discharge(place, work, run)} == {Verdict.PROVED}
+    assert not open_obligations(place, work, Run("d", False, elsewhere=run.elsewhere))
+
+
+def test_a_refutation_stays_one_whatever_the_worker_saw(place: Workspace) -> None:
+    asked = one(place)[1]
+    good = read_response(answer(asked.data), asked.data).report
+    assert good is not None
+    bad = tuple(dataclasses.replace(o, verdict=Verdict.REFUTED) for o in good.outcomes)
+    row = Observed(Seen.READ, "/etc/other", "0")
+    report = asking._undeclared(dataclasses.replace(good, outcomes=bad, observed=(row,)), [row], "wk1")
+    assert {o.verdict for o in report.outcomes} == {Verdict.REFUTED}
+    assert all(o.details[RETRY] for o in report.outcomes)
