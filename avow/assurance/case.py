@@ -218,7 +218,8 @@ def conclude(facts: Facts) -> Case:
 
 
 def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[Entry, ...]]:
-    """Each obligation's records with where they stand in time, and the records that belong to no obligation."""
+    """Each obligation's records with where they stand in time, and the records that belong to no obligation: in an
+    order that does not hang on which method answered first."""
     grouped: dict[str, list[Entry]] = {o.id: [] for o in facts.obligations}
     orphans = []
     for entry in facts.entries:
@@ -228,10 +229,18 @@ def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[
             orphans.append(entry)
     digests = {o.id: o.digest for o in facts.obligations}
     result = {
-        name: tuple(_views(entries, digests[name], dict(facts.planned.get(name, ())), facts.run, facts.today))
+        name: _in_order(_views(entries, digests[name], dict(facts.planned.get(name, ())), facts.run, facts.today))
         for name, entries in grouped.items()
     }
-    return result, tuple(orphans)
+    return result, tuple(sorted(orphans, key=lambda e: (e.evidence.obligation, e.evidence.method)))
+
+
+def _in_order(views: list[EvidenceView]) -> tuple[EvidenceView, ...]:
+    """Run by run, and in each by method: which of several methods answered first is chance."""
+    if len(views) == 1:  # nearly always
+        return tuple(views)
+    runs = {run: at for at, run in enumerate(dict.fromkeys(v.entry.evidence.run for v in views))}
+    return tuple(sorted(views, key=lambda v: (runs[v.entry.evidence.run], v.entry.evidence.method)))
 
 
 def _views(

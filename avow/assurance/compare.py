@@ -138,7 +138,7 @@ def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
         digests[record.obligation] = record.obligation_digest
     grouped: dict[str, list[Evidence]] = {}
     answers: dict[str, dict[str, Answer]] = {}
-    for (obligation, method), found in newest.items():
+    for (obligation, method), found in sorted(newest.items()):
         counting = [e for e in found if e.evidence.obligation_digest == digests[obligation]]
         grouped.setdefault(obligation, []).extend(e.evidence for e in counting)
         if counting:

@@ -34,7 +34,7 @@ def standing(file: str) -> StatusLookup:
 
     def lookup(node: str, clause: str) -> str | None:
         found = latest.get(f"{system}/{node}/guarantee/{clause}")
-        return "last time: " + ", ".join(found.values()) if found else None
+        return "last time: " + ", ".join(found[method] for method in sorted(found)) if found else None
 
     return lookup
 

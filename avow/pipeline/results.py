@@ -46,8 +46,8 @@ class Results:
 
     @property
     def all(self) -> tuple[Result, ...]:
-        """The systems assessed so far."""
-        return tuple(self.finished.values())
+        """The systems assessed so far, by name: which was through first is chance."""
+        return tuple(self.finished[name] for name in sorted(self.finished))
 
     @property
     def exit_code(self) -> int:
