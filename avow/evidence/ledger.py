@@ -246,10 +246,8 @@ class Ledger:
             tail = os.pread(file, start - begin, begin) + tail
             start = begin
         torn = tail.rpartition(b"\n")[2]
-        with self.path.with_name(self.path.name + ".torn").open("ab") as aside:
-            aside.write(torn + b"\n")
-            aside.flush()
-            os.fsync(aside.fileno())
+        with locked(self.path.with_name(self.path.name + ".torn")) as aside:
+            append(aside, torn + b"\n")
         os.ftruncate(file, size - len(torn))
         self.repaired += (f"a torn last line of {len(torn)} bytes was put aside in {self.path.name}.torn",)
 

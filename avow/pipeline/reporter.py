@@ -196,8 +196,11 @@ def _sweep(workspace: Workspace) -> None:
 def _lock_run(workspace: Workspace, out: IO[str]) -> IO[str] | None:
     """One run at a time in a workspace: a second waits for the first and then finds its work done. None where nothing
     can be written: there, no two runs can be in each other's way."""
+    place = workspace.artifacts / ".lock"
     try:
-        file = (workspace.artifacts / ".lock").open("w")
+        if place.exists() and not place.is_file():
+            place.unlink()  # a pipe in its place would keep us waiting for ever
+        file = place.open("w")
     except OSError:
         return None
     try:
