@@ -14,7 +14,6 @@ Profiles are data (`profiles.yaml`, beside this module). Errors are located diag
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -25,6 +24,7 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 from avow.base.verdict import Isolation, Link, Object, said, unsaid
 from avow.evidence.status import Status
 from avow.system.plan import Located, Numbers
@@ -153,7 +153,7 @@ def read_policy(located: Located) -> Policy:
 def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
     if name in _data()[0]:
         return profile(name), []
-    fault = Diagnostic("POLICY001", f"there is no policy profile '{name}'", span, hint=_near(name, profile_names()))
+    fault = Diagnostic("POLICY001", f"there is no policy profile '{name}'", span, hint=suggest(name, profile_names()))
     return profile("default"), [fault]
 
 
@@ -257,7 +257,7 @@ class _PolicyReader:
             if word in allowed:
                 good.append(word)
             else:
-                self.fault(f"'{word}' is none of {', '.join(allowed)}", (*path, at), _near(word, allowed))
+                self.fault(f"'{word}' is none of {', '.join(allowed)}", (*path, at), suggest(word, allowed))
         return tuple(good)
 
     def texts(self, data: object, path: tuple[str | int, ...]) -> tuple[str, ...]:
@@ -300,16 +300,11 @@ def _unknown(
             "POLICY003",
             f"{'.'.join(map(str, ('policy', *path)))}: unknown key '{key}'; known: {', '.join(known)}",
             located.at(*path, key),
-            hint=_near(str(key), known),
+            hint=suggest(str(key), known),
         )
         for key in data
         if key not in known
     ]
-
-
-def _near(word: str, known: Iterable[str]) -> str | None:
-    found = difflib.get_close_matches(word, list(known), n=1)
-    return f"did you mean '{found[0]}'?" if found else f"known: {', '.join(known)}"
 
 
 @cache

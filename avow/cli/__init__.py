@@ -12,6 +12,7 @@ import sys
 from typing import Any
 
 from avow.base.module_path import leave_here
+from avow.base.suggestions import did_you_mean
 
 leave_here()  # before anything is imported that a folder of somebody else's could have a module for
 
@@ -80,11 +81,8 @@ class _Lazy(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        import difflib
-
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            ctx.fail(f"no such command '{args[0]}'" + (f"; did you mean '{near[0]}'?" if near else ""))
+            ctx.fail("; ".join(filter(None, (f"no such command '{args[0]}'", did_you_mean(args[0], COMMANDS)))))
         return super().resolve_command(ctx, args)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from avow.assurance.codec import read_case
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import did_you_mean, suggest
 from avow.base.workspace import Workspace, name_of
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
@@ -165,13 +165,12 @@ def find_claim(
     known = [name for _, view in named for name in (short(view.id), view.id)]
     known += [name for case in cases for name in _others(case)]
     today = renamed(wanted)
-    near = [today] if today else difflib.get_close_matches(wanted, dict.fromkeys(known), n=3)
     guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
     such = f" (such as {guarantees[0]})" if guarantees else ""
     kinds = (
         f"a guarantee{such}, a requirement, node, supposition, gate or file, a diagnostic's code, a word of the report"
     )
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {kinds}"
+    hint = f"did you mean `{today}`?" if today else did_you_mean(wanted, known, 3) or f"known: {kinds}"
     raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
 
 
@@ -188,6 +187,4 @@ def _others(case: Case) -> Iterator[str]:
 
 
 def _unknown(message: str, name: str, known: Sequence[str]) -> Diagnostic:
-    near = difflib.get_close_matches(name, known, n=3)
-    hint = f"did you mean {' or '.join(near)}?" if near else (f"known: {', '.join(known[:8])}" if known else None)
-    return Diagnostic("LEDGER002", message, hint=hint)
+    return Diagnostic("LEDGER002", message, hint=did_you_mean(name, known, 3) or suggest(name, known))

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
-from avow.language.terms import (
-    Term,
-)
+from avow.language.terms import Term
 
 T = TypeVar("T")
 

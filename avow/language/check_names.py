@@ -6,8 +6,8 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Span
 from avow.base.plain import count
+from avow.base.suggestions import did_you_mean
 from avow.language.check_base import Base
-from avow.language.environment import did_you_mean
 from avow.language.foreign import FIELDS, FOREIGN_NAMES
 from avow.language.lexer import KEYWORDS, unquote
 from avow.language.printer import show_sort

@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.suggestions import did_you_mean
 from avow.language.chains import equivalence, implication
 from avow.language.check_definitions import Definitions
 from avow.language.check_names import BUILTINS
-from avow.language.environment import did_you_mean
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.operators import conditional

@@ -12,10 +12,11 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
-from avow.language.environment import Environment, did_you_mean
+from avow.language.environment import Environment
 from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
 from dataclasses import field
 from typing import assert_never
 
@@ -88,22 +86,3 @@ def of_contract(contract: Contract) -> Environment:
         for port in (*node.inputs, *node.outputs):
             environment._inner(port.sort)
     return environment
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that someone who wrote `name` most likely meant, if any is near."""
-    if len(name) > 60:
-        return None
-    candidates = sorted({k for k in known if k != name and abs(len(k) - len(name)) <= 3})
-    folded = name.casefold()
-    for candidate in candidates:
-        if candidate.casefold() == folded:
-            return candidate
-    limit = 0.6 if len(name) > 3 else 0.75
-    close = difflib.get_close_matches(name, candidates[:2000], n=1, cutoff=limit)
-    return close[0] if close else None
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str | None:
-    near = nearest(name, known)
-    return f"did you mean `{near}`?" if near is not None else None

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.diagnostics import Span
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import CONTRACT_PARTS, NESTING
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
 from avow.language.definedness import with_value
-from avow.language.environment import did_you_mean
 from avow.language.file_syntax import ClauseSyntax, NodeSyntax
 from avow.language.flat import flat
 from avow.language.lexer import Token, unquote

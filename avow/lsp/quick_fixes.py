@@ -17,7 +17,7 @@ from avow.base.diagnostics import Diagnostic, Span
 from avow.base.tuning.running import FIXES_TRIED
 
 _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
-_MEANT = re.compile(r"did you mean ['`]([^'`\n]+)['`]\?")
+_MEANT = re.compile(r"did you mean `([^`\n]+)`\?")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_']*")
 
 Check = Callable[[str], tuple[Diagnostic, ...]]

@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterable, Iterator
 
 from avow.base.diagnostics import Diagnostic, Span
+from avow.base.suggestions import suggest
 from avow.language.contract import Contract, Node, Port
 from avow.language.sorts import BOOL, REAL, FunctionSort
 from avow.system.plan import STEP_LENGTH, Plan
 from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
-from avow.system.schema import suggest
 from avow.system.source_plan import check_memory
 from avow.system.strict_yaml import Piece, listed
 

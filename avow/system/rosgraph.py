@@ -14,12 +14,12 @@ from pathlib import Path
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import ROS_GRAPH_ARCS, ROS_GRAPH_BYTES
 from avow.ros.listing import is_info, parse_info
 from avow.system.dot import Malformed, parse
 from avow.system.graph import Graph
 from avow.system.plan import System
-from avow.system.schema import suggest
 
 _DOT = re.compile(r"(?>\s|(?://|#)[^\n]*|/\*.*?\*/)*+(?:strict\s+)?(?:di)?graph\b[^{>]*\{", re.DOTALL | re.IGNORECASE)
 _LINE = re.compile(r"\s*(/?[\w/.-]+)\s*->\s*(/?[\w/.-]+)\s*(?::\s*(\S+))?\s*\Z")

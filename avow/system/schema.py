@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,6 +12,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.remembered import Shelf
+from avow.base.suggestions import suggest
 from avow.base.tools import package_version
 from avow.base.tuning.sizes import REPAIR_ROUNDS
 from avow.system.plan import Located
@@ -123,18 +123,6 @@ def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
             return Piece(span, items=[_piece(options, (*path, place)) for place in range(len(data))])
         case _:  # a scalar
             return Piece(span, data)
-
-
-def suggest(word: str, known: Iterable[str]) -> str | None:
-    """A hint: the nearest known name, else what is known."""
-    names = list(known)
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    if near:
-        return f"did you mean {near[0]!r}?"
-    if not names:
-        return None
-    shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
-    return f"known: {shown}"
 
 
 def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.suggestions import suggest
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 from avow.system.plan import Driving, Numbers, Plan, Source
-from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
 
 HELD = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort)

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.graphs import components, cycle_in
+from avow.base.suggestions import suggest
 from avow.language.contract import Contract
 from avow.system.folding import leaves, parents
 from avow.system.plan import Connection, Endpoint, Plan, Subsystem
-from avow.system.schema import suggest
 
 
 def check_subsystems(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:

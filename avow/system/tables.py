@@ -10,9 +10,9 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.base.files import read_regular
+from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import RANGE_VALUES, TABLE_CELLS
 from avow.system.plan import Table
-from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import suggest
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
@@ -22,7 +23,6 @@ from avow.ros.definitions import canonical
 from avow.ros.names import Resolver
 from avow.ros.sources import definitions
 from avow.system.plan import Connection, Endpoint, Plan
-from avow.system.schema import suggest
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term
@@ -52,7 +53,7 @@ from .syntax import (
     StatementSyntax,
     WhileStatement,
 )
-from .typing import Scope, fit, formula, rejected, suggest, term
+from .typing import Scope, fit, formula, rejected, term
 
 T = TypeVar("T")
 
@@ -137,7 +138,7 @@ class _Checker:
         for declaration in self.source.declarations:
             unknown = [s for s in (*declaration.parameters, declaration.sort) if s not in types]
             for word in unknown:
-                self._problem("HOARE200", f"there is no type `{word}`", declaration.span, suggest(word, [*types]))
+                self._problem("HOARE200", f"there is no type `{word}`", declaration.span, did_you_mean(word, [*types]))
             if unknown:
                 continue
             sort: Sort = types[declaration.sort]
@@ -224,7 +225,9 @@ class _Checker:
                 "HOARE400", f"`{key}`: there is an input and an output of that name; write in. or out.", span
             )
         known = [f"{p.role}.{p.name}" for p in (*self.node.inputs, *self.node.outputs)]
-        raise rejected("HOARE400", f"`{key}`: the node has no such input or output", span, suggest(str(name), known))
+        raise rejected(
+            "HOARE400", f"`{key}`: the node has no such input or output", span, did_you_mean(str(name), known)
+        )
 
     # -- what the ports are in the program -----------------------------------------------------------------------------
 
@@ -304,7 +307,7 @@ class _Checker:
             for found in sorted(free, key=lambda v: v.name):
                 if at[0] is Role.OUTPUT and found.name not in known and at in spans:
                     message = f"the program neither sets nor is given `{found.name}`"
-                    self._problem("HOARE400", message, spans[at], suggest(found.name, known))
+                    self._problem("HOARE400", message, spans[at], did_you_mean(found.name, known))
 
     def _restrictions(
         self, terms: Mapping[tuple[Role, str], Term], predicates: Mapping[tuple[Role, str], Predicate]
@@ -370,7 +373,8 @@ class _Checker:
             if statement.arguments:
                 known = [n for n, s in self.names.sorts.items() if isinstance(s, FunctionSort)]
                 hint = (
-                    suggest(name.name, known) or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
+                    did_you_mean(name.name, known)
+                    or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
                 )
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
             raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show_sort(value.sort)}?)", name.span)
@@ -406,7 +410,7 @@ class _Checker:
             if isinstance(subject.sort, EnumSort) or (isinstance(subject.sort, DataSort) and not known):
                 hint = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
                 raise rejected("HOARE300", message, name.span, hint)
-            raise rejected("HOARE300", message, name.span, suggest(name.name, known))
+            raise rejected("HOARE300", message, name.span, did_you_mean(name.name, known))
         parameters = words.constructors[name.name][1].parameters
         if len(parameters) != len(statement.variables):
             message = f"`{name.name}` has {len(parameters)} argument(s), not {len(statement.variables)}"

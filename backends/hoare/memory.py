@@ -13,6 +13,7 @@ from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, stepping
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.evaluation.compiler import member_of
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.formulas.formula import free_variables
@@ -26,7 +27,7 @@ from .runs import Runner, Seen, Step, look
 from .syntax import Memory, Source
 from .triples import Triple, triples
 from .tuning import GUESSES, LONGEST_RUN
-from .typing import Scope, fit, rejected, suggest, term
+from .typing import Scope, fit, rejected, term
 from .wp import Condition, TooLarge, conditions
 
 
@@ -54,7 +55,7 @@ def _held(memory: Memory, job: Job) -> Held:
     if memory.sort not in types:
         raise Rejected(
             Diagnostic(
-                "HOARE200", f"there is no type `{memory.sort}`", memory.span, hint=suggest(memory.sort, [*types])
+                "HOARE200", f"there is no type `{memory.sort}`", memory.span, hint=did_you_mean(memory.sort, [*types])
             )
         )
     sort = types[memory.sort]

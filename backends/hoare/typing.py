@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import field
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
+from avow.base.suggestions import did_you_mean
 from avow.language.operators import OPERATORS, Why
 from avow.language.printer import show_sort
 from avow.language.sorts import (
@@ -186,11 +186,6 @@ def rejected(code: str, message: str, span: Span | None, hint: str | None = None
     return Rejected(Diagnostic(code, message, span, hint=hint))
 
 
-def suggest(name: str, known: list[str]) -> str | None:
-    near = difflib.get_close_matches(name, known, 1, 0.7)
-    return f"did you mean `{near[0]}`?" if near else None
-
-
 def _name(name: Name, scope: Scope) -> Term:
     if name.prefix is not None:
         return _port(name, scope)
@@ -213,7 +208,7 @@ def _name(name: Name, scope: Scope) -> Term:
         "HOARE200",
         f"nothing is called `{name.name}` here, or nothing says of which sort it is",
         name.span,
-        suggest(name.name, known)
+        did_you_mean(name.name, known)
         or "declare it (VAR name : REAL; or GIVEN name : REAL;) or map it to a port in the plan",
     )
 
@@ -224,7 +219,7 @@ def _port(name: Name, scope: Scope) -> Term:
         raise rejected("HOARE200", f"`{name}` belongs into {what}: a program has variables", name.span)
     if name.name not in scope.ports:
         raise rejected(
-            "HOARE200", f"the node has no input `{name.name}`", name.span, suggest(name.name, [*scope.ports])
+            "HOARE200", f"the node has no input `{name.name}`", name.span, did_you_mean(name.name, [*scope.ports])
         )
     return scope.ports[name.name]
 
@@ -301,7 +296,7 @@ def _quantified(expression: Quantification, scope: Scope) -> Term:
     for names, sort_name in expression.groups:
         sort = scope.names.vocabulary.types.get(sort_name)
         if sort is None:
-            hint = suggest(sort_name, [*scope.names.vocabulary.types])
+            hint = did_you_mean(sort_name, [*scope.names.vocabulary.types])
             raise rejected("HOARE200", f"there is no type `{sort_name}`", expression.span, hint)
         for name in names:
             if name.name in local or name.name in scope.names.sorts:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from pathlib import Path
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular
+from avow.base.suggestions import did_you_mean
 from avow.drive.steps import coded
 from avow.formulas.formula import free_variables
 from avow.language.sorts import (
@@ -67,11 +67,8 @@ def subject(job: Job) -> SubjectFile:
             raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{job.source.class_name}`", where))
         return _without(found, _method(declared, "step"), job) if job.source.kind is Driving.STEP else found
     if found.function not in defined:
-        near = difflib.get_close_matches(found.function, [*defined], 1)
-        hint = f"did you mean `{near[0]}`?" if near else None
-        raise Rejected(
-            Diagnostic("HYPO102", f"`{found.name}` defines no function `{found.function}`", place, hint=hint)
-        )
+        message = f"`{found.name}` defines no function `{found.function}`"
+        raise Rejected(Diagnostic("HYPO102", message, place, hint=did_you_mean(found.function, defined)))
     definition = defined[found.function]
     if isinstance(definition, ast.FunctionDef | ast.AsyncFunctionDef):
         problems = _arguments(definition, found, job)
@@ -257,8 +254,7 @@ def _arguments(
             message = f"`{argument.arg}` can only be given by position; inputs are given by name"
             problems.append(Diagnostic("HYPO104", message, _span(argument, file)))
         elif argument.arg not in inputs:
-            near = difflib.get_close_matches(argument.arg, inputs, 1)
-            hint = f"did you mean `{near[0]}`?" if near else f"inputs: {', '.join(inputs) or 'none'}"
+            hint = did_you_mean(argument.arg, inputs) or f"inputs: {', '.join(inputs) or 'none'}"
             message = f"node {job.node.name} has no input `{argument.arg}`"
             problems.append(Diagnostic("HYPO104", message, _span(argument, file), hint=hint))
     return problems

@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular
 from avow.base.persons import unreadable
 from avow.base.records import dataclass
-from avow.system.schema import suggest
+from avow.base.suggestions import suggest
 from avow.system.strict_yaml import Piece, read_yaml
 
 FORMAT = 1

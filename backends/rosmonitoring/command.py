@@ -6,7 +6,6 @@ import io
 import sys
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,6 +13,7 @@ import click
 
 from avow.base.codec import document
 from avow.base.plain import listed
+from avow.base.suggestions import did_you_mean
 
 from .coverage import coverage
 from .tuning import VIOLATIONS_SHOWN
@@ -305,8 +305,8 @@ def _print_summary(running: Session) -> None:
         click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
         for topic in list(running.unheard)[:10]:
-            if near := get_close_matches(topic, running.topics, n=1):
-                click.echo(f"  {topic}: did you mean {near[0]}?")
+            if meant := did_you_mean(topic, running.topics):
+                click.echo(f"  {topic}: {meant}")
     faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
     fine = (
         "nothing broken"

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from avow.base.suggestions import suggest
 from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Port
 from avow.language.sorts import (
@@ -27,7 +28,6 @@ from avow.language.sorts import (
 from avow.language.terms import Variable
 from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message, Nested, NoField, Scalar, Wire
 from avow.system.plan import Plan, Table
-from avow.system.schema import suggest
 
 from .fitting import SOURCES, Undecided, decide, parts_of, words
 from .reading import convert, shown

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import suggest
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import FunctionValue, Value
@@ -23,7 +24,6 @@ from avow.ros.sources import definitions
 from avow.system.graph import Edge, dataflow
 from avow.system.paths import inside
 from avow.system.plan import Located, System
-from avow.system.schema import suggest
 
 from . import observing
 from .bags import Event, Origin, carried, is_bag

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import suggest
 from avow.language.contract import ClauseKind
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
-from avow.system.schema import suggest
 
 from .bags import is_bag, messages
 from .blame import Blame

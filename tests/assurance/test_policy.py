@@ -312,7 +312,7 @@ def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
 def test_of_a_slip_the_word_that_was_meant_is_told() -> None:
     with pytest.raises(Rejected) as caught:
         read_policy(located({"requirments": ["proved"]}))
-    assert caught.value.diagnostics[0].hint == "did you mean 'requirements'?"
+    assert caught.value.diagnostics[0].hint == "did you mean `requirements`?"
 
 
 def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:

@@ -284,7 +284,7 @@ def test_an_own_input_of_a_subsystem(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("plan", "code", "line", "words"),
     [
-        ("subsystems:\n  s: {nodes: [reader, gradr]}", "PLAN106", 2, "did you mean 'grader'"),
+        ("subsystems:\n  s: {nodes: [reader, gradr]}", "PLAN106", 2, "did you mean `grader`"),
         ("subsystems:\n  s: {nodes: [reader]}\n  t: {nodes: [reader]}", "PLAN110", 3, "is in 's' already"),
         ("subsystems:\n  s: {nodes: [reader, reader]}", "PLAN110", 2, "named twice"),
         ("subsystems:\n  reader: {nodes: [grader]}", "PLAN110", 2, "also a node"),
@@ -293,7 +293,7 @@ def test_an_own_input_of_a_subsystem(tmp_path: Path) -> None:
         ("subsystems:\n  s: {nodes: [s, reader]}", "PLAN110", 2, "contain one another: s → s"),
         ("subsystems:\n  s: {}", "PLAN104", 2, "either nodes or system"),
         ("subsystems:\n  s: {nodes: []}", "PLAN105", 2, "must not be empty"),
-        ("subsystems:\n  s: {node: [reader]}", "PLAN103", 2, "'nodes'"),
+        ("subsystems:\n  s: {node: [reader]}", "PLAN103", 2, "`nodes`"),
         ("subsystems:\n  whole: {nodes: [reader]}", "PLAN103", 2, "'whole'"),
         ("subsystems:\n  s: {nodes: [reader], system: x}", "PLAN110", 2, "not both"),
         ("subsystems:\n  s: {system: nowhere}", "PLAN107", 2, "no folder 'nowhere'"),

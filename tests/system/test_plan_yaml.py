@@ -147,7 +147,7 @@ def test_options_that_depart_from_a_schema_are_told_in_words(options: dict[str, 
 
 def test_did_you_mean(tmp_path: Path) -> None:
     (fault,) = faults(tmp_path, "conections: []\n")
-    assert fault.hint == "did you mean 'connections'?"
+    assert fault.hint == "did you mean `connections`?"
 
 
 def test_all_faults_in_one_go(tmp_path: Path) -> None:

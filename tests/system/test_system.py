@@ -74,10 +74,10 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("plan", "code", "line", "words", "hint"),
     [
-        ("connections: [{from: a.z, to: b.x}]", "PLAN106", 1, "a.z", "'a.x'"),
+        ("connections: [{from: a.z, to: b.x}]", "PLAN106", 1, "a.z", "`a.x`"),
         ("connections: [{from: c.x, to: b.x}]", "PLAN106", 1, "'c'", "known: a, b"),
         ("connections: [{from: b.x, to: b.x}]", "PLAN106", 1, "output 'b.x'", "b.y"),
-        ("environment: {in.rr: {because: x}}", "PLAN106", 1, "in.rr", "'in.r'"),
+        ("environment: {in.rr: {because: x}}", "PLAN106", 1, "in.rr", "`in.r`"),
         ("environment: {b.x: {because: x}}", "PLAN113", 1, "a.x provides it", ""),
         ("environment:\n  in.r: {assume: in.r > q, because: x}", "RCL201", 2, "q", ""),
         ("environment: {in.r: {assume: out.x > 1, because: x}}", "PLAN113", 1, "out.x", "no node provides"),
@@ -90,9 +90,9 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
             "this `)` closes nothing",
             "",
         ),
-        ("compose: {D: {select: [a, bb]}}", "PLAN106", 1, "'bb'", "'b'"),
+        ("compose: {D: {select: [a, bb]}}", "PLAN106", 1, "'bb'", "`b`"),
         ("compose: {D: {select: [a, a]}}", "PLAN110", 1, "twice", ""),
-        ("nodes: {aa: {}}", "PLAN106", 1, "'aa'", "'a'"),
+        ("nodes: {aa: {}}", "PLAN106", 1, "'aa'", "`a`"),
         ("nodes:\n  a:\n    methods: [{hoare: {guarantees: [g9]}}]", "PLAN106", 3, "g9", "g1"),
         ("nodes: {a: {methods: [{hoare: {id: x}}, {dafny: {id: x}}]}}", "PLAN110", 1, "used twice", ""),
         ("model: {compound: {navi: [x]}}", "PLAN106", 1, "navi", ""),
@@ -101,7 +101,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("scenario: {domains: {NATURAL: [0, -1]}}", "PLAN109", 1, "it is negative", ""),
         ("scenario: {domains: {INTEGER: [-1, 1.5]}}", "PLAN109", 1, "it is not whole", ""),
         ("scenario: {domains: {in.r: 0..100000000000}}", "PLAN109", 1, "more than 100000 values", ""),
-        ("scenario: {domains: {REALS: 1}}", "PLAN106", 1, "REALS", "'REAL'"),
+        ("scenario: {domains: {REALS: 1}}", "PLAN106", 1, "REALS", "`REAL`"),
         ("expected: [{obligation: c/sanity/x, verdict: refuted}]", "PLAN106", 1, "'c'", "a, b, system"),
         (
             "expected: [{obligation: a/sanity/vacuous-g1, verdict: refuted}]",

@@ -17,6 +17,7 @@ from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, wr
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import read_text
 from avow.base.process import ToolMissing
+from avow.base.suggestions import suggest
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
 from avow.isolation.observed import Seen
 from avow.language.contract import Node
@@ -28,7 +29,6 @@ from avow.ros.sources import definitions, require
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Driving, Source, System
-from avow.system.schema import suggest
 from avow.system.topics import whole_name
 
 SECOND = 10**9

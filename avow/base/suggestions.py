@@ -1,0 +1,36 @@
+"""What someone who wrote an unknown name most likely meant, as the hint of a diagnostic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.6) -> list[str]:
+    """The known names that are nearest to one that is not known, if any are near: the one that differs in capitals
+    only, else up to so many. `alike`: how near, as `difflib` has it."""
+    import difflib  # seldom needed, and it takes a while
+
+    if len(name) > 100:
+        return []
+    candidates = sorted({k for k in known if k != name})
+    folded = name.casefold()
+    same = [k for k in candidates if k.casefold() == folded]
+    return same[:1] or difflib.get_close_matches(name, candidates[:2000], most, alike)
+
+
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str | None:
+    """A hint; None where nothing is near. Many short names differ by one letter."""
+    return _hint(nearest(name, known, most, alike=0.6 if len(name) > 3 else 0.75))
+
+
+def suggest(name: str, known: Iterable[str]) -> str | None:
+    """A hint: the nearest known name, else what is known."""
+    names = list(known)
+    if not names:
+        return None
+    shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
+    return _hint(nearest(name, names)) or f"known: {shown}"
+
+
+def _hint(near: list[str]) -> str | None:
+    return f"did you mean {' or '.join(f'`{each}`' for each in near)}?" if near else None
