@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import chain
 from typing import Literal as OneOf
 from typing import assert_never
@@ -40,7 +40,7 @@ from avow.language.sorts import (
 )
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
-from avow.solving.checking import Answer, Status, check, with_small_numbers, z3_version
+from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
@@ -141,14 +141,8 @@ def solve(
         patient = solution.status == "unknown" and not given and effort >= ANOTHER_SOLVER_EFFORT
         if patient and allowed(effort):
             solution = _second_opinion(labelled, effort) or solution
-    return Solution(
-        solution.status,
-        solution.values,
-        solution.core,
-        tried(solution.reason, granted) if solution.status == "unknown" else solution.reason,
-        solution.engine,
-        time.monotonic() - start,
-    )
+    reason = tried(solution.reason, granted) if solution.status == "unknown" else solution.reason
+    return replace(solution, reason=reason, seconds=time.monotonic() - start)
 
 
 def entails(
@@ -169,19 +163,18 @@ def entails(
         denied += "!"
     asked = {**labelled, denied: negation(goal)}
     solution = solve(asked, effort=effort, seed=seed, variables=variables, given=given)
-    reason, engine, seconds = solution.reason, solution.engine, solution.seconds
     match solution.status:
         case "unsat":
             needed = tuple(label for label in solution.core if label != denied)
             vacuous = bool(solution.core) and denied not in solution.core
-            return Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous, engine=engine, seconds=seconds)
+            found = Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous)
         case "sat":
-            shown = Counterexample(show_values(solution.values))
-            return Entailment(Verdict.REFUTED, shown, solution.values, engine=engine, seconds=seconds)
+            found = Entailment(Verdict.REFUTED, Counterexample(show_values(solution.values)), solution.values)
         case "unknown":
-            return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
+            found = Entailment(Verdict.UNKNOWN, reason=solution.reason)
         case _:
             assert_never(solution.status)
+    return replace(found, engine=solution.engine, seconds=solution.seconds)
 
 
 def _solve(
@@ -210,7 +203,7 @@ def _solve(
         parts = [translator.term(formula, {**fixed, **meanings}) for formula in labelled.values()]
         return [*translator.opaque_facts(), *parts]
 
-    def replayed(answer: Answer, engine: str = "z3", *, simple: bool = False) -> Solution | None:
+    def replayed(answer: Answer, engine: str, *, simple: bool) -> Solution | None:
         """The values of its model, if they can be read and replayed."""
         for smaller in (True,) if small else (False, True):
             one = with_small_numbers(translator, whole, numbers, answer, seed=seed) if smaller else answer
@@ -221,43 +214,36 @@ def _solve(
                 return Solution("sat", values, engine=engine)
         return None
 
-    def restarted() -> Solution | None:
-        """By other seeds of the solver, each for a short while."""
-        for another in range(seed + 1, seed + 1 + RESTARTS):
-            limit = max(1, int(effort * RESTART))
-            answer = check(translator, background, effort=limit, seed=another, tracked=tracked)
-            if answer.status == "unsat":
-                return Solution("unsat", core=answer.core)
-            if solution := replayed(answer, simple=True):
-                return solution
-        return None
+    def asked(effort: float, seed: int, engine: Engine = "smt") -> tuple[Answer, Solution | None]:
+        """An engine's answer, and the solution that it is, if it counts."""
+        answer = check(translator, background, effort=max(1, int(effort)), seed=seed, tracked=tracked, engine=engine)
+        name = "z3" if engine == "smt" else "z3, qsat"
+        if answer.status == "unsat":
+            return answer, Solution("unsat", core=answer.core, engine=name)
+        return answer, replayed(answer, name, simple=engine == "smt")
 
     reason = ""
     for plain, tables in ROUNDS:
-        if functions and (plain, tables) == ROUNDS[-1] and (solution := restarted()):
-            return solution
-        limit = max(1, int(effort * plain))
-        if functions and plain == ROUNDS[0][0]:
-            limit = min(limit, FIRST_LOOK_EFFORT)
-        answer = check(translator, background, effort=limit, seed=seed, tracked=tracked)
-        if answer.status == "unsat":
-            return Solution("unsat", core=answer.core)
-        if solution := replayed(answer, simple=True):
+        if functions and (plain, tables) == ROUNDS[-1]:
+            for another in range(seed + 1, seed + 1 + RESTARTS):  # other seeds, each for a short while
+                answer, solution = asked(effort * RESTART, another)
+                if solution is not None:
+                    return solution
+        first = functions and plain == ROUNDS[0][0]
+        answer, solution = asked(min(effort * plain, FIRST_LOOK_EFFORT) if first else effort * plain, seed)
+        if solution is not None:
             return solution
         reason = answer.reason
-        limit = max(1, int(effort * tables))
         if functions:
+            limit = max(1, int(effort * tables))
             found = search_tables(translator, build, ordinary, functions, effort=limit, seed=seed)
             if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
                 return Solution("sat", found, engine="z3, functions as tables")
-            if solution := replayed(answer):
-                return solution
+            solution = replayed(answer, "z3", simple=False)
         else:
-            answer = check(translator, background, effort=limit, tracked=tracked, engine="qsat")
-            if answer.status == "unsat":
-                return Solution("unsat", core=answer.core, engine="z3, qsat")
-            if solution := replayed(answer, "z3, qsat"):
-                return solution
+            answer, solution = asked(effort * tables, seed, "qsat")
+        if solution is not None:
+            return solution
         if answer.model is not None:
             reason = "the solver's model could not be replayed"
     return Solution("unknown", reason=reason or NO_ANSWER)
