@@ -22,8 +22,8 @@ CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL
 class Program(SubjectProcess):
     """Each case is ``{"command": text}``; the text holds neither ``|`` nor the end of a line."""
 
-    def __init__(self, path: Path, patience: float, root: Path) -> None:
-        super().__init__(path, "", patience, root)
+    def __init__(self, path: Path, patience: float, root: Path, names: Sequence[str] = ()) -> None:
+        super().__init__(path, "", patience, root, names)
         self._turn = ""
         self._events["program", f"the program {path.name}"] = None
 

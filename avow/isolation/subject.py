@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import select
 import subprocess
 import sys
 import tempfile
@@ -19,8 +18,10 @@ from avow.base import process
 from avow.base.codec import LATER, Unreadable, from_text
 from avow.base.records import dataclass
 from avow.base.verdict import Isolation
+from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed, interpreter, recorded, sandbox, tracer, untold, variables
+from avow.isolation.printed import Printed
 from avow.isolation.tracing import Trace, traces
 
 _SCRATCH = "/tmp/avow-scratch"
@@ -53,12 +54,16 @@ class Message:
 class SubjectProcess:
     """The process that holds a function of a Python file. Started at the first question.
 
-    `root` is the system's folder. Once `fault` says something, no answer of this subject counts: it started processes,
-    wrote files or looked at other processes; what it left running is found where the judge has said
-    `process.adopt_orphans`. Raises `level.Unavailable` where it must be sealed and cannot be.
+    `root` is the system's folder, `names` what has a verdict (`Names.of`). Once `fault` says something, no answer
+    of this subject counts: it started processes, wrote files, looked at other processes or printed what reads as a
+    result; what it left running is found where the judge has said `process.adopt_orphans`. Raises `level.Unavailable`
+    where it must be sealed and cannot be.
     """
 
-    def __init__(self, path: Path, function: str, patience: float, root: Path | None = None) -> None:
+    def __init__(
+        self, path: Path, function: str, patience: float, root: Path | None = None, names: Sequence[str] = ()
+    ) -> None:
+        self.names = names
         self.path, self.function, self.patience = path.resolve(), function, patience
         self.root = (root or path.parent).resolve()
         self.isolation: Isolation = available()
@@ -70,6 +75,7 @@ class SubjectProcess:
         self.process: subprocess.Popen[bytes] | None = None
         self._events: dict[tuple[str, str], None] = {}
         self._trace: Trace | None = None
+        self._printed: Printed | None = None
         self._untraced = False
         """Whether something ran that no trace tells of."""
         self._to = self._from = -1
@@ -142,16 +148,27 @@ class SubjectProcess:
             self._start()
         if self._buffer:
             raise SubjectFailed("the subject's process answers out of turn")
-        request = self._written(cases)
-        try:
-            while request:
-                request = request[os.write(self._to, request) :]
-        except OSError as error:
-            raise self._end("the subject's process has ended") from error
+        self._send(self._written(cases))
         message = self._message()
         if message.replies is None or len(message.replies) != len(cases) or not self._in_turn(message):
             raise self._end("the subject's answer is no data")
         return list(message.replies)
+
+    def _send(self, request: bytes) -> None:
+        end = time.monotonic() + self.patience
+        while request:
+            try:
+                request = request[os.write(self._to, request) :]
+            except BlockingIOError:
+                self._wait((), (self._to,), end)
+            except OSError as error:
+                raise self._end("the subject's process has ended") from error
+
+    def _wait(self, reading: Sequence[int], writing: Sequence[int], end: float) -> None:
+        assert self._printed is not None
+        if not self._printed.wait(reading, writing, end - time.monotonic()):
+            self.silent = f"the subject does not answer within {self.patience:g} s"
+            raise self._end(self.silent)
 
     def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
         """The cases as the process reads them: one line."""
@@ -186,6 +203,10 @@ class SubjectProcess:
             for channel in {self._to, self._from} - {-1}:
                 os.close(channel)
             left = process.end_orphans()
+            if self._printed is not None:
+                self._printed.end()
+                self._judge_printed()
+                self._printed = None
             if left and self.isolation is not Isolation.SEALED and not self.fault:
                 self.fault = "the subject left processes behind"
             self.process, self._buffer = None, b""
@@ -193,6 +214,10 @@ class SubjectProcess:
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None
+
+    def _judge_printed(self) -> None:
+        if self._printed is not None and self._printed.result and not self.fault:
+            self.fault = f"the subject {self._printed.told()}"
 
     def _read_trace(self) -> None:
         traced = self._trace.read(self.root, self._writes) if self._trace is not None else None
@@ -224,17 +249,20 @@ class SubjectProcess:
         environment["HOME"] = self._writes = environment["TMPDIR"]
         if self._trace is not None:
             command = self._trace.around(command)
+        os.set_blocking(self._to, False)
+        self._printed = Printed(Names.of(self.names))
         self.process = subprocess.Popen(
             command,
             cwd=self.root,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stdout=self._printed.theirs[0],
+            stderr=self._printed.theirs[1],
             env=environment,
             start_new_session=True,
             pass_fds=(there, back),
         )
         process.watch(self.process.pid)
+        self._printed.begun()
         os.close(there)
         os.close(back)
         ready = self._message()
@@ -250,16 +278,17 @@ class SubjectProcess:
         self._events.update((looked, None) for looked in message.seen)
         if message.faults:
             self.fault = f"the subject {message.faults[0]}"
+        elif self._printed is not None:
+            self._printed.read()
+            self._judge_printed()
+        if self.fault:
             raise self._end(self.fault)
         return message
 
     def _line(self) -> bytes:
         end = time.monotonic() + self.patience
         while b"\n" not in self._buffer:
-            left = end - time.monotonic()
-            if left <= 0 or not select.select([self._from], [], [], left)[0]:
-                self.silent = f"the subject does not answer within {self.patience:g} s"
-                raise self._end(self.silent)
+            self._wait((self._from,), (), end)
             part = os.read(self._from, 1 << 16)
             if not part:
                 with contextlib.suppress(subprocess.TimeoutExpired):

@@ -22,8 +22,10 @@ from avow.base.codec import Unreadable, from_text
 from avow.base.tuning.running import SUBJECT_PATIENCE
 from avow.base.verdict import Isolation
 from avow.isolation import judge
+from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed
+from avow.isolation.printed import Printed
 from avow.isolation.program import Program
 from avow.isolation.subject import Message, SubjectFailed
 
@@ -108,6 +110,8 @@ class Question:
     ask: Campaign | Runs | Show
     root: str
     seconds: float
+    names: tuple[str, ...]
+    """What has a verdict: `avow.isolation.forged.Names.of`."""
 
 
 def campaign(asked: Campaign, question: Question) -> Campaigned:
@@ -122,50 +126,52 @@ def campaign(asked: Campaign, question: Question) -> Campaigned:
     if level is Isolation.SEALED:
         command = sealed(command, (folder, Path(question.root)), _SCRATCH, (kept,))
     told = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
-    code, left, said, text = _ended(command, kept, question.seconds, channel, told, source)
+    code, left, said, printed = _ended(command, kept, question, channel, told, source)
     words = said.split()
     closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
     done = closed and words[1] == "done" and code == 0
     fault = "the source left processes behind" if left and level is not Isolation.SEALED else ""
     if closed and words[1] == "left":
         fault = fault or "the source ended the process within a step"
-    return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, text[-20_000:], level)
+    if printed.result:
+        fault = f"the source {printed.told()}"
+    return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, printed.log(), level)
 
 
 def _ended(
     command: list[str],
     cwd: Path,
-    seconds: float,
+    question: Question,
     channel: judge.Channel,
     told: Mapping[str, str],
     given: int,
-) -> tuple[int | None, bool, str, str]:
+) -> tuple[int | None, bool, str, Printed]:
     """Run a build with sanitizers to its end, and end all that it leaves; `given` is a descriptor that it reads. Its
-    exit code (None: its time was up), whether it left something, what came through the channel, and its log."""
-    with tempfile.TemporaryFile() as log:
-        started = subprocess.Popen(
-            command,
-            cwd=cwd,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=log,
-            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
-            start_new_session=True,
-            pass_fds=(channel.theirs, given),
-        )
-        process.watch(started.pid)
-        os.close(channel.theirs)
-        try:
-            code: int | None = started.wait(seconds)
-        except subprocess.TimeoutExpired:
-            code = None
-        process.kill_tree(started.pid)
-        started.wait()
-        process.unwatch(started.pid)
-        left = process.end_orphans()
-        said = channel.close() or b""
-        log.seek(0)
-        return code, left, said.decode("utf-8", "replace"), log.read(1 << 20).decode("utf-8", "replace")
+    exit code (None: its time was up), whether it left something, what came through the channel, and what it printed."""
+    printed = Printed(Names.of(question.names), keeps=True)
+    started = subprocess.Popen(
+        command,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=printed.theirs[0],
+        stderr=printed.theirs[1],
+        env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
+        start_new_session=True,
+        pass_fds=(channel.theirs, given),
+    )
+    process.watch(started.pid)
+    printed.begun()
+    os.close(channel.theirs)
+    ended = os.pidfd_open(started.pid)
+    code = started.wait() if printed.wait((ended,), (), question.seconds) else None
+    os.close(ended)
+    process.kill_tree(started.pid)
+    started.wait()
+    process.unwatch(started.pid)
+    left = process.end_orphans()
+    printed.end()
+    said = channel.close() or b""
+    return code, left, said.decode("utf-8", "replace"), printed
 
 
 def answered(asked: Runs, question: Question) -> Answered:
@@ -173,13 +179,13 @@ def answered(asked: Runs, question: Question) -> Answered:
     what nothing was written to holds other bytes: what comes of chance, of the clock, of such bytes, or of the runs
     before is no answer to a run."""
     end = time.monotonic() + question.seconds
-    first, faults, program = _all(asked.program, asked.runs, asked.crashes, question.root, end)
+    first, faults, program = _all(asked.program, asked.runs, asked.crashes, question, end)
     silent = bool(program.silent)
     unsteady = None
     if asked.twin and not faults:
         order = [k for k in reversed(range(len(first))) if not first[k].crash]
         runs = [asked.runs[k] for k in order]
-        again, faults, twin = _all(asked.twin, runs, asked.crashes, question.root, end)
+        again, faults, twin = _all(asked.twin, runs, asked.crashes, question, end)
         silent = bool(twin.silent)
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
@@ -189,9 +195,9 @@ def answered(asked: Runs, question: Question) -> Answered:
 
 
 def _all(
-    path: str, runs: Sequence[tuple[str, ...]], most: int, root: str, end: float
+    path: str, runs: Sequence[tuple[str, ...]], most: int, question: Question, end: float
 ) -> tuple[list[Run], str, Program]:
-    program = Program(Path(path), SUBJECT_PATIENCE, Path(root))
+    program = Program(Path(path), SUBJECT_PATIENCE, Path(question.root), question.names)
     found: list[Run] = []
     crashes = 0
     fault = ""
@@ -226,7 +232,7 @@ def shown(asked: Show, question: Question) -> Shown:
         command = [str(program), str(lines.fileno()), str(channel.theirs), "/avow-unmarked", "alone"]
         if level is Isolation.SEALED:
             command = sealed(command, (program.parent, Path(question.root)), _SCRATCH)
-        code, _, said, text = _ended(command, Path(question.root), question.seconds, channel, {}, lines.fileno())
+        code, _, said, printed = _ended(command, Path(question.root), question, channel, {}, lines.fileno())
     replies: list[Any] = []
     for line in said.splitlines():
         try:
@@ -235,7 +241,7 @@ def shown(asked: Show, question: Question) -> Shown:
             break
         if message.turn == str(len(replies)) and message.replies:
             replies.append(message.replies[0]["value"])
-    return Shown(tuple(replies), code, text[:20_000])
+    return Shown(tuple(replies), code, printed.log())
 
 
 def _answer(question: Question) -> Campaigned | Answered | Shown:

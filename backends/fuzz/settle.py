@@ -157,7 +157,7 @@ class Work:
 
     def _ask(self, kind: type[T], ask: Campaign | Runs | Show) -> T:
         place = self.folder / "question.json"
-        question = Question(ask, str(self.job.root.resolve()), self._left())
+        question = Question(ask, str(self.job.root.resolve()), self._left(), ("fuzz", *(o.id for o in self.job.every)))
         place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
             kind,

@@ -144,13 +144,13 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, 
     if answer.silent:  # whatever else was found: it is of a subject that might have answered
         why = f"{answer.silent}: that says nothing of what it would answer, and the next run asks again"
         return replace(outcome, verdict=Verdict.ERROR, summary=why, details={**details, RETRY: True})
+    if answer.fault:
+        return replace(outcome, verdict=Verdict.ERROR, summary=answer.fault)
     if answer.crash is not None:
         shown = Counterexample(*answer.crash)
         # a class that raises has no output for inputs that the contract allows; a function may be no subject at all
         verdict = Verdict.REFUTED if answer.crash_trace else Verdict.ERROR
         return replace(outcome, verdict=verdict, summary=shown.text(), counterexample=shown)
-    if answer.fault:
-        return replace(outcome, verdict=Verdict.ERROR, summary=answer.fault)
     apart = [Counterexample(case, why) for case, why in answer.apart]
     if apart:
         details["no numbers"] = [one.text() for one in apart]

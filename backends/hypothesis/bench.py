@@ -85,7 +85,8 @@ class Bench:
         path = root / asked.subject.file
         self._written = constants(text_or_nothing(path))
         self.generator = self.generating(frozenset(), frozenset())
-        self.subject = SubjectProcess(path, asked.subject.function, SUBJECT_PATIENCE, root)
+        names = ("hypothesis", *(f"{asked.system}/{asked.node}/guarantee/{c.name}" for c in asked.guarantees))
+        self.subject = SubjectProcess(path, asked.subject.function, SUBJECT_PATIENCE, root, names)
         self._aims = tuple(self._aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = kept_inputs(folder / KEPT, self.inputs_sorts)
         self.replayed = 0
@@ -342,11 +343,13 @@ class Bench:
     @contextlib.contextmanager
     def twin(self) -> Iterator[SubjectProcess]:
         """Another process of the subject's."""
-        twin = SubjectProcess(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        first = self.subject
+        twin = SubjectProcess(first.path, first.function, first.patience, first.root, first.names)
         try:
             yield twin
         finally:
-            twin.close()
+            fault = twin.close()
+            first.fault = first.fault or fault
             self.silent = self.silent or twin.silent
 
     def _asked_apart(self) -> list[tuple[Pairs, str]]:

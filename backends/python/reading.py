@@ -44,6 +44,7 @@ class Reading:
             self.params,
             dict(self.source.memory),
             tuple(self.step.start) if self.step is not None else (),
+            ("python", *(o.id for o in self.job.every)),
         )
 
     @property

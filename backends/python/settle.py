@@ -74,6 +74,8 @@ class Work:
     limits: Limits
     observed: dict[Observed, None] = field(default_factory=dict)
     isolation: Isolation = Isolation.SEALED
+    deed: bool = False
+    """A run did what no subject may do."""
     silent: bool = False
     """A run had no answer for a reason that says nothing of the class: the next run asks again."""
     logs: dict[str, str] = field(default_factory=dict)
@@ -103,7 +105,7 @@ class Work:
         if cases is None:
             return self.alike(Verdict.UNKNOWN, self.refusals())
         fault = self.try_recorded(formulas, assumed) or self.try_all(cases, formulas, assumed)
-        if fault and reading.step is None:
+        if fault and reading.step is None and not self.deed:
             return self.alike(Verdict.UNKNOWN, f"{self.refusals()} ({fault})")
         if fault:
             return self.alike(Verdict.ERROR, fault)
@@ -222,6 +224,7 @@ class Work:
         self.observed.update(dict.fromkeys(found.observed))
         self.isolation = min(self.isolation, found.isolation, key=lambda level: level.rank)
         self.silent |= found.silent
+        self.deed |= found.deed
 
     def differs(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> str:
         """How class and translation differ on a case, bit for bit."""

@@ -93,6 +93,8 @@ HOSTILE = {
     "channel": (
         'for (int fd = 3; fd < 40; ++fd) if (write(fd, "{\\"turn\\": \\"\\", \\"replies\\": []}\\n", 29) < 0) continue;'
     ),
+    "prints a verdict": 'puts("G1: tested");',
+    "prints it once": 'if (in.real("v") > 2) std::fputs("3 passed", stderr);',
     "prints": 'if (in.real("v") > 2) { puts("Done 500 runs in 0 second(s)"); fflush(stdout); _exit(0); }',
 }
 

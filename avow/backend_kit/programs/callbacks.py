@@ -216,7 +216,8 @@ def driver(system: System, name: str) -> Driver:
         "most": DRIVEN_CALLBACKS,
         "messages": _messages(node, path, known, source.kind),
     }
-    subject = Subject(root, path, source.class_name, params, {}, (), ros)
+    judged = tuple(f"{system.name}/{node.name}/guarantee/{clause.name}" for clause in node.guarantees)
+    subject = Subject(root, path, source.class_name, params, {}, (), judged, ros)
     ((topics,), _) = _runs(source, subject, [((), 0, 0)], quiet=True)
     found = Driver(system, node, source, subject, known, topics)
     if found.topics.wrong:

@@ -32,6 +32,8 @@ class Subject:
     memory: Mapping[str, str]
     attributes: tuple[str, ...]
     """Whose values after `__init__` are wanted."""
+    names: tuple[str, ...] = ()
+    """What has a verdict: `avow.isolation.forged.Names.of`."""
     ros: Mapping[str, Any] | None = None
     """Of a callback class: what stands in for ROS (`avow.drive.callbacks`)."""
 
@@ -58,6 +60,7 @@ class Question:
     cases: tuple[str, ...]
     seconds: float
     batch: int
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,8 @@ class Told:
     fault: str
     observed: tuple[Observed, ...]
     isolation: Isolation
+    deed: bool = False
+    """The fault is something that no subject may do."""
     silent: bool = False
     """The fault is the machine's: time on the wall, or a kill from outside. It says nothing of the class."""
 
@@ -88,7 +93,8 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
 
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         place = Path(scratch) / "cases.json"
-        question = Question(*(str(subject.root), str(subject.file), subject.spec, tuple(cases), seconds, SUBJECT_BATCH))
+        where = str(subject.root), str(subject.file), subject.spec
+        question = Question(*where, tuple(cases), seconds, SUBJECT_BATCH, subject.names)
         place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
             Told,
@@ -103,7 +109,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
         why = "took too long" if done.timed_out else f"ended without an answer (code {done.code})"
         last = done.stderr.strip().splitlines()[-1:]
         fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
-        return Told((), fault, (), Isolation.NONE, True)
+        return Told((), fault, (), Isolation.NONE, silent=True)
     return replace(answer, replies=tuple(json.loads(r) if isinstance(r, str) else r for r in answer.replies))
 
 
@@ -117,7 +123,7 @@ def main() -> None:
     adopt_orphans()
     question = from_text(Question, Path(sys.argv[2]).read_bytes())
     patience = max(1.0, min(SUBJECT_PATIENCE, question.seconds / 3))
-    process = SubjectProcess(Path(question.file), question.spec, patience, Path(question.root))
+    process = SubjectProcess(Path(question.file), question.spec, patience, Path(question.root), question.names)
     replies: list[Any] = []
     fault = ""
     try:
@@ -130,7 +136,8 @@ def main() -> None:
             replies += found
     finally:
         fault = process.close() or fault
-    judge.say(channel, Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.silent)))
+    told = Told(tuple(replies), fault, process.observed(), process.isolation, bool(process.fault), bool(process.silent))
+    judge.say(channel, told)
 
 
 if __name__ == "__main__":

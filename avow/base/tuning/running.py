@@ -141,3 +141,7 @@ them have different times, where the file system counts less than seconds."""
 SETTLED_NS = 2_000_000_000
 """Nanoseconds after a file's last change for which another change might show no other time: coarse clocks tick in
 hundredths of a second, some file systems in two seconds."""
+
+PRINTED_GATHERS = 0.005
+"""Seconds for which what a subject prints gathers before it is read: who prints line by line would wake its judge so
+often."""

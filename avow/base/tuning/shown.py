@@ -128,3 +128,6 @@ TIMELINE_PORTS = 12
 
 TIMELINES = 4
 """Timelines of one guarantee in its evidence, those with a finding first."""
+
+PRINTED_SHOWN = 120
+"""Characters of a printed line that a message shows: enough to find it by."""

@@ -132,3 +132,12 @@ SCRIPT_BYTES = 65_536
 FOLDED = 4
 """Files of one folder that a tool looked at, from which on a record tells of the folder: a compiler reads hundreds of
 headers, and a record that names each would be a hundred times as long."""
+
+PRINTED_AT_ONCE = 1 << 20
+"""Bytes that a subject may print before it waits for its judge: the most that Linux gives a user's pipe."""
+
+PRINTED_LINE = 1 << 16
+"""Bytes of a printed line that are kept until it ends: a longer one is read in parts."""
+
+PRINTED_KEPT = 20_000
+"""Bytes of a program's standard error that are kept, the last: a sanitizer's report is its end."""

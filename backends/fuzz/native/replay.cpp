@@ -10,6 +10,7 @@
 #include <cstring>
 #include <dirent.h>
 #include <exception>
+#include <iostream>
 #ifdef AVOW_FILLED
 #include <malloc.h>
 #endif
@@ -224,6 +225,8 @@ int main(int count, char** words) {
       text += (more ? ", " : "") + std::string("{\"value\": ") + answered(each) + "}";
       more = true;
     }
+    std::cout.flush();
+    std::fflush(nullptr);  // what the node printed comes before its answer
     if (forked) {
       say(to, "{\"faults\": [\"starts a process\"]}\n");
       _exit(1);
