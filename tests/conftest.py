@@ -79,9 +79,17 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
         item._initrequest()  # type: ignore[attr-defined]
         reports = runtestprotocol(item, nextitem=nextitem, log=False)
     for report in reports:
-        item.ihook.pytest_runtest_logreport(report=report)
+        if _tells(report, item.config):
+            item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def _tells(report: pytest.TestReport, config: pytest.Config) -> bool:
+    """Whether a report is more than that setting up and taking down went well: with xdist each costs some tenths of a
+    millisecond, and two of three are no more. Who asks how long each phase took, or for JUnit's file, gets them all."""
+    asked = config.option.durations is not None or config.option.xmlpath is not None
+    return asked or report.when == "call" or not report.passed or bool(report.sections)
 
 
 def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, tuple[str, dict[str, bool]]] | None:
@@ -100,6 +108,11 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+
+
+def pytest_sessionfinish() -> None:
+    """pytest collects garbage five times when it ends, and would walk all that thousands of tests left."""
+    gc.freeze()
 
 
 @pytest.fixture
