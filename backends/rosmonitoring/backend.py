@@ -40,7 +40,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "6"
+    version = "7"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING

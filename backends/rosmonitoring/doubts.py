@@ -46,8 +46,9 @@ class Doubts:
     def ask(self, monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
         """Whether a breach is not told yet."""
         topic = same_topic(str(event.get("topic", "")))
-        spoken = [n for n in dict.fromkeys(monitor.spoken(watched)) if n in values]
-        topics = {n: same_topic(r.topic) for n in spoken if isinstance(r := monitor.setup.rules[n], Fields | Choice)}
+        spoken = [n for n in dict.fromkeys(monitor.spoken(watched)) if n in values or n not in watched.names]
+        rules = monitor.setup.rules
+        topics = {n: same_topic(r.topic) for n in spoken if isinstance(r := rules.get(n), Fields | Choice)}
         inputs = tuple(n for n, of in topics.items() if of != topic)
         guarantee = watched.clause.kind is ClauseKind.GUARANTEE
         remembers = watched.steps is not None or (monitor.so_far is not None and guarantee)
@@ -60,9 +61,9 @@ class Doubts:
                 return False
             watched.tally.unsure(REMEMBERS)
             return True
-        own = tuple(n for n in spoken if n not in inputs)
+        own = tuple(n for n in spoken if n not in inputs and n in values)
         now, heard, known = time_of(event), monitor.heard_of(watched.names), tuple(values[n] for n in own)
-        self.pairing.ask(
-            Asked(watched, event, monitor.events, own, known, inputs, ticks(now), float(now), None, heard, ())
-        )
+        asked = Asked(watched, event, monitor.events, own, known, inputs, ticks(now), float(now), None, heard, ())
+        asked.needless = frozenset(inputs).difference(watched.names)
+        self.pairing.ask(asked)
         return True

@@ -89,6 +89,10 @@ class Asked:
     """When the oldest message came that each input's value may be of."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """The places in the trace of the messages that each input's value may be of."""
+    needless: frozenset[str] = frozenset()
+    """The inputs of which only assumptions speak: there is a verdict also where they have said nothing yet."""
+    unsaid: set[str] = field(default_factory=set)
+    """Those of them that may have said nothing yet."""
 
 
 @dataclass(slots=True, eq=False)
@@ -268,9 +272,9 @@ class Pairing:
 
     def cases(self, asked: Asked, choices: list[list[Said]]) -> list[dict[str, Value]] | str:
         """The combinations of values that an answer may have answered, or why there are none."""
-        distinct: list[list[Value]] = []
+        distinct: list[list[Value | None]] = []
         for name, alike in zip(asked.inputs, choices, strict=True):
-            values: list[Value] = []
+            values: list[Value | None] = [None] * (name in asked.unsaid)
             for said in alike:
                 value = self.value_of(name, said)
                 if value is None:
@@ -282,8 +286,9 @@ class Pairing:
             distinct.append(values)
         if (count := math.prod(map(len, distinct))) > COMBINATIONS:
             return f"{count} combinations of inputs may have been answered"
-        known = self.known(asked)
-        return [{**known, **dict(zip(asked.inputs, values, strict=True))} for values in itertools.product(*distinct)]
+        known, some = self.known(asked), itertools.product(*distinct)
+        pairs = (zip(asked.inputs, values, strict=True) for values in some)
+        return [{**known, **{name: value for name, value in one if value is not None}} for one in pairs]
 
     def known(self, asked: Asked) -> dict[str, Value]:
         """What an answer's verdict depends on, but for the inputs."""
@@ -322,9 +327,11 @@ class Pairing:
                 asked.since[name] = said.seconds
             elif said.time <= end:
                 current.append(said)
-        if not current:
+        if not before and name in asked.needless:
+            asked.unsaid.add(name)
+        elif not current:
             return EARLY
-        if not before:
+        elif not before:
             return f"{name} may have had no value yet"
         asked.messages[name] = tuple(said.place for said in current)
         return current

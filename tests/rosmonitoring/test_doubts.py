@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import random
 from collections.abc import Callable
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +97,26 @@ def test_an_assumption_about_two_topics_waits_too(make_system: Make) -> None:
     assert tally(running, "alike").order == 1
     found = judge(session(make_system(TWO + "}", VALUES)), live([*events, {"topic": "b", "time": 4, "value": 7}]))
     assert [(v.fault, v.clause, v.index) for v in found] == [(Fault.ASSUMPTION, "alike", 5)]
+
+
+@pytest.mark.parametrize("b", [5, 6])
+def test_what_only_an_assumption_speaks_of_may_be_said_for_the_first_time_at_a_breach(
+    b: int, make_system: Make
+) -> None:
+    """The node is wrong at 1 s. It is excused where the assumption was known by then, and broken."""
+    system = make_system(TWO + "}", VALUES)
+    for first in itertools.product([0.2, 0.9, 1.0001, 1.3, 3, None], repeat=2):
+        said = [(1.0, "s", 11), *((time, topic, value) for time, topic, value in zip(first, "ab", (5, b), strict=True))]
+        events = [{"topic": topic, "time": time, "value": value} for time, topic, value in said if time is not None]
+        running = session(system)
+        found = [v.fault for v in judge(running, live(sorted(events, key=itemgetter("time")))) if v.clause == "small"]
+        may_be_known = all(time is not None and time <= 1.5 for time in first)
+        surely_known = all(time is not None and time <= 0.5 for time in first)
+        if b == 5 or not may_be_known:
+            assert found == [Fault.GUARANTEE], first
+        else:
+            assert found == ([Fault.EXCUSED] if surely_known else []), first
+        assert tally(running, "small").order == (not found)
 
 
 def test_memory_of_several_topics_is_undecided_and_that_of_one_is_told(make_system: Make) -> None:
