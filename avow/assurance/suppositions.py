@@ -165,16 +165,17 @@ def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], stat
 
 
 def _constants(facts: Facts, closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
-    """Inputs that the plan declares to be the same at every step: no claim says so, and the calculus uses it."""
+    """Inputs that the plan declares to be the same at every step: no claim says so, and the calculus uses it. What an
+    entry says is about its assumption, where it has one: that the input does not change needs a reason of its own."""
     for entry in facts.environment:
         if entry.constant:
-            place = f"environment.{entry.port}"
+            place = f"environment.{entry.port}" + (".constant" if entry.assume else "")
             reading = tuple(f"{facts.system}/{node}/{Kind.GUARANTEE}/" for node in entry.nodes)
             holders = {
                 name for name, found in closed.items() if any(claim.startswith(reading) for claim in found.claims)
             }
-            text = entry.because or f"{entry.port} is the same at every step"
-            yield _Raw(Sort.WORLD, place, text, statements.at(place, entry.because), place, holders.__contains__)
+            text = f"{entry.port} is the same at every step"
+            yield _Raw(Sort.WORLD, place, text, statements.at(place), place, holders.__contains__)
 
 
 def _of_methods(

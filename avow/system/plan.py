@@ -85,8 +85,8 @@ class EnvironmentInput:
 class Statement:
     """What a person says of something that results rest on without its being shown, in words for any reader.
 
-    `place` says of what: ``environment.in.r``, ``D1.persistence``, ``D1.one-output``, ``D1.entered``,
-    ``suppositions.<method>.<word>`` or ``requirements.REQ1.amounts``.
+    `place` says of what: ``environment.in.r``, ``environment.in.r.constant``, ``D1.persistence``, ``D1.one-output``,
+    ``D1.entered``, ``suppositions.<method>.<word>`` or ``requirements.REQ1.amounts``.
     """
 
     place: str

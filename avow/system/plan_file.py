@@ -253,12 +253,15 @@ class _PlanReader:
             assume = piece.at("assume")
             because = piece.at("because")
             constant = piece.at("constant")
+            if assume is None and constant is not None and constant.entries is not None:
+                message = f"environment.{port}: constant has words of its own only beside an assume"
+                self.fault("PLAN110", message, constant.span, "write  constant: true ; the entry's words are about it")
             yield EnvironmentInput(
                 port,
                 assume.text if assume else None,
                 because.text if because else None,
                 piece.span,
-                bool(constant and constant.value),
+                constant is not None and constant.value is not False,
                 assume.span if assume else None,
             )
 

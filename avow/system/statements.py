@@ -25,13 +25,13 @@ def without_words(system: System) -> Iterator[Diagnostic]:
     """A warning for each supposition of this plan that has no words for a reader who does not know the contract."""
     for statement in system.plan.statements:
         if not statement.says and statement.span is not None and _own(statement, system.plan):
-            yield Diagnostic(
-                "PLAN128",
-                f"{statement.place}: no plain words yet",
-                statement.span,
-                Severity.WARNING,
-                hint=f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …",
-            )
+            hint = f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …"
+            if not statement.because and statement.place.startswith("environment."):  # `constant: true`
+                hint = (
+                    "an assumption's reason is none for this: write  constant: {because: …, says: …, who: …, until: …}"
+                )
+            message = f"{statement.place}: no plain words yet"
+            yield Diagnostic("PLAN128", message, statement.span, Severity.WARNING, hint)
 
 
 def unconfirmed(system: System) -> Iterator[Diagnostic]:
@@ -74,8 +74,12 @@ def _own(statement: Statement, plan: Plan) -> bool:
 
 def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
     for port, _, piece in root.keyed("environment"):
-        if piece.at("assume") is not None or _is_true(piece.at("constant")):
+        constant = piece.at("constant")
+        holds = constant is not None and constant.value is not False
+        if piece.at("assume") is not None or holds:
             yield f"environment.{port}", piece
+        if piece.at("assume") is not None and constant is not None and holds:
+            yield f"environment.{port}.constant", constant  # that it does not change is another matter
     for section in ("compose", "subsystems"):
         for goal, _, piece in root.keyed(section):
             for key, name in _ARGUMENTS.items():
@@ -88,10 +92,6 @@ def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
         amounts = piece.at("amounts")
         if amounts is not None:
             yield f"requirements.{name}.amounts", amounts
-
-
-def _is_true(piece: Piece | None) -> bool:
-    return piece is not None and piece.value is True
 
 
 def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:

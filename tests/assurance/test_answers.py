@@ -193,6 +193,29 @@ def test_a_supposition_stands_once_whoever_needs_it() -> None:
     assert "2026-11-21" in found.answers.owners
 
 
+def test_a_reason_for_an_assumption_is_none_for_its_input_being_constant() -> None:
+    """Two things are supposed, each with its own words and owner; no format knows of one reason for both."""
+    about = "environment.in.a"
+    said = [Statement(about, "It is small", "surveyed", *OWNED)]
+    claim = obligation(SYSTEM_LEVEL, Kind.COMPOSITION, about)
+    reason = evidence(claim, Verdict.JUSTIFIED, "compose", link=Link.GUIDED, summary="surveyed")
+    needs = (Hypothesis(HypothesisKind.CLAIM, claim.local_id, claim.digest),)
+    proofs = [evidence(g, rests_on=needs) for g in GUARANTEES]
+
+    def supposed(entry: EnvironmentInput, words: list[Statement]) -> list[tuple[str, str, str]]:
+        made = case(subject(PROSE, words, environment=[entry]), [*GUARANTEES, claim], [*proofs, reason])
+        made = replace(made, environment=tuple(replace(e, nodes=("a",)) for e in made.environment))
+        world = [s for s in conclude_again(made).suppositions if s.sort is Sort.WORLD]
+        return [(s.key, s.because, s.who) for s in world]
+
+    both = EnvironmentInput("in.a", "TRUE", "surveyed", constant=True)
+    first = (about, "surveyed", "somebody")
+    assert supposed(both, said) == [first, (f"{about}.constant", "", "")]
+    own = Statement(f"{about}.constant", "It stays", "bolted", *OWNED)
+    assert supposed(both, [*said, own]) == [first, (f"{about}.constant", "bolted", "somebody")]
+    assert supposed(replace(both, constant=False), said) == [first]
+
+
 def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_node_assumes() -> None:
     """b assumes something that a's guarantee discharges, which a test supports: a requirement on b rests on a."""
     side = obligation(SYSTEM_LEVEL, Kind.COMPOSITION, "whole.b.input", clauses=("b.input", "a.g"))

@@ -459,6 +459,32 @@ def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> No
     assert faults(tmp_path / "c", A, "suppositions: {nobody.word: {says: x}}")[0].code == "PLAN106"
 
 
+def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> None:
+    """What is said for an assumption is no reason for this; without an assumption the entry's words are about it."""
+    from avow.system.statements import without_words
+
+    entry = "environment: {{a.r: {{because: b, says: It is small, {}}}}}"
+    assumed = "assume: '0 <= in.r', constant: {}"
+    own = "{because: c, says: It stays, who: W, until: 2030-01-01}"
+    cases = {
+        "constant: true": [("a.r", "It is small")],
+        "constant: false": [],
+        assumed.format("false"): [("a.r", "It is small")],
+        assumed.format(own): [("a.r", "It is small"), ("a.r.constant", "It stays")],
+        assumed.format("true"): [("a.r", "It is small"), ("a.r.constant", "")],
+    }
+    for at, (said, wanted) in enumerate(cases.items()):
+        system = make(tmp_path / str(at), A, entry.format(said))
+        found = [(s.place.removeprefix("environment."), s.says) for s in system.plan.statements]
+        assert found == wanted, said
+        assert system.plan.environment[0].constant is ("false" not in said)
+        silent = [d.hint or "" for d in without_words(system)]
+        assert [hint for hint in silent if "constant: {because" in hint] == silent
+        assert len(silent) == sum(not words for _, words in wanted)
+    assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
+    assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
+
+
 @pytest.mark.parametrize(
     ("former", "today"),
     [
