@@ -1,8 +1,8 @@
 """The argument as a goal structure (GSN): goals, strategies, solutions, contexts, assumptions, justifications.
 
 A requirement is a goal; a rule's application, an entailment or a person's linking is a strategy; a node's contract and
-its guarantees are sub-goals; evidence is a solution. What nothing supports stays an undeveloped goal, and shows as one.
-Data only: `avow.report` draws it and writes it as gsn2x YAML.
+its guarantees are sub-goals; evidence is a solution. What nothing supports stays a goal without anything under it.
+Data only: the report's page has it as a list.
 """
 
 from __future__ import annotations
@@ -41,28 +41,14 @@ class Element:
     claim: str = ""
     supported_by: tuple[str, ...] = ()
     in_context_of: tuple[str, ...] = ()
-    undeveloped: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Argument:
     """Elements in the order in which they are first needed; `goals` are (requirement id, element id)."""
 
-    root: str
     elements: tuple[Element, ...]
     goals: tuple[tuple[str, str], ...]
-
-    def below(self, start: str) -> tuple[Element, ...]:
-        """An element with everything under it, in the order of the argument."""
-        known = {element.id: element for element in self.elements}
-        wanted, queue = {start}, [start]
-        while queue:
-            element = known[queue.pop()]
-            for name in (*element.supported_by, *element.in_context_of):
-                if name not in wanted:
-                    wanted.add(name)
-                    queue.append(name)
-        return tuple(element for element in self.elements if element.id in wanted)
 
 
 def build_argument(case: Case) -> Argument:
@@ -90,22 +76,12 @@ class _Builder:
             strategy = self.add(Shape.STRATEGY, "Requirements", "Argument over each requirement")
             self.change(root, supported_by=(strategy,))
             self.change(strategy, supported_by=tuple(dict.fromkeys(name for _, name in goals)))
-        else:
-            self.change(root, undeveloped=True)
-        return Argument(root, tuple(self.elements.values()), goals)
+        return Argument(tuple(self.elements.values()), goals)
 
-    def add(
-        self,
-        shape: Shape,
-        title: str,
-        text: str,
-        status: Status | None = None,
-        claim: str = "",
-        undeveloped: bool = False,
-    ) -> str:
+    def add(self, shape: Shape, title: str, text: str, status: Status | None = None, claim: str = "") -> str:
         number = self.numbers[shape] = self.numbers.get(shape, 0) + 1
         name = f"{shape}{number}"
-        self.elements[name] = Element(name, shape, title, text, status, claim, undeveloped=undeveloped)
+        self.elements[name] = Element(name, shape, title, text, status, claim)
         return name
 
     def change(self, name: str, **parts: object) -> None:
@@ -115,12 +91,12 @@ class _Builder:
         claim = requirement_claim(view.id)
         if claim in self.by_claim:
             return self.by_claim[claim]
-        goal = self.add(Shape.GOAL, view.id, view.text or view.formula or view.temporal, view.status, claim)
+        goal = self.add(Shape.GOAL, view.id, view.words, view.status, claim)
         self.by_claim[claim] = goal
         context = [self.add(Shape.ASSUMPTION, "Hypothesis", text) for text in view.hypotheses[:6]]
         if len(view.hypotheses) > 6:
             context.append(self.add(Shape.ASSUMPTION, "Hypotheses", f"and {len(view.hypotheses) - 6} more"))
-        formal = view.formula or view.temporal
+        formal = view.formal
         if formal:
             context.append(self.add(Shape.CONTEXT, "Formula", formal))
         steps = []
@@ -136,7 +112,7 @@ class _Builder:
                 "is what a person says to amount to the requirement" if not formal else "is what the formula speaks of"
             )
             steps.append(self.strategy("Contracts", f"What the nodes guarantee {how}", others))
-        self.change(goal, supported_by=tuple(steps), in_context_of=tuple(context), undeveloped=not steps)
+        self.change(goal, supported_by=tuple(steps), in_context_of=tuple(context))
         return goal
 
     def strategy(self, title: str, text: str, claims: Iterable[str]) -> str:
@@ -170,9 +146,7 @@ class _Builder:
             return self.derivation(self.derivations[name])
         view = self.views.get(name)
         if view is None:
-            self.by_claim[name] = self.add(
-                Shape.GOAL, short(name), "no such claim", Status.MISSING, name, undeveloped=True
-            )
+            self.by_claim[name] = self.add(Shape.GOAL, short(name), "no such claim", Status.MISSING, name)
             return self.by_claim[name]
         return self.obligation(view)
 
@@ -194,7 +168,7 @@ class _Builder:
             )
             context = (self.add(Shape.JUSTIFICATION, finding.how.capitalize(), said),)
         supported = tuple(dict.fromkeys((*solutions, *below)))
-        self.change(goal, supported_by=supported, in_context_of=context, undeveloped=not supported)
+        self.change(goal, supported_by=supported, in_context_of=context)
         return goal
 
     def solution(self, view: ObligationView, item: EvidenceView) -> str:

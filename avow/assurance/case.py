@@ -362,7 +362,7 @@ def _derivation(
 def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
     found: dict[str, list[str]] = {}
     for view in views:
-        counted = [v.entry.evidence for v in view.counting]
+        counted = view.records
         for text in dict.fromkeys(h for e in counted for h in in_words(e.rests_on, e.hypotheses)):
             found.setdefault(text, []).append(view.id)
     for d in derived:
@@ -377,7 +377,7 @@ def _single(views: Sequence[ObligationView]) -> tuple[str, ...]:
         for view in views
         if view.obligation.kind is Kind.GUARANTEE
         and view.status.supports
-        and independent(v.entry.evidence for v in view.counting if weigh(v.entry.evidence).support) == 1
+        and independent(r for r in view.records if weigh(r).support) == 1
     )
 
 
@@ -399,7 +399,7 @@ def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
     if serious:
         return False, f"the audit found {count(serious, 'discrepancy', 'discrepancies')}"
     if not facts.run.fresh:
-        cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
+        cached = sum(1 for view in views for r in view.records if r.run != facts.run.id)
         if not cached:
             return False, "every answer is of this run, though earlier ones were allowed"
         return False, f"{count(cached, 'answer')} from earlier runs, of the same inputs as now"

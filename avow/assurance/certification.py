@@ -83,7 +83,7 @@ def proof_views(views: Iterable[ObligationView], kernel: KernelRun, run: str) ->
 
 
 def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
-    proofs = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).support is Status.PROVED]
+    proofs = [r for r in view.records if weigh(r).support is Status.PROVED]
     own = [e for e in proofs if e.backend == CALCULUS]
     certifiable = view.obligation.kind in _CERTIFIABLE
     if known is not None and own and certifiable:
@@ -93,7 +93,7 @@ def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
     if own and not others:
         return ProofView(view.id, ProofGrade.CLAIMED, tuple(sorted({f"{e.tool} {e.tool_version}" for e in own})))
     tools = {f"{e.backend}: {e.tool} {e.tool_version}".strip() for e in others}
-    tools |= set() if tools else {f"{v.entry.evidence.backend}: another claim's proof" for v in view.counting}
+    tools |= set() if tools else {f"{r.backend}: another claim's proof" for r in view.records}
     return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tools)))
 
 

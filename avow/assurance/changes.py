@@ -9,6 +9,7 @@ from avow.assurance.answers import Baseline, ChangeLine, Changes, How, Suppositi
 from avow.assurance.model import Case, ObligationView, RequirementView
 from avow.assurance.relied import word
 from avow.assurance.weakenings import words_of
+from avow.base.codec import canonical
 from avow.base.files import sha256
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
@@ -31,7 +32,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         until=until,
         content="",
         verdict=case.answers.verdict,
-        requirements=tuple((r.id, _meaning(r), r.how.value, r.formula or r.temporal) for r in case.requirements),
+        requirements=tuple((r.id, _meaning(r), r.how.value, r.formal) for r in case.requirements),
         guarantees=tuple(_guarantee(view) for view in case.obligations if view.obligation.kind is Kind.GUARANTEE),
         suppositions=tuple((s.key, s.words, s.until) for s in case.suppositions),
         weakenings=tuple((w.key, w.count) for w in case.weakenings if w.key not in _PASSING),
@@ -41,8 +42,6 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
 
 def content_of(of: Baseline) -> str:
     """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
-    from avow.base.codec import canonical
-
     return sha256(
         canonical(
             {
@@ -110,7 +109,7 @@ def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Ite
         elif _HOW_RANK[r.how] > _HOW_RANK[was]:
             yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.how}", was.value, r.how.value)
         if meaning != _meaning(r):
-            yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formula or r.temporal)
+            yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formal)
     for name in then:
         if name not in {r.id for r in requirements}:
             yield ChangeLine("gone", name, f"{name} is not claimed any more", then[name][2], "")

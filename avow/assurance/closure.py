@@ -99,7 +99,7 @@ class Closure:
             assumed = [f"{node}.{clause}" for clause in self.assumptions.get(node, ())]
             return self._discharged(assumed, list(self.joint.get(about, ())))
         if view.obligation.kind in (Kind.COMPOSITION, Kind.REQUIREMENT):
-            labels = [label for item in view.counting for label in _needed(item.entry.evidence.details)]
+            labels = [label for r in view.records for label in _needed(r.details)]
             found = [self.known[label] for label in labels if label in self.known]
             found += [name for label in labels if (name := self._environment(label)) is not None]
             assumed = [label for label in labels if label not in self.known and self._is_assumption(label)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
 from avow.base import codec
 from avow.base.codec import Unreadable
@@ -29,12 +28,6 @@ def from_json(data: object) -> Case:
     return codec.from_json(Case, {key: value for key, value in data.items() if key != "schema"})
 
 
-def baseline_to_json(baseline: Baseline) -> dict[str, Any]:
-    """What of a case was signed, as plain data."""
-    found: dict[str, Any] = codec.to_json(baseline)
-    return found
-
-
 def read_case(path: Path) -> Case:
     """The case of a report (its folder, or report.json). Raises Rejected."""
     file = path / "report.json" if path.is_dir() else path
@@ -45,11 +38,6 @@ def read_case(path: Path) -> Case:
     except ValueError as error:
         message = f"{file} is no report of this version of Avow: {error}"
         raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
-
-
-def baseline_from_json(data: object) -> Baseline:
-    """Raises Unreadable."""
-    return codec.from_json(Baseline, data)
 
 
 def case_schema() -> dict[str, Any]:

@@ -105,12 +105,7 @@ def of_case(case: Case) -> Snapshot:
         for v in case.obligations
         if not v.advice
     }
-    told |= {
-        requirement_claim(r.id): Told(
-            r.text or r.formula or r.temporal, {}, r.below or r.failing, r.formula or r.temporal
-        )
-        for r in case.requirements
-    }
+    told |= {requirement_claim(r.id): Told(r.words, {}, r.below or r.failing, r.formal) for r in case.requirements}
     return Snapshot(
         case.system,
         claims,

@@ -8,7 +8,7 @@ from datetime import date
 from itertools import combinations
 
 from avow.assurance.facts import Facts
-from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
+from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.persons import one_person
@@ -25,7 +25,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     """What a guarantee lacks, in words; None where the demand is met."""
     if not demand.one_of:
         return None
-    evidence = [v.entry.evidence for v in view.counting]
+    evidence = view.records
     kept, dropped = [], []
     persons = _persons(evidence, demand, policy, today)
     for item in evidence:
@@ -162,7 +162,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             # the same question is not asked twice: it has to change, or be asked afresh
             again = f"`avow verify --fresh {facts.system}`"
             return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
-        case Status.VACUOUS if hollow := [v.entry.evidence.method for v in view.counting if _is_score(v)]:
+        case Status.VACUOUS if hollow := [r.method for r in view.records if r.vacuous and "mutation" in r.details]:
             return Suggestion(
                 f"find out what `{hollow[0]}` looks at: it says the same of every mutant of the claim", cost=50
             )
@@ -184,15 +184,14 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         )
     used = _planned(view, facts)
     by_name = {method.name: method for method in facts.methods}
-    tried = {v.entry.evidence.method for v in view.counting}
+    tried = {r.method for r in view.records}
     for method, backend in used.items():
         info = by_name.get(backend)
         if info is not None and not info.available:
             return Suggestion(f"install what `{method}` needs: {info.install}", method)
         if method not in tried:
             return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
-    for item in view.counting:
-        record = item.entry.evidence
+    for record in view.records:
         if record.method in used and (record.verdict is Verdict.ERROR or undeclared(record)):
             return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
     if demand is None:
@@ -204,8 +203,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             "narrow the question (a scenario in the plan), allow more `seconds`, or accept it with a reason", cost=20
         )
     new = _new_method(view, demand, used, facts)
-    for item in view.counting:
-        record = item.entry.evidence
+    for record in view.records:
         if record.method in used and record.verdict is Verdict.UNKNOWN and not record.vacuous:
             return replace(new, text=f"{new.text}; or see why `{record.method}` gave up: {_clipped(record.summary)}")
     return new
@@ -217,7 +215,7 @@ def _clipped(text: str) -> str:
 
 def _two_answers(view: ObligationView) -> str:
     """Of one and the same thing two answers cannot both be right; a model and a trace of the robot may well differ."""
-    records = [item.entry.evidence for item in view.counting]
+    records = view.records
     for proof in (r for r in records if effective(r) is Verdict.PROVED):
         for refutation in (r for r in records if r.verdict is Verdict.REFUTED):
             read, other = set(proof.inputs), set(refutation.inputs)
@@ -231,10 +229,6 @@ def _two_answers(view: ObligationView) -> str:
 def _files(paths: set[str]) -> str:
     names = sorted(path.rpartition("/")[2] for path in paths)
     return ", ".join(names[:2]) + (", …" if len(names) > 2 else "")
-
-
-def _is_score(item: EvidenceView) -> bool:
-    return item.entry.evidence.vacuous and "mutation" in item.entry.evidence.details
 
 
 def _expired(view: ObligationView) -> tuple[str, ...]:

@@ -254,7 +254,7 @@ def _requirements(
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
     if any(r.suspect for r in bad):
         found.append(Suggestion("read the sentence again and confirm it: `avow check` prints what to write", cost=5))
-    if any(not (r.formula or r.temporal or r.below or causes[r.id] or r.suspect) for r in bad):
+    if any(not (r.formal or r.below or causes[r.id] or r.suspect) for r in bad):
         found.append(
             Suggestion("state the requirement as a `formula` or a `temporal` one: prose is argued by a person", cost=20)
         )

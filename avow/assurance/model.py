@@ -26,6 +26,7 @@ from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Confirmation, Statement
 
@@ -198,6 +199,11 @@ class ObligationView:
     def counting(self) -> tuple[EvidenceView, ...]:
         return tuple(view for view in self.evidence if view.counts)
 
+    @functools.cached_property
+    def records(self) -> tuple[Evidence, ...]:
+        """What counts, without its place in the ledger."""
+        return tuple(view.entry.evidence for view in self.counting)
+
 
 @dataclass(frozen=True, slots=True)
 class RequirementView:
@@ -238,6 +244,16 @@ class RequirementView:
     """Whether its sentence, or what is linked to it, is another than was confirmed."""
     linked: str = ""
     """Digest of what the names under `supported_by` say in the contract."""
+
+    @property
+    def formal(self) -> str:
+        """Its formula or temporal property; empty where it is prose."""
+        return self.formula or self.temporal
+
+    @property
+    def words(self) -> str:
+        """What it says, in the plan's words if there are any."""
+        return self.text or self.formal
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,6 +101,6 @@ def _because(case: Case, r: RequirementView) -> str:
 
 def _strategy(r: RequirementView, nodes: int) -> str:
     over = count(nodes, "node contract")
-    if not (r.formula or r.temporal):
+    if not r.formal:
         return f"A person's judgement over {over}"
     return f"Composition of {over}"

@@ -62,7 +62,7 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
     if not view.status.supports:
         return None
     ways = []
-    records = [item.entry.evidence for item in view.counting]
+    records = view.records
     supporting = [(record, status) for record in records if (status := weigh(record).support) is not None]
     for record, status in supporting:
         outdone = record.of is Object.MODEL and any(

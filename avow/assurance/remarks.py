@@ -70,8 +70,7 @@ def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterato
     """What the methods' checks remarked when they gave the answers that count; each once, at the first claim."""
     seen = set[tuple[str, str, str]]()
     for view in views:
-        for evidence in view.counting:
-            record = evidence.entry.evidence
+        for record in view.records:
             listed = record.details.get(REMARKS)
             for told in listed if isinstance(listed, list) else ():
                 match told:

@@ -20,26 +20,8 @@ from avow.base.plain import bare
 from avow.base.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
 
 _BLOCKS = frozenset(
-    (
-        "p",
-        "div",
-        "br",
-        "hr",
-        "li",
-        "ul",
-        "ol",
-        "dl",
-        "dt",
-        "dd",
-        "table",
-        "caption",
-        "tr",
-        "td",
-        "th",
-        "pre",
-        "blockquote",
-    )
-) | {f"h{n}" for n in range(1, 7)}
+    ("p", "div", "br", "hr", "li", "ul", "ol", "dl", "dt", "dd", "table", "caption", "tr", "td", "th", "pre")
+) | {"blockquote", *(f"h{n}" for n in range(1, 7))}
 """XHTML elements that part words."""
 _OBJECT = " [a picture or embedded object] "
 """What stands for something that is no text: a requirement must not vanish because it is a picture."""

@@ -64,7 +64,7 @@ def held(
     how = How.DERIVED
     if not view.status.supports or closed.failing or view.unknown_names or any(s.expired for s in mine):
         how = How.OPEN
-    elif not (view.formula or view.temporal):
+    elif not view.formal:
         how = How.ARGUED
     elif any(by_id[name].status is not Status.PROVED for name in view.obligations):
         how = How.BOUNDED

@@ -10,10 +10,9 @@ from typing import Any
 
 from avow.assurance.answers import Baseline
 from avow.assurance.changes import baseline_of, content_of
-from avow.assurance.codec import baseline_from_json, baseline_to_json
 from avow.assurance.model import Case
-from avow.base.codec import Unreadable
-from avow.base.files import read_regular, write
+from avow.base.codec import Unreadable, from_json, to_json
+from avow.base.files import digest_file, read_regular, write
 from avow.evidence.envelope import Opened, seal, unseal
 
 PREDICATE = "https://avow.invalid/signed-case/v1"
@@ -36,13 +35,13 @@ def sign_case(
         "until": until.isoformat(),
         "system": case.system,
         "says": case.answers.statement,
-        "baseline": baseline_to_json(told),
+        "baseline": to_json(told),
     }
     statement: dict[str, Any] = {
         "_type": "https://in-toto.io/Statement/v1",
         "subject": [
             {"name": f"case/{case.system}", "digest": {"sha256": told.content}},
-            {"name": "report.json", "digest": {"sha256": _digest(report)}},
+            {"name": "report.json", "digest": {"sha256": digest_file(report)}},
             *({"name": name, "digest": {"sha256": mark}} for name, mark in case.digests),
         ],
         "predicateType": PREDICATE,
@@ -76,7 +75,7 @@ def _read(path: Path, system: str, trusted: list[Path]) -> Baseline | str:
     if opened.statement.get("predicateType") != PREDICATE or not isinstance(predicate, dict):
         return "it is no signature of a case"
     try:
-        found = baseline_from_json(predicate.get("baseline"))
+        found = from_json(Baseline, predicate.get("baseline"))
     except Unreadable as error:
         return str(error)
     if predicate.get("system") != system:
@@ -89,9 +88,3 @@ def _read(path: Path, system: str, trusted: list[Path]) -> Baseline | str:
 def _number(path: Path) -> int:
     text = path.name.partition("-")[0]
     return int(text) if text.isascii() and text.isdigit() else 0
-
-
-def _digest(path: Path) -> str:
-    from avow.base.files import digest_file
-
-    return digest_file(path)

@@ -101,8 +101,7 @@ def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
     told: dict[tuple[str, str], list[ObligationView]] = {}
     for view in views:
         if view.status is not Status.ERROR and not view.advice:
-            for item in view.counting:
-                record = item.entry.evidence
+            for record in view.records:
                 if weigh(record).status is Status.ERROR:
                     told.setdefault((record.method, record.summary), []).append(view)
     for (method, summary), failed in told.items():
@@ -152,12 +151,12 @@ def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
 
 def _summary(view: ObligationView) -> str:
     """The most telling evidence in a line: a refutation's counterexample, else the last attempt's summary."""
-    refuting = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).refuted]
+    refuting = [r for r in view.records if weigh(r).refuted]
     if refuting:
         record = refuting[-1]
         example = record.counterexample.text() if record.counterexample else ""
         return f"{record.method}: {example or record.summary}"
-    telling = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).status is view.status]
+    telling = [r for r in view.records if weigh(r).status is view.status]
     if telling:
         record = telling[-1]
         return f"{record.method}: {record.summary}"
@@ -168,11 +167,11 @@ def _summary(view: ObligationView) -> str:
 
 
 def _has_vacuous(view: ObligationView) -> bool:
-    return any(v.entry.evidence.vacuous and v.entry.evidence.verdict.supports for v in view.counting)
+    return any(r.vacuous and r.verdict.supports for r in view.records)
 
 
 def _vacuous(view: ObligationView) -> OpenItem:
-    methods = ", ".join(v.entry.evidence.method for v in view.counting if v.entry.evidence.vacuous)
+    methods = ", ".join(r.method for r in view.records if r.vacuous)
     return OpenItem(
         "vacuous",
         view.id,
@@ -186,8 +185,7 @@ def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, st
     """What bounds the answers: for reproduction, and for judging what a bounded answer is worth."""
     bounds: dict[tuple[str, str, str], list[str]] = {}
     for view in views:
-        for v in view.counting:
-            record = v.entry.evidence
+        for record in view.records:
             if record.bound:
                 text = ", ".join(f"{name} = {_short(value)}" for name, value in record.bound.items())
                 bounds.setdefault((view.obligation.node, record.method, text), []).append(view.obligation.name)
@@ -246,7 +244,7 @@ def not_shown(
         lines.append(
             f"{listed(trusted, 12)}: what is assumed of these environment inputs is believed for a reason, not shown."
         )
-    used = {v.entry.evidence.backend for view in views for v in view.counting}
+    used = {r.backend for view in views for r in view.records}
     if any(m.strength in (Verdict.PROVED, Verdict.CHECKED) and m.name in used for m in facts.methods):
         lines.append(
             "A proof or check is about the program or model that it was given; that the deployed software is that "
@@ -263,8 +261,8 @@ def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
     """How measured runs were made, in the plan's words: 47 of 47 in a simulation is not 47 of 47 on the robot."""
     found: dict[str, list[str]] = {}
     for view in views:
-        for v in view.counting:
-            match v.entry.evidence.details.get("protocol"):
+        for record in view.records:
+            match record.details.get("protocol"):
                 case str(text) if text.strip():
                     found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
     for text, names in found.items():

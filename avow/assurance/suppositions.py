@@ -154,7 +154,7 @@ def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], stat
         if view.status is not Status.JUSTIFIED:
             continue
         o = view.obligation
-        text = next((v.entry.evidence.summary for v in reversed(view.counting)), o.claim)
+        text = next((r.summary for r in reversed(view.records)), o.claim)
         sort, place = Sort.MODELS, o.local_id
         if o.kind is Kind.COMPOSITION and o.name.startswith("environment."):
             sort, place = Sort.WORLD, o.name
@@ -204,8 +204,8 @@ def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str
     supposed = {
         supposition_claim(h): h
         for view in views
-        for item in view.counting
-        for h in item.entry.evidence.rests_on
+        for record in view.records
+        for h in record.rests_on
         if h.kind is HypothesisKind.SUPPOSITION
     }
     for claim in dict.fromkeys(name for found in closed.values() for name in found.accepted):

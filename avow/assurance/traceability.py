@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
@@ -43,21 +43,6 @@ class Row:
     tool: str = ""
     evidence: str = ""
     remark: str = ""
-
-    def cells(self) -> tuple[str, ...]:
-        return (
-            self.requirement,
-            self.derivation,
-            self.guarantee,
-            self.obligation,
-            self.status,
-            self.method,
-            self.verdict,
-            self.link,
-            self.tool,
-            self.evidence,
-            self.remark,
-        )
 
 
 def trace(case: Case) -> tuple[Row, ...]:
@@ -125,13 +110,12 @@ def _rows(view: ObligationView, requirement: str, derivation: str, remark: str =
         yield replace(start, remark=f"{remark}; {missing}" if remark else missing)
     for item in view.counting:
         record = item.entry.evidence
-        tool = record.tool_told
         yield replace(
             start,
             method=record.method,
             verdict=weigh(record).status.value,  # what it counts as: a pass that is vacuous shows nothing
             link=record.link.value,
-            tool=tool,
+            tool=record.tool_told,
             evidence=item.entry.hash[:12],
         )
 
@@ -141,7 +125,7 @@ def to_csv(rows: Iterable[Row]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(COLUMNS)
-    writer.writerows([[_harmless(cell) for cell in row.cells()] for row in rows])
+    writer.writerows([[_harmless(cell) for cell in astuple(row)] for row in rows])
     return out.getvalue()
 
 

@@ -13,47 +13,45 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 
 _WORDS = {
-    "argued": ("argued, not derived", "A person must agree that the guarantees amount to the sentence."),
+    "argued": ("argued, not derived", "argued", "A person must agree that the guarantees amount to the sentence."),
     "unconfirmed": (
         "sentence{s} that nobody has confirmed",
+        "unconfirmed",
         "A changed sentence would not be noticed (`confirmed`).",
     ),
-    "bounded": ("derived within bounds only", "Nothing is said outside the finite scenario."),
-    "unowned": ("supposition{s} without owner or date", "Nobody is named to keep them true, or they never expire."),
-    "sampled": ("guarantee{s} sampled, not proved", "Other inputs and other runs may behave otherwise."),
-    "read": ("guarantee{s} on a person's reading only", "No tool has looked at them."),
-    "single": ("guarantee{s} with one method only", "An error of that tool would not be noticed."),
+    "bounded": ("derived within bounds only", "bounded", "Nothing is said outside the finite scenario."),
+    "unowned": (
+        "supposition{s} without owner or date",
+        "without owner",
+        "Nobody is named to keep them true, or they never expire.",
+    ),
+    "sampled": ("guarantee{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
+    "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
+    "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
     "tied": (
         "guarantee{s} translated by a person for the tool",
+        "translated by a person",
         "That a person's table or measure fits is not shown.",
     ),
     "unrun": (
         "planned method{s} without an answer",
+        "not answered",
         "A tool is missing, gave up or failed; others answer for it.",
     ),
-    "conditional": ("review{s} with conditions", "The reviewer names what must be so besides."),
-    "advice": ("open remark{s}", "They fail nothing; read them."),
-    "excused": ("finding{s} accepted by a person", "Somebody takes responsibility for what is not so."),
-    "believed": ("answer{s} from earlier runs", "They were not computed afresh for this report."),
+    "conditional": (
+        "review{s} with conditions",
+        "reviewed with conditions",
+        "The reviewer names what must be so besides.",
+    ),
+    "advice": ("open remark{s}", "remarks", "They fail nothing; read them."),
+    "excused": ("finding{s} accepted by a person", "excused", "Somebody takes responsibility for what is not so."),
+    "believed": (
+        "answer{s} from earlier runs",
+        "answered earlier",
+        "They were not computed afresh for this report.",
+    ),
 }
-
-
-_BRIEFLY = {
-    "argued": "argued",
-    "unconfirmed": "unconfirmed",
-    "bounded": "bounded",
-    "unowned": "without owner",
-    "sampled": "sampled",
-    "read": "only read",
-    "single": "by one method",
-    "tied": "translated by a person",
-    "unrun": "not answered",
-    "conditional": "reviewed with conditions",
-    "advice": "remarks",
-    "excused": "excused",
-    "believed": "answered earlier",
-}
-"""The same for the first screen, where it leads to the words."""
+"""Of each kind what it is called, with its number before it; the same on the first screen; what to make of it."""
 
 
 def of_weakening(kinds: int) -> str:
@@ -63,7 +61,7 @@ def of_weakening(kinds: int) -> str:
 
 def briefly(found: Iterable[Weakening]) -> str:
     """``2 argued, 19 by one method``."""
-    return ", ".join(f"{w.count} {_BRIEFLY[w.key]}" for w in found)
+    return ", ".join(f"{w.count} {_WORDS[w.key][1]}" for w in found)
 
 
 def weakenings(
@@ -80,7 +78,7 @@ def weakenings(
     """`basis`: the obligations that matter (all that requirements rest on); `single`: guarantees with one method."""
     within = set(basis)
     guarantees = [v for v in views if v.id in within and v.obligation.kind is Kind.GUARANTEE]
-    found: dict[str, Iterable[str]] = {
+    found = {
         "argued": [r.id for r in requirements if r.how is How.ARGUED],
         "unconfirmed": [r.id for r in requirements if r.how is How.ARGUED and r.confirmed is None],
         "bounded": [r.id for r in requirements if r.how is How.BOUNDED],
@@ -95,12 +93,11 @@ def weakenings(
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
         "believed": [v.id for v in views if v.id in within and any(e.entry.evidence.run != run for e in v.counting)],
     }
-    listed = {key: tuple(claims) for key, claims in found.items()}
-    return tuple(_weakening(key, claims) for key, claims in listed.items() if claims)
+    return tuple(_weakening(key, tuple(claims)) for key, claims in found.items() if claims)
 
 
 def _weakening(key: str, claims: tuple[str, ...]) -> Weakening:
-    return Weakening(key, len(claims), claims, words_of(key, len(claims)), _WORDS[key][1])
+    return Weakening(key, len(claims), claims, words_of(key, len(claims)), _WORDS[key][2])
 
 
 def words_of(key: str, number: int) -> str:
@@ -114,24 +111,18 @@ def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None
 
 def _by_hand(view: ObligationView, relied: Relied) -> bool:
     """Whether what gives the claim its status is tied to the formula by a person, in a table or by judgement."""
-    alike = [
-        v.entry.evidence
-        for v in view.counting
-        if weigh(v.entry.evidence).support is relied.status
-        or (relied.status in EXHAUSTIVE and weigh(v.entry.evidence).support in EXHAUSTIVE)
-    ]
+    sure = relied.status in EXHAUSTIVE
+    alike = [r for r in view.records if weigh(r).support is relied.status or (sure and weigh(r).support in EXHAUSTIVE)]
     return relied.status is not Status.REVIEWED and all(record.link is not Link.GENERATED for record in alike)
 
 
 def _unanswered(view: ObligationView) -> Iterator[str]:
     silent = (Verdict.NOT_RUN, Verdict.ERROR, Verdict.UNKNOWN)
     for method, _ in view.planned:
-        said = [v.entry.evidence.verdict for v in view.counting if v.entry.evidence.method == method]
+        said = [r.verdict for r in view.records if r.method == method]
         if all(verdict in silent for verdict in said):
             yield method
 
 
 def _on_conditions(view: ObligationView) -> bool:
-    return any(
-        weigh(v.entry.evidence).support is Status.REVIEWED and v.entry.evidence.hypotheses for v in view.counting
-    )
+    return any(weigh(r).support is Status.REVIEWED and r.hypotheses for r in view.records)

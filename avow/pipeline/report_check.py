@@ -57,7 +57,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
 def stale(case: Case, root: Path) -> tuple[str, ...]:
     """The files, under `root` or beyond it, that evidence which counts in the case was made of and that are others now:
     the report says what the ledger says, but of an earlier state."""
-    counting = [item.entry.evidence for view in case.obligations for item in view.counting]
+    counting = [r for view in case.obligations for r in view.records]
     marks = {pair for record in counting for pair in record.inputs.items()}
     seen = {path for record in counting for path in changed(record, root)}
     return tuple(sorted(seen | {path for path, mark in marks if _digest(root / path) != mark}))

@@ -106,7 +106,7 @@ def _requirement(case: Case, module: RequirementModule) -> dict[str, Any]:
     own = []
     for name in module.requirement.obligations:
         view = case.obligation(name)
-        own += [(view, item.entry.evidence) for item in view.counting]
+        own += [(view, r) for r in view.records]
     fields = {name: getattr(module, name) for name in RequirementModule.__slots__}
     return {**fields, "own": own}
 
@@ -128,7 +128,7 @@ def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
         "tone": Tone.GREEN if sure else Tone.AMBER if good else Tone.RED,
         "where": wording.where(view),
         "reason": said.reason if said else "",
-        "records": [item.entry.evidence for item in view.counting],
+        "records": view.records,
         "history": len(view.evidence) - len(view.counting),
     }
 

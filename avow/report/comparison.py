@@ -12,35 +12,17 @@ from avow.base.tuning.shown import CHANGES_UNFOLDED
 from avow.evidence.status import Status
 from avow.report.page import asset, environment
 
-_HEADINGS = {
-    "gate": "Gates of the policy",
-    "worse": "Lost: claims that stand worse",
-    "removed": "Gone: claims that are not made any more",
-    "supposition": "Supposed now, without being shown",
-    "meaning": "Changed meaning: another claim under the same name",
-    "added": "New claims",
-    "better": "Gained: claims that stand better",
-    "rerun": "Asked again, with the same verdict",
+_KINDS = {
+    "gate": ("Gates of the policy", "of the gates changed", ""),
+    "worse": ("Lost: claims that stand worse", "worse", "bad"),
+    "removed": ("Gone: claims that are not made any more", "gone", "open"),
+    "supposition": ("Supposed now, without being shown", "supposed now", "open"),
+    "meaning": ("Changed meaning: another claim under the same name", "changed meaning", "open"),
+    "added": ("New claims", "new", "fair"),
+    "better": ("Gained: claims that stand better", "better", "good"),
+    "rerun": ("Asked again, with the same verdict", "asked again", "plain"),
 }
-_WORDS = {
-    "gate": "of the gates changed",
-    "worse": "worse",
-    "removed": "gone",
-    "supposition": "supposed now",
-    "meaning": "changed meaning",
-    "added": "new",
-    "better": "better",
-    "rerun": "asked again",
-}
-_TONES = {
-    "worse": "bad",
-    "removed": "open",
-    "supposition": "open",
-    "meaning": "open",
-    "added": "fair",
-    "better": "good",
-    "rerun": "plain",
-}
+"""Of each kind its heading, the word after its number, and its colour (a gate's is that of what it says now)."""
 
 
 def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]]) -> str:
@@ -60,8 +42,8 @@ def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]])
             line=_line(counts, lost),
             banner="bad" if lost else "open" if counts["removed"] or counts["meaning"] else "good",
             systems=systems,
-            counts=[(kind, counts[kind], _WORDS[kind], _tone(kind, changes)) for kind in ORDER if counts[kind]],
-            headings=_HEADINGS,
+            counts=[(kind, counts[kind], _KINDS[kind][1], _tone(kind, changes)) for kind in ORDER if counts[kind]],
+            headings={kind: heading for kind, (heading, _, _) in _KINDS.items()},
             known={status.value for status in Status},
             folded=CHANGES_UNFOLDED,
             style=Markup(asset("style.css")),  # our own file
@@ -83,5 +65,5 @@ def _line(counts: Counter[str], lost: int) -> str:
 
 def _tone(kind: str, changes: Sequence[tuple[str, Change]]) -> str:
     if kind != "gate":
-        return _TONES[kind]
+        return _KINDS[kind][2]
     return "bad" if any(c.kind == "gate" and c.after == "fails" for _, c in changes) else "good"

@@ -26,7 +26,7 @@ def render_json(case: Case) -> str:
 
 def headline(view: ObligationView) -> str:
     """An obligation's state in a line: what refutes it first, else the newest evidence, else that there is none."""
-    counting = [item.entry.evidence for item in view.counting]
+    counting = view.records
     for record in counting:
         if record.verdict.value == "refuted":
             example = record.counterexample.text() if record.counterexample else ""
@@ -87,7 +87,7 @@ def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str,
             handled = f"{view.handled}; " if view.handled else ""
             inside = f"<skipped message={_attribute(handled + message)}/>"
         counts[0] += 1
-        seconds = sum(item.entry.evidence.seconds for item in view.counting)
+        seconds = sum(r.seconds for r in view.records)
         o = view.obligation
         rows.append(_testcase(f"{case.system}.{o.node}.{o.kind}", o.name, seconds, inside))
     return f"<testsuite name={_attribute(node)} {_numbers(counts)}>\n{''.join(rows)}</testsuite>\n", counts
@@ -226,7 +226,7 @@ def render_attestation(case: Case) -> str:
 
 def _statement(case: Case, node: str, views: list[ObligationView], result: str) -> dict[str, Any]:
     subjects = dict(case.digests)
-    for record in (item.entry.evidence for view in views for item in view.counting):
+    for record in (record for view in views for record in view.records):
         subjects |= record.inputs  # the programs and data that were verified, beside contract and plan
     if not subjects:
         subjects = {f"ledger/{case.system}": case.ledger_head}

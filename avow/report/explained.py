@@ -18,8 +18,8 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
     for module in requirement_modules(case):
         r = module.requirement
         if r.id == name:
-            lines = [r.text or r.formula or r.temporal, f"{r.how}. {module.because}"]
-            lines += [f"formula: {r.formula or r.temporal}"] if r.formula or r.temporal else []
+            lines = [r.words, f"{r.how}. {module.because}"]
+            lines += [f"formula: {r.formal}"] if r.formal else []
             weakest = r.weakest_evidence
             lines += [f"weakest evidence: {weakest.title}, {weakest.words} ({short(weakest.claim)})"] if weakest else []
             lines += [f"rests on {title}: {words}" for _, title, words in module.away]

@@ -34,8 +34,8 @@ def render_gsn(case: Case) -> str:
         r = module.requirement
         goal, strategy = f"G{at}", counter.next("S")
         names[r.id] = goal
-        elements: _Elements = {"module": {"name": f"requirement-{r.id}", "brief": r.text or r.formula or r.temporal}}
-        elements[goal] = {"text": f"{r.id} [{r.how}]\n{r.text or r.formula or r.temporal}"}
+        elements: _Elements = {"module": {"name": f"requirement-{r.id}", "brief": r.words}}
+        elements[goal] = {"text": f"{r.id} [{r.how}]\n{r.words}"}
         away = [goal_of_node[node] for node, _, _ in module.away]
         if away:
             elements[goal]["supportedBy"] = [strategy]
@@ -43,9 +43,9 @@ def render_gsn(case: Case) -> str:
         else:
             elements[goal]["undeveloped"] = True
         context = [suppositions[number] for number in module.supposes]
-        if r.formula or r.temporal:
+        if r.formal:
             formula = counter.next("C")
-            elements[formula] = {"text": r.formula or r.temporal}
+            elements[formula] = {"text": r.formal}
             context.append(formula)
         if module.conditions:
             reason = counter.next("J")
@@ -67,8 +67,7 @@ def render_gsn(case: Case) -> str:
             standing = word(view.standing) if view.standing.supports else view.status.value
             elements[one] = {"text": f"{view.obligation.name} [{standing}]\n{view.obligation.claim}"}
             solutions = []
-            for item in view.counting:
-                record = item.entry.evidence
+            for record in view.records:
                 solution = counter.next("Sn")
                 solutions.append(solution)
                 elements[solution] = {"text": f"{record.method} [{weigh(record).status.word}]\n{record.summary}"}
@@ -128,12 +127,12 @@ def cae(case: Case) -> _Elements:
     for module in requirement_modules(case):
         r = module.requirement
         found[f"claim-requirement-{r.id}"] = {
-            "text": r.text or r.formula or r.temporal,
+            "text": r.words,
             "verdict": r.how.value,
             "argued_by": [f"argument-requirement-{r.id}"],
         }
         found[f"argument-requirement-{r.id}"] = {
-            "kind": "decomposition" if (r.formula or r.temporal) else "substitution",
+            "kind": "decomposition" if r.formal else "substitution",
             "supports": [f"claim-requirement-{r.id}"],
             "from": [f"claim-node-{node}" for node, _, _ in module.away],
             **({"side_warrant": module.conditions} if module.conditions else {}),
@@ -153,7 +152,7 @@ def cae(case: Case) -> _Elements:
             "from": clauses,
         }
         for view, claim in zip(node.guarantees, clauses, strict=True):
-            records = [f"evidence-{name}.{view.obligation.name}-{item.entry.evidence.method}" for item in view.counting]
+            records = [f"evidence-{name}.{view.obligation.name}-{r.method}" for r in view.records]
             records = list(dict.fromkeys(records))
             argument = f"argument-guarantee-{name}.{view.obligation.name}"
             found[claim] = {
@@ -166,8 +165,7 @@ def cae(case: Case) -> _Elements:
                 "supports": [claim],
                 "from": records,
             }
-            for item in view.counting:
-                record = item.entry.evidence
+            for record in view.records:
                 found[f"evidence-{name}.{view.obligation.name}-{record.method}"] = {
                     "text": record.summary,
                     "verdict": weigh(record).status.value,

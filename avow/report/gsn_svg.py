@@ -73,7 +73,7 @@ def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
             below.append(Box("Composition", module.conditions, "sol", "claims.html#obligations"))
         if module.supposes:
             below.append(Box("supposes", ", ".join(module.supposes), "asm", "index.html#suppositions"))
-        yield Box(f"{r.id}: {r.how}", r.text or r.formula or r.temporal, f"goal {r.tone}", link), module.strategy, below
+        yield Box(f"{r.id}: {r.how}", r.words, f"goal {r.tone}", link), module.strategy, below
     bases = {basis.node: basis for basis in case.answers.bases}
     for node in node_modules(case):
         link = f"index.html#{anchor('node:' + node.node.name)}"

@@ -134,8 +134,7 @@ def _latex_obligation(view: ObligationView) -> Iterable[str]:
     yield rf"\paragraph{{{latex(short(o.id))}}} \textit{{{view.standing.word}}}. {latex(o.claim.rstrip('.'))}."
     if o.formula:
         yield r"\begin{quote}" + latex(o.formula) + r"\end{quote}"
-    for item in view.counting:
-        record = item.entry.evidence
+    for record in view.records:
         tool = latex(record.tool_told)
         yield rf"{latex(record.method)}: \textit{{{worth(record).word}}}, {tool}. {latex(record.summary)}."
         if record.counterexample:

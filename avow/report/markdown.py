@@ -116,7 +116,7 @@ def _guarantees(case: Case) -> list[ObligationView]:
 
 
 def _row(view: ObligationView) -> tuple[str, ...]:
-    methods = ", ".join(_answer(item.entry.evidence) for item in view.counting)
+    methods = ", ".join(_answer(r) for r in view.records)
     return (
         escaped(short(view.id)),
         escaped(view.criticality),

@@ -259,7 +259,7 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
     said = "".join(
         f"<li><b>{escape(e.method)}</b> {wording.worth(e)}: {escape(e.summary)}"
         f"{f' <span class=quiet>({escape(wording.bound_text(e.bound))})</span>' if e.bound else ''}</li>"
-        for e in (item.entry.evidence for item in view.counting)
+        for e in view.records
     )
     formula = f'<pre class="formula">{escape(o.formula)}</pre>' if o.formula else ""
     return Markup(
@@ -272,7 +272,7 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
 
 def _found(view: ObligationView) -> str:
     """What refutes a claim, in a line; empty where nothing does."""
-    shown = next((e.counterexample for e in (v.entry.evidence for v in view.counting) if e.counterexample), None)
+    shown = next((e.counterexample for e in view.records if e.counterexample), None)
     text = shown.text() if shown is not None and not view.status.supports else ""
     return text if len(text) <= FINDING_CHARACTERS else text[: FINDING_CHARACTERS - 1] + "…"
 
@@ -366,8 +366,8 @@ def _graph(case: Case) -> str:
 
 def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
     return [
-        (view, item.entry.evidence)
+        (view, record)
         for view in case.obligations
-        for item in view.counting
-        if weigh(item.entry.evidence).support is Status.JUSTIFIED
+        for record in view.records
+        if weigh(record).support is Status.JUSTIFIED
     ]

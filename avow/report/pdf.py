@@ -152,7 +152,7 @@ def _first(case: Case) -> dict[str, Any]:
         "listed": [
             [
                 r.id,
-                r.text or r.formula or r.temporal,
+                r.words,
                 {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
                 f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
                 str(len(r.supposes)),
@@ -210,8 +210,8 @@ def _module(module: RequirementModule) -> dict[str, Any]:
     lines += [f"supposes {', '.join(module.supposes)}"] if module.supposes else []
     return {
         "id": r.id,
-        "text": r.text or r.formula or r.temporal,
-        "formula": in_lines(r.formula or r.temporal),
+        "text": r.words,
+        "formula": in_lines(r.formal),
         "status": {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
         "because": module.because,
         "strategy": module.strategy,
@@ -222,7 +222,6 @@ def _module(module: RequirementModule) -> dict[str, Any]:
 
 def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
     said = case.said(view.id)
-    evidence = [item.entry.evidence for item in view.counting]
     return {
         "name": short(view.id),
         "claim": view.obligation.claim,
@@ -239,7 +238,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
                 "counter": _counter(case, e.counterexample) if e.counterexample else None,
                 "lanes": [{"svg": str(picture(t, alone=True)), "told": in_words(t)} for t in timelines(e.details)],
             }
-            for e in evidence
+            for e in view.records
         ],
     }
 
@@ -264,13 +263,7 @@ def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
 
 
 def _row(view: ObligationView) -> dict[str, Any]:
-    methods = [
-        {
-            "word": f"{i.entry.evidence.method}: {worth(i.entry.evidence)}",
-            "tone": tone(worth(i.entry.evidence)),
-        }
-        for i in view.counting
-    ]
+    methods = [{"word": f"{record.method}: {worth(record)}", "tone": tone(worth(record))} for record in view.records]
     return {"name": view.obligation.name, "status": _chip(view.standing), "methods": methods}
 
 

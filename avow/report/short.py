@@ -126,7 +126,7 @@ def _next(case: Case) -> str:
 
 
 def _one(r: RequirementView) -> str:
-    return " ".join((r.text or r.formula or r.temporal).split())
+    return " ".join(r.words.split())
 
 
 def _cut(line: str, most: int = WIDTH) -> str:

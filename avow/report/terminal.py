@@ -45,8 +45,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
     out.print(f"[dim]{escape(at)}meaning {o.digest[:12]}, criticality {escape(view.criticality)}[/]")
     if view.below:
         out.print(f"rests on what fails: {escape(', '.join(map(short, view.below)))}")
-    for item in view.counting:
-        e = item.entry.evidence
+    for e in view.records:
         vacuous = " (vacuous: supports nothing)" if e.vacuous else ""
         tool = escape(f"({e.tool_told}, tie {e.link})")
         out.print(f"\n{_status(Status(e.verdict))}{vacuous} by [bold]{escape(e.method)}[/] {tool}")

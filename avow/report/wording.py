@@ -125,7 +125,7 @@ def gate_line(reason: str, most: int = 200) -> str:
 
 def within(view: ObligationView, status: Status, most: int = 160) -> str:
     """The bounds of the evidence that gives a claim this status: "tested" says nothing without its number of cases."""
-    records = [item.entry.evidence for item in view.counting]
+    records = view.records
     texts = [bound_text(e.bound) for e in records if e.bound and worth(e) is status]
     text = "; ".join(dict.fromkeys(texts))
     return text if len(text) <= most else text[: most - 1] + "…"

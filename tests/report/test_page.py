@@ -204,10 +204,10 @@ def test_boxes_do_not_overlap_and_texts_fit() -> None:
                 assert apart or box[1] + box[3] <= int(b) or int(b) + int(d) <= box[1]
 
 
-def test_the_argument_shows_what_is_undeveloped_and_what_is_assumed() -> None:
+def test_the_argument_shows_what_nothing_supports_and_what_is_assumed() -> None:
     argument = build_argument(rover_case())
     by_title = {e.title: e for e in argument.elements}
-    assert by_title["localisation.one_position"].undeveloped
+    assert not by_title["localisation.one_position"].supported_by
     assert by_title["REQ3"].status is Status.CHECKED
     assert {e.shape for e in argument.elements} == set(Shape)
     assert (
