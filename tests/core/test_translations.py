@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from oracle.rml_reader import read
 
 from avow.backend_kit import registry
 from avow.backend_kit.registry import translators
-from avow.backends.rosmonitoring.rml.reader import read
 from avow.base.diagnostics import Rejected
 from avow.cli import main
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 from helpers import some
+from oracle.rml import Interpreter
 from oracle.values import Meaning
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml.interpreter import Interpreter
 from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.watched import Fault
 from avow.language.sorts import NATURAL, REAL

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from oracle.rml import Interpreter
+from oracle.rml_reader import Malformed, read
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.backends.rosmonitoring.rml.interpreter import Interpreter
-from avow.backends.rosmonitoring.rml.reader import Malformed, read
 from avow.backends.rosmonitoring.rml.translate import Translation, translate
 from avow.system.plan import System
 

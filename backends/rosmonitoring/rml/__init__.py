@@ -1,2 +1,2 @@
-"""A node's guarantees as an RML specification: written (`translate`), read back (`reader`), and run by an interpreter
-of our own (`interpreter`), which the tests hold against the engine."""
+"""A node's guarantees as an RML specification (`translate`). The tests read it back, and hold an interpreter of theirs
+against the engine (`tests/oracle/rml.py`)."""

@@ -1,4 +1,4 @@
-"""RML specifications as data, and their text. What is written here is read back by our own grammar (`reader`)."""
+"""RML specifications as data, and their text. The tests read back what is written here."""
 
 from __future__ import annotations
 

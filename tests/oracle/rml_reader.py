@@ -10,9 +10,8 @@ from typing import Any
 
 import lark
 
+from avow.backends.rosmonitoring.rml.syntax import KEYWORDS
 from avow.base.grammars import lark_of
-
-from .syntax import KEYWORDS
 
 PREDECLARED = frozenset(("any", "none"))
 

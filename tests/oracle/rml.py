@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ..numbers import Decimal, NotANumber, exact
-from .reader import Declared, Parsed, number, read
+from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
+from oracle.rml_reader import Declared, Parsed, number, read
 
 Binding = dict[str, Any]
 
