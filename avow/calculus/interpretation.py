@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from avow.calculus.variables import Frame
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Element, FunctionValue, Value
-from avow.language.contract import Node
+from avow.language.contract import Node, Port
 from avow.language.sorts import (
     BoolSort,
     EnumSort,
@@ -33,13 +34,23 @@ def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Valu
         sort = port.sort
         if scenario is None or not isinstance(sort, FunctionSort) or not isinstance(sort.result, BoolSort):
             continue
-        for name in (f"{node.name}.in.{port.name}", f"{node.name}.{port.name}", f"in.{port.name}", port.name):
-            if name in scenario.interpret:
-                value = _relation(sort, scenario, *scenario.interpret[name])
-                if value is not None:
-                    found[port.variable] = value
-                break
+        rows = rows_of(node, port, sort.parameters, scenario)
+        if rows is not None:
+            found[port.variable] = FunctionValue(dict.fromkeys(rows, True), False)
     return found
+
+
+def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -> list[tuple[Value, ...]] | None:
+    """The rows of the table that interprets a port; None where there is none of such columns."""
+    said = scenario.interpreted(node.name, port)
+    if said is None or len(said[1]) != len(sorts):
+        return None
+    try:
+        table = scenario.table(said[0])
+        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(said[1], sorts, strict=True)]
+    except (KeyError, ValueError, ZeroDivisionError):
+        return None
+    return list(zip(*cells, strict=True))
 
 
 def ranges(whole: Frame, node: Node) -> Ranges:
@@ -64,17 +75,6 @@ def ranges(whole: Frame, node: Node) -> Ranges:
         except CannotRun:
             continue
     return Ranges(found.domains, inputs)
-
-
-def _relation(sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]) -> Value | None:
-    if len(columns) != len(sort.parameters):
-        return None
-    try:
-        table = scenario.table(table_name)
-        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(columns, sort.parameters, strict=True)]
-    except (KeyError, ValueError, ZeroDivisionError):
-        return None
-    return FunctionValue(dict.fromkeys(zip(*cells, strict=True), True), False)
 
 
 def _value(text: str, sort: Sort) -> Value:

@@ -62,7 +62,7 @@ class World:
 
     def choices(self, node: str, port: Port) -> tuple[Value, ...]:
         """The values that an environment input may take at each step. Raises CannotRun."""
-        table = self.scenario.interpret.get(f"in.{port.name}") or self.scenario.interpret.get(f"{node}.{port.name}")
+        table = self.scenario.interpreted(node, port)
         if table is not None:
             return (self.interpreted(port.sort, *table),)
         return self.values(f"{node}.{port.name}", ("in", node), port)

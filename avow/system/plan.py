@@ -16,7 +16,7 @@ from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
-from avow.language.contract import Contract
+from avow.language.contract import Contract, Port
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 
@@ -144,6 +144,10 @@ class Scenario:
             if table.name == name:
                 return table
         raise KeyError(name)
+
+    def interpreted(self, node: str, port: Port) -> tuple[str, tuple[str, ...]] | None:
+        """Table and columns of a node's port: what is said of this node's comes before what is said of every node's."""
+        return self.interpret.get(f"{node}.{port.name}") or self.interpret.get(port.variable.qualified)
 
 
 @dataclass(frozen=True, slots=True)

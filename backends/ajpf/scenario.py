@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 
 from avow.backend_kit.protocol import Job
+from avow.calculus.interpretation import interpretation, rows_of
 from avow.evaluation.evaluate import NotEvaluable, evaluate, free_names
-from avow.formulas.values import Element, FunctionValue, Value
+from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Node
-from avow.language.sorts import (
-    BoolSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    Sort,
-    StringSort,
-)
-from avow.language.terms import Role, Term, Variable
+from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort
+from avow.language.terms import Term, Variable
 from avow.system.plan import Scenario
 
 
@@ -70,54 +61,15 @@ def domain_of(variable: Variable, scenario: Scenario | None) -> Sequence[int] | 
 
 
 def _interpretations(node: Node, scenario: Scenario) -> dict[str, Value]:
-    found: dict[str, Value] = {}
+    """A relation holds at the table's rows; a function to whole numbers takes its last column as value there. (Of other
+    sorts there is no value to stand for "none".)"""
+    found = {variable.qualified: value for variable, value in interpretation(node, scenario).items()}
     for port in node.inputs:
-        if not isinstance(port.sort, FunctionSort):
-            continue
-        for name in (f"{node.name}.in.{port.name}", f"{node.name}.{port.name}", f"{Role.INPUT}.{port.name}", port.name):
-            if name in scenario.interpret:
-                table_name, columns = scenario.interpret[name]
-                value = _function(port.sort, scenario, table_name, columns)
-                if value is not None:
-                    found[port.variable.qualified] = value
-                break
+        sort = port.sort
+        if isinstance(sort, FunctionSort) and isinstance(sort.result, IntegerSort | NaturalSort):
+            rows = rows_of(node, port, (*sort.parameters, sort.result), scenario)
+            if rows is not None:
+                points = {row[:-1]: row[-1] for row in rows}
+                lowest = min((v for v in points.values() if isinstance(v, int)), default=0)
+                found[port.variable.qualified] = FunctionValue(points, min(-1, lowest - 1))
     return found
-
-
-def _function(
-    sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]
-) -> FunctionValue | None:
-    """A relation holds at the table's rows; another function takes its last column as value there."""
-    relation = isinstance(sort.result, BoolSort)
-    sorts = [*sort.parameters, *(() if relation else (sort.result,))]
-    if len(sorts) != len(columns):
-        return None
-    try:
-        table = scenario.table(table_name)
-        cells = [[_value(text, s) for text in table.column(c)] for c, s in zip(columns, sorts, strict=True)]
-    except (KeyError, ValueError):
-        return None
-    rows = list(zip(*cells, strict=True))
-    if relation:
-        return FunctionValue(dict.fromkeys(rows, True), False)
-    if not isinstance(sort.result, IntegerSort | NaturalSort):
-        return None  # there is no value to stand for "none"
-    points = {row[:-1]: row[-1] for row in rows}
-    lowest = min((v for v in points.values() if isinstance(v, int)), default=0)
-    return FunctionValue(points, min(-1, lowest - 1))
-
-
-def _value(text: str, sort: Sort) -> Value:
-    """Raises ValueError."""
-    match sort:
-        case RealSort():
-            return Fraction(text)
-        case IntegerSort() | NaturalSort():
-            return int(text)
-        case StringSort():
-            return text
-        case EnumSort(members=members) if text in members:
-            return Element(text)
-        case BoolSort() if text in ("TRUE", "FALSE"):
-            return text == "TRUE"
-    raise ValueError(text)

@@ -145,10 +145,9 @@ def _scenario(job: Job) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
     scenario = job.system.plan.scenario
     if scenario is None:
         return
-    names = {port.name for port in job.node.inputs}
-    for key, (table_name, columns) in sorted(scenario.interpret.items()):
-        owner, _, port = key.rpartition(".")
-        if port in names and owner in {"", "in", job.node.name}:
-            table = scenario.table(table_name)
-            at = [table.columns.index(column) for column in columns if column in table.columns]
-            yield port, tuple(tuple(row[k] for k in at) for row in table.rows)
+    for port in sorted(job.node.inputs, key=lambda port: port.name):
+        said = scenario.interpreted(job.node.name, port)
+        if said is not None:
+            table = scenario.table(said[0])
+            at = [table.columns.index(column) for column in said[1] if column in table.columns]
+            yield port.name, tuple(tuple(row[k] for k in at) for row in table.rows)

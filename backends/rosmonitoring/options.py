@@ -379,12 +379,7 @@ class _Work:
 
     def interpretation(self, port: Port) -> tuple[str, tuple[str, ...]] | None:
         scenario = self.system.plan.scenario
-        if scenario is None:
-            return None
-        for name in (f"{self.node.name}.{port.name}", port.variable.qualified):
-            if name in scenario.interpret:
-                return scenario.interpret[name]
-        return None
+        return None if scenario is None else scenario.interpreted(self.node.name, port)
 
     def scenario(self, port: Port) -> Rule:
         found = self.interpretation(port)
