@@ -163,20 +163,13 @@ class Reasoner:
     ) -> Iterator[Bindings]:
         ways: Iterator[Bindings]
         if condition.group:
-            if next(self.holds(beliefs, condition.group, bindings, goals, depth), None) is None:
-                yield bindings
-            return
-        if condition.term is None:
+            ways = self.holds(beliefs, condition.group, bindings, goals, depth)
+        elif condition.term is None:
             yield bindings
             return
-        if condition.test is not None:
+        elif condition.test is not None:
             ways = compare(condition.test, apply(condition.term, bindings), bindings)
-            if condition.positive:
-                yield from ways
-            elif next(ways, None) is None:
-                yield bindings
-            return
-        if condition.is_goal:
+        elif condition.is_goal:
             ways = (
                 u
                 for g in goals

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from avow.base.graphs import strong_components
@@ -85,9 +86,7 @@ class Checker:
             self.reduced = smaller
 
     def whole(self, labels: Sequence[int]) -> Kripke:
-        offsets, targets = self.graph.offsets, self.graph.targets
-        successors = [targets[offsets[s] : offsets[s + 1]] for s in range(len(self.graph))]
-        return Kripke(self.graph.initial, successors, labels)
+        return Kripke(self.graph.initial, [self.graph.after(s) for s in range(len(self.graph))], labels)
 
     def check(self, wanted: Property, deadline: float | None = None) -> Result:
         """Raises OutOfTime, automaton.TooLarge."""
@@ -117,24 +116,21 @@ class Checker:
         meant, banned = compiled(wanted.trigger, self.places), compiled(wanted.forbidden, self.places)
         needs_act = any(atom.modality is Modality.DID for atom in atoms(wanted.forbidden))
 
-        def targets(state: int) -> Sequence[int]:
-            return graph.targets[graph.offsets[state] : graph.offsets[state + 1]]
-
         def acted(state: int, target: int) -> bool:
             return bool(states[target].last != states[state].last)
 
         def waiting(state: int) -> list[int]:
-            return [t for t in targets(state) if not acted(state, t) and not states[t].drawn]
+            return [t for t in graph.after(state) if not acted(state, t) and not states[t].drawn]
 
         triggered = [meant(label) for label in labels]
         occasions = {s for s in graph.initial if triggered[s]}
-        occasions.update(t for s in range(len(graph)) if not triggered[s] for t in targets(s) if triggered[t])
+        occasions.update(t for s in range(len(graph)) if not triggered[s] for t in graph.after(s) if triggered[t])
         good: set[int] = set()
         for component in strong_components(occasions, waiting):
             state = component[0]
             still = set(waiting(state))
-            if len(component) == 1 and state not in still and still <= good and targets(state):
-                ends = [t for t in targets(state) if t not in still]
+            if len(component) == 1 and state not in still and still <= good and graph.after(state):
+                ends = [t for t in graph.after(state) if t not in still]
                 if all(banned(labels[t]) and (acted(state, t) or not needs_act) for t in ends):
                     good.add(state)
         return not good.isdisjoint(occasions)
@@ -176,20 +172,26 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
     done = [(bit, names[a.agent], named_apart(a.term)) for bit, a in numbered if a.modality is Modality.DID]
     perceived = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
     fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(system.environment.fair)]
-    by_last: dict[int, int] = {}
-    by_draw: dict[int, int] = {}
+    last: dict[int, int] = {}
+
+    @cache
+    def drawn(choice: int) -> int:
+        return _of_draw(system.world.offers(choice), fair)
+
     result = []
     for state in states:
         bits = 0
         for own, mind in zip(labels, system.minds(state), strict=True):
             bits |= own.of(mind)
         if done:
-            bits |= _memo(by_last, state.last, lambda _: _of_last(system.did(state), done))  # noqa: B023 - called at once
+            if state.last not in last:
+                last[state.last] = _of_last(system.did(state), done)
+            bits |= last[state.last]
         if perceived:
             offered = system.sees(state)
             bits |= sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
         if fair and state.drawn:
-            bits |= _memo(by_draw, state.choice, lambda choice: _of_draw(system.world.offers(choice), fair))
+            bits |= drawn(state.choice)
         result.append(bits)
     return result
 
@@ -213,17 +215,17 @@ class Labels:
         self.believed = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
         self.wanted = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
         self.intended = [(bit, a.modality, named_apart(a.term)) for bit, a in numbered if a.modality in mental]
-        self.by_beliefs: dict[int, int] = {}
-        self.by_goals: dict[int, int] = {}
-        self.by_intention: dict[int, int] = {NONE: 0}
+        self.by_beliefs = cache(self._of_beliefs)
+        self.by_goals = cache(self._of_goals)
+        self.by_intention = cache(self._of_intention)
 
     def of(self, mind: State) -> int:
-        bits = _memo(self.by_beliefs, mind.beliefs, self._of_beliefs) if self.believed else 0
+        bits = self.by_beliefs(mind.beliefs) if self.believed else 0
         if self.wanted:
-            bits |= _memo(self.by_goals, mind.goals, self._of_goals)
+            bits |= self.by_goals(mind.goals)
         if self.intended:
             for number in (*mind.queue, mind.current):
-                bits |= _memo(self.by_intention, number, self._of_intention)
+                bits |= self.by_intention(number)
         return bits
 
     def _of_beliefs(self, number: int) -> int:
@@ -237,14 +239,7 @@ class Labels:
         return sum(bit for bit, term in self.wanted if any(unify(term, g.term, {}) is not None for g in goals))
 
     def _of_intention(self, number: int) -> int:
-        return _mental(self.agent.intentions.items[number].frames, self.intended)
-
-
-def _memo(known: dict[int, int], key: int, compute: Callable[[int], int]) -> int:
-    found = known.get(key)
-    if found is None:
-        found = known[key] = compute(key)
-    return found
+        return 0 if number == NONE else _mental(self.agent.intentions.items[number].frames, self.intended)
 
 
 def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]]) -> int:

@@ -38,7 +38,7 @@ class System(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """States by their numbers. The successors of s are ``targets[offsets[s]:offsets[s + 1]]``."""
+    """States by their numbers; of their successors `after` tells."""
 
     system: System
     states: tuple[Any, ...]
@@ -53,6 +53,10 @@ class Graph:
 
     def __len__(self) -> int:
         return len(self.states)
+
+    def after(self, state: int) -> array[int]:
+        """The state's successors."""
+        return self.targets[self.offsets[state] : self.offsets[state + 1]]
 
     @property
     def transitions(self) -> int:

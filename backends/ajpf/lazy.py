@@ -13,6 +13,7 @@ from .automaton import build, compiled
 from .builtin import Crash
 from .checker import Property, label_states
 from .explore import Graph, System
+from .mind import Table
 from .psl import Formula, Not, atoms
 from .tuning import TAIL
 
@@ -22,16 +23,9 @@ class _Part:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.numbers: dict[Any, int] = {}
-        self.states: list[Any] = []
+        self.table: Table[Any] = Table()
+        self.states, self.number = self.table.items, self.table.number
         self.successors: dict[int, tuple[int, ...]] = {}
-
-    def number(self, state: Any) -> int:
-        known = self.numbers.get(state)
-        if known is None:
-            known = self.numbers[state] = len(self.states)
-            self.states.append(state)
-        return known
 
     def after(self, number: int) -> tuple[int, ...]:
         found = self.successors.get(number)

@@ -196,8 +196,11 @@ class _Builder(Transformer):  # type: ignore[misc]
             )
         return parts[0]
 
-    def beliefs(self, parts: list[Struct]) -> tuple[Struct, ...]:
-        return tuple(parts)
+    def several(self, parts: list[Any]) -> tuple[Any, ...]:
+        """All that is there."""
+        return tuple(p for p in parts if p is not None)
+
+    beliefs = rules = goals = plans = deeds = start = several
 
     def list_term(self, parts: list[Any]) -> Struct:
         made = Struct(NIL)
@@ -257,9 +260,6 @@ class _Builder(Transformer):  # type: ignore[misc]
     def rule(self, meta: Any, parts: list[Any]) -> Rule:
         return Rule(parts[0], tuple(p for p in parts[1:] if p is not None), self.span(meta))
 
-    def rules(self, parts: list[Any]) -> tuple[Rule, ...]:
-        return tuple(p for p in parts if p is not None)
-
     def kind(self, parts: list[Token]) -> GoalKind:
         return GoalKind(str(parts[0]))
 
@@ -271,41 +271,24 @@ class _Builder(Transformer):  # type: ignore[misc]
             )
         return Goal(parts[0], parts[1] or GoalKind.PERFORM)
 
-    def goals(self, parts: list[Goal]) -> tuple[Goal, ...]:
-        return tuple(parts)
-
     # Plans
 
     @_build
-    def belief_added(self, meta: Any, parts: list[Any]) -> Event:
-        return self.trigger(Event(Sign.ADD, parts[1]), meta)
+    def of_belief(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign(parts[0]), parts[1]), meta)
 
     @_build
-    def belief_dropped(self, meta: Any, parts: list[Any]) -> Event:
-        return self.trigger(Event(Sign.DROP, parts[1]), meta)
+    def of_goal(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign(parts[0]), parts[1], parts[2], is_goal=True), meta)
 
     def trigger(self, event: Event, meta: Any) -> Event:
         if isinstance(event.term, Var):
             self.refuse(f"a plan for any {'goal' if event.is_goal else 'belief'} at all", self.span(meta))
         return event
 
-    @_build
-    def goal_added(self, meta: Any, parts: list[Any]) -> Event:
-        return self.trigger(Event(Sign.ADD, parts[1], parts[2], is_goal=True), meta)
-
-    @_build
-    def goal_dropped(self, meta: Any, parts: list[Any]) -> Event:
-        return self.trigger(Event(Sign.DROP, parts[1], parts[2], is_goal=True), meta)
-
     def received(self, parts: list[Any]) -> Event:
         """AIL calls the sender `From` and the receiver `To`: a plan may use these variables."""
         return Event(Sign.ADD, Struct(RECEIVED, (Var("From"), Var("To"), _force(parts[1]), parts[2])))
-
-    def believed(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0])
-
-    def not_believed(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0], positive=False)
 
     def wanted_goal(self, parts: list[Any]) -> Condition:
         return Condition(parts[0], is_goal=True, goal=parts[1])
@@ -319,17 +302,11 @@ class _Builder(Transformer):  # type: ignore[misc]
     def guard(self, parts: list[Condition]) -> tuple[Condition, ...]:
         return _as_tried(parts)
 
-    def add_belief(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.ADD_BELIEF, parts[1])
+    def change_belief(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind(parts[0]), parts[1])
 
-    def drop_belief(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.DROP_BELIEF, parts[1])
-
-    def add_goal(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.ADD_GOAL, parts[1], parts[2] or GoalKind.PERFORM)
-
-    def drop_goal(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.DROP_GOAL, parts[1], parts[2] or GoalKind.PERFORM)
+    def change_goal(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind(f"{parts[0]}!"), parts[1], parts[2] or GoalKind.PERFORM)
 
     def wait(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.WAIT, parts[0])
@@ -338,10 +315,7 @@ class _Builder(Transformer):  # type: ignore[misc]
         return Deed(DeedKind.SEND, Struct("send", (parts[0], _force(parts[1]), parts[2])))
 
     def lock(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.LOCK, Struct(".lock"))
-
-    def unlock(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.UNLOCK, Struct(".lock"))
+        return Deed(DeedKind(f"{parts[0]}.lock"), Struct(".lock"))
 
     def wait_not(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.WAIT_NOT, parts[0])
@@ -349,19 +323,10 @@ class _Builder(Transformer):  # type: ignore[misc]
     def action(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.ACTION, parts[0])
 
-    def deeds(self, parts: list[Deed]) -> tuple[Deed, ...]:
-        return tuple(parts)
-
     @_build
     def plan(self, meta: Any, parts: list[Any]) -> Plan:
         event, guard, deeds = parts
         return Plan(event, guard, deeds or (), self.span(meta))
-
-    def plans(self, parts: list[Plan]) -> tuple[Plan, ...]:
-        return tuple(parts)
-
-    def start(self, parts: list[Program]) -> tuple[Program, ...]:
-        return tuple(parts)
 
     def agent(self, parts: list[Any]) -> Program:
         name, beliefs, rules, goals, plans = parts

@@ -15,6 +15,7 @@ from .instances import Claim, Instantiation
 from .options import Extra, Setup
 from .syntax import RECEIVED, Program, Struct
 from .tautology import is_valid
+from .words import runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,21 +212,10 @@ def _which(properties: Sequence[Property]) -> str:
     shown = list(dict.fromkeys(names))
     split = [name.split(" = ") for name in shown]
     if len(shown) > 1 and all(len(s) == 2 and s[0] == split[0][0] for s in split):
-        return f" for {split[0][0]} = {_runs([s[1] for s in split])}"
+        values = [s[1] for s in split]
+        said = runs(map(int, values)) if all(v.isdigit() for v in values) else ", ".join(values)
+        return f" for {split[0][0]} = {said}"
     return f" for {'; '.join(shown[:6])}{' …' if len(shown) > 6 else ''}"
-
-
-def _runs(values: Sequence[str]) -> str:
-    if not all(v.isdigit() for v in values):
-        return ", ".join(values)
-    numbers = sorted(map(int, values))
-    groups: list[list[int]] = []
-    for n in numbers:
-        if groups and groups[-1][-1] == n - 1:
-            groups[-1].append(n)
-        else:
-            groups.append([n])
-    return ", ".join(f"{g[0]}…{g[-1]}" if len(g) > 2 else ", ".join(map(str, g)) for g in groups)
 
 
 def _entry(p: Property, result: Settled) -> dict[str, object]:

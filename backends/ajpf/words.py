@@ -7,7 +7,7 @@ it, under names in parentheses: reports print those small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, assert_never
@@ -167,11 +167,11 @@ def _cell(holds_for: Sequence[Mapping[str, int]]) -> str:
         return "no"
     names = list(holds_for[0])
     if len(names) == 1:
-        return f"{names[0]} = {_runs([values[names[0]] for values in holds_for])}"
+        return f"{names[0]} = {runs([values[names[0]] for values in holds_for])}"
     return "; ".join(", ".join(f"{n} = {v}" for n, v in values.items()) for values in holds_for) or "yes"
 
 
-def _runs(numbers: Sequence[int]) -> str:
+def runs(numbers: Iterable[int]) -> str:
     """``1, 2, 5…9``"""
     groups: list[list[int]] = []
     for n in sorted(numbers):

@@ -245,32 +245,15 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     def sequence(self, meta: Any, items: list[Any]) -> Sequence:
         return Sequence(items[0] or (), self._span(meta))
 
-    def _binary(self, operator: str, meta: Any, items: list[Any]) -> Binary:
-        return Binary(operator, items[0], items[-1], self._span(meta))
+    @staticmethod
+    def _infix(operator: str) -> Any:
+        def build(self: _Build, meta: Any, items: list[Any]) -> Binary:
+            return Binary(operator, items[0], items[-1], self._span(meta))
 
-    def iff(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("<=>", meta, items)
+        return build
 
-    def implies(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("->", meta, items)
-
-    def disjoin(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("or", meta, items)
-
-    def conjoin(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("and", meta, items)
-
-    def add(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("+", meta, items)
-
-    def subtract(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("-", meta, items)
-
-    def multiply(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("*", meta, items)
-
-    def divide(self, meta: Any, items: list[Any]) -> Binary:
-        return self._binary("/", meta, items)
+    iff, implies, disjoin, conjoin = map(_infix, ("<=>", "->", "or", "and"))
+    add, subtract, multiply, divide = map(_infix, "+-*/")
 
     def negate(self, meta: Any, items: list[Any]) -> Unary:
         return Unary("not", items[1], self._span(meta))
