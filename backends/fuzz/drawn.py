@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from avow.backend_kit.programs.samples import as_single, next_single
 from avow.language.contract import Port
 from avow.language.sorts import EnumSort, NaturalSort, SequenceSort
 
@@ -121,29 +122,6 @@ class Drawn:
 
 def _signed(value: int, bits: int) -> int:
     return value - 2**bits if value >= 2 ** (bits - 1) else value
-
-
-def as_single(value: float) -> float:
-    """The nearest float32."""
-    if not math.isfinite(value):
-        return value
-    try:
-        (near,) = struct.unpack("f", struct.pack("f", value))
-    except OverflowError:
-        return math.copysign(math.inf, value)
-    return float(near)
-
-
-def next_single(value: float, towards: float) -> float:
-    """The float32 beside a float32."""
-    if not math.isfinite(value):
-        return value
-    if value == 0:
-        return math.copysign(2.0**-149, towards)
-    (bits,) = struct.unpack("i", struct.pack("f", value))
-    away = (towards > 0) == (value > 0)
-    (found,) = struct.unpack("f", struct.pack("i", bits + (1 if away else -1)))
-    return float(found)
 
 
 def command(ports: Sequence[Port], step: Step) -> str:

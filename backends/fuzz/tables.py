@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, assert_never
 
-from avow.backend_kit.programs.samples import around, numbers_of
+from avow.backend_kit.programs.samples import around, as_single, leaves, numbers_of
 from avow.base.records import dataclass
 from avow.language.contract import Port
 from avow.language.sorts import (
@@ -61,13 +61,13 @@ def drawable(reading: Reading) -> Drawable:
     node, job = reading.node, reading.job
     formulas = [c.formula for c in (*node.assumptions, *(job.clause(o) for o in job.obligations))]
     seen: dict[Fraction, None] = dict.fromkeys(sorted(numbers_of(formulas), key=lambda n: (abs(n), n)))
-    seen |= dict.fromkeys(sorted(_leaves(reading.params)))
+    seen |= dict.fromkeys(sorted(leaves(reading.params)))
     seen |= dict.fromkeys(sorted(_literals(texts(reading))))
     written = list(seen)[:WRITTEN]
     plain = (0.0, 1.0, -1.0, 0.5, 2.0, 10.0, 100.0, 1e6)
     reals = [*plain, *(d for n in written for m in (n, -n) for d in around(m) if math.isfinite(d))]
     if reading.single:
-        reals = [near for near in map(_single, reals) if math.isfinite(near)]
+        reals = [near for near in map(as_single, reals) if math.isfinite(near)]
     whole = [w + d for n in written for w in {math.floor(n), math.ceil(n)} for d in (0, -1, 1)]
     integers = [w for w in (*range(4), -1, *whole) if -(2**63) <= w < 2**63]
     lengths = [n + d for n in (math.floor(w) for w in written) if 0 <= n <= 64 for d in (-1, 0, 1) if n + d >= 0]
@@ -180,16 +180,6 @@ def _whole(value: int) -> str:
     return "(-9223372036854775807LL - 1)" if value == -(2**63) else f"{value}LL"
 
 
-def _single(value: float) -> float:
-    import struct
-
-    try:
-        (near,) = struct.unpack("f", struct.pack("f", value))
-    except OverflowError:
-        return math.inf
-    return float(near)
-
-
 _LITERAL = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -201,17 +191,6 @@ def _literals(text: str) -> set[Fraction]:
         if number <= 10**15:
             found.add(number)
     return found
-
-
-def _leaves(data: Any) -> Iterator[Fraction]:
-    match data:
-        case dict():
-            for value in data.values():
-                yield from _leaves(value)
-        case bool() | str() | None:
-            return
-        case _:  # a number
-            yield Fraction(data)
 
 
 __all__ = ["ENDS", "TABLES", "Drawable", "drawable", "native", "sort_name", "tables"]

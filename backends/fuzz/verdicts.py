@@ -10,6 +10,7 @@ from typing import Any, assert_never
 
 from avow.backend_kit.linked import Recorded, settled
 from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
+from avow.backend_kit.programs.samples import as_single, next_single
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
@@ -38,7 +39,6 @@ from .tables import Drawable
 from .tuning import APART
 
 SPECIAL = {"NaN": math.nan, "infinity": math.inf, "-infinity": -math.inf}
-_MADE = "made"
 
 
 class Misused(Exception):  # noqa: N818 - it names what happened
@@ -407,8 +407,6 @@ def _of(data: Any, sort: Sort | None) -> bool:
 
 def _single(data: Any) -> bool:
     """Whether an output has float32 numbers only."""
-    from .drawn import as_single
-
     match data:
         case {"l": list(items)}:
             return all(map(_single, items))
@@ -436,8 +434,6 @@ def _simple(sort: Sort) -> Any:
 
 
 def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
-    from .drawn import as_single, next_single
-
     match sort:
         case BoolSort():
             return [True]

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
+from avow.backend_kit.programs.samples import as_single, next_single
 from avow.formulas.values import Binary, Element, SequenceValue, Value
 from avow.language.sorts import (
     BoolSort,
@@ -188,10 +189,9 @@ LARGEST_SINGLE = (2 - 2.0**-23) * 2.0**127
 
 
 def _single(value: float) -> float:
-    try:
-        found: float = struct.unpack("<f", struct.pack("<f", value))[0]
-    except OverflowError:
-        raise MappingError(f"{value} is too large for a float32") from None
+    found = as_single(value)
+    if not math.isfinite(found):
+        raise MappingError(f"{value} is too large for a float32")
     return found
 
 
@@ -199,12 +199,8 @@ def _nearest(value: Fraction, near: float, *, wide: bool) -> Fraction:
     """The number of the type that is nearest to a value; `near` is it, or (rounded twice) next to it."""
     if wide:
         return _held(Fraction(near), wide=True)
-    bits = struct.unpack("<i", struct.pack("<f", near))[0]
-    around = [near]
-    for step in (-1, 1):
-        other = struct.unpack("<f", struct.pack("<i", bits + step))[0] if bits not in (0, -(2**31)) else near
-        if math.isfinite(other):
-            around.append(other)
+    beside = (next_single(near, end) if near else near for end in (-math.inf, math.inf))
+    around = [near, *filter(math.isfinite, beside)]
     return _held(min(map(Fraction, around), key=lambda n: abs(n - value)), wide=False)
 
 

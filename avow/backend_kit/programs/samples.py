@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import math
 import random
+import struct
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
@@ -218,3 +219,26 @@ def around(constant: Fraction) -> tuple[float, float]:
     if exact == constant:
         return near, near
     return (near, math.nextafter(near, math.inf)) if exact < constant else (math.nextafter(near, -math.inf), near)
+
+
+def as_single(value: float) -> float:
+    """The nearest float32."""
+    if not math.isfinite(value):
+        return value
+    try:
+        (near,) = struct.unpack("f", struct.pack("f", value))
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return float(near)
+
+
+def next_single(value: float, towards: float) -> float:
+    """The float32 beside a float32."""
+    if not math.isfinite(value):
+        return value
+    if value == 0:
+        return math.copysign(2.0**-149, towards)
+    (bits,) = struct.unpack("i", struct.pack("f", value))
+    away = (towards > 0) == (value > 0)
+    (found,) = struct.unpack("f", struct.pack("i", bits + (1 if away else -1)))
+    return float(found)
