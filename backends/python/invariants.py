@@ -14,6 +14,7 @@ from avow.formulas.formula import free_variables, substitute
 from avow.formulas.sequences import flatten
 from avow.language.contract import Contract, Node
 from avow.language.load import parse_formula
+from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, Sort
 from avow.language.terms import (
     FALSE,
@@ -22,6 +23,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Implies,
     Literal,
     Or,
     Quantified,
@@ -31,7 +33,7 @@ from avow.language.terms import (
     Variable,
 )
 
-from .program import Assign, For, Item, View, parts
+from .program import Assign, For, Item, Name, View, parts
 from .symbolic import ZERO, Candidate, Turn, widest
 from .tuning import CANDIDATES
 
@@ -139,8 +141,6 @@ def _promised(loop: For, first: Turn, promised: Sequence[Term], known: Sequences
 
 def _hash_text(formula: Term) -> str:
     """A formula, told apart from others in few words."""
-    from avow.language.printer import show_term
-
     return show_term(formula, "unicode").replace("\n", " ")[:120]
 
 
@@ -157,7 +157,7 @@ def _shapes(loop: For, first: Turn, known: Sequences) -> Iterator[Candidate]:
                 yield _compared(loop, name, "<=", lambda turn, name=name: _plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
                 yield _compared(loop, name, "==", lambda turn, name=name: _plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
         for view in views:
-            length, elements = known.of(view.sequence)
+            _, elements = known.of(view.sequence)
             assert isinstance(elements.sort, FunctionSort)
             if widest(elements.sort.result) != sort or sort not in _NUMBERS:
                 continue
@@ -166,7 +166,6 @@ def _shapes(loop: For, first: Turn, known: Sequences) -> Iterator[Candidate]:
                 yield Candidate(
                     loop.counter, f"{name} {operator} every item so far", _every_item(name, operator, view, elements)
                 )
-            del length
 
 
 def _item_or_first(name: str, view: View, elements: Variable) -> Callable[[Turn], Term]:
@@ -180,8 +179,6 @@ def _item_or_first(name: str, view: View, elements: Variable) -> Callable[[Turn]
 
 
 def _every_item(name: str, operator: str, view: View, elements: Variable) -> Callable[[Turn], Term]:
-    from avow.language.terms import Implies
-
     def build(turn: Turn) -> Term:
         at, item = _position(view, elements)
         inside = Implies(Compare("<", at, turn.done), Compare(operator, turn.values[name], item))
@@ -204,8 +201,6 @@ def _compared(loop: For, name: str, operator: str, other: Callable[[Turn], Term]
 
 def _views(loop: For) -> Iterator[View]:
     """The sequences, or parts, whose item of the turn's number is looked at."""
-    from .program import Name
-
     for statement in loop.body:
         if isinstance(statement, Assign):
             for part in parts(statement.value):
