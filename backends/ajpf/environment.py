@@ -145,9 +145,9 @@ class Environment:
         return NOTHING if percept is None else show(percept)
 
 
-def read_environment(path: Path, shown: str | None = None) -> Environment:
+def read_environment(path: Path) -> Environment:
     """Raises Rejected with every problem, located."""
-    name = shown or str(path)
+    name = str(path)
     try:
         data = read_regular(path)
     except OSError as error:

@@ -270,13 +270,7 @@ _DONE = {
 }
 
 
-def environment_class(
-    environment: Environment,
-    name: str = CLASS,
-    *,
-    agents: int = 1,
-    scripted: bool = False,
-) -> str:
+def environment_class(environment: Environment, *, agents: int = 1, scripted: bool = False) -> str:
     """The class's source. A `scripted` one chooses what a `Script` beside it says and nothing else, and tells what
     happens."""
     groups = environment.groups
@@ -295,7 +289,7 @@ def environment_class(
     tell_idle = "" if not scripted else 'tell("idle");\n            '
     quiet = sorted(environment.quiet | {"print"})
     return _FRAME.format(
-        name=name,
+        name=CLASS,
         alone=_ALONE if agents == 1 else "",
         scheduler=_scheduler(agents, scripted),
         now="{" + ", ".join("-1" for _ in groups) + "}",

@@ -12,7 +12,6 @@ from typing import Any
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_text
 from avow.formulas.renaming import bound_names
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
@@ -62,8 +61,6 @@ class Setup:
     """The agents of the system."""
     agent: str
     """The node's."""
-    program_path: Path
-    program_text: str
     environment: Environment
     environment_path: Path
     rows: tuple[Row, ...]
@@ -99,7 +96,7 @@ class _OptionsReader:
         self.faults.append(Diagnostic(code, message, self.job.method.options.at(*path), hint=hint))
 
     def setup(self) -> Setup | None:
-        programs, program_path = self.file("program", read_system)
+        programs, _ = self.file("program", read_system)
         environment, environment_path = self.file("environment", read_environment)
         if programs is not None:
             self.agents(programs)
@@ -108,13 +105,11 @@ class _OptionsReader:
         instances = self.instances()
         rows = self.rows(programs)
         extras = self.extras(programs, instances)
-        if programs is None or environment is None or program_path is None or environment_path is None:
+        if programs is None or environment is None or environment_path is None:
             return None
         return Setup(
             programs,
             self.options.get("agent", programs[0].name),
-            program_path,
-            read_text(program_path, "utf-8-sig"),
             environment,
             environment_path,
             rows,

@@ -50,9 +50,9 @@ _SAID = {
 }
 
 
-def read_system(path: Path, shown: str | None = None) -> tuple[Program, ...]:
-    """The agents of a file; `shown` is how messages call the file. Raises Rejected."""
-    name = shown or str(path)
+def read_system(path: Path) -> tuple[Program, ...]:
+    """The agents of a file. Raises Rejected."""
+    name = str(path)
     try:
         data = read_regular(path)
     except OSError as error:

@@ -115,7 +115,7 @@ def greatest_deviation(runs: int, mean: Range, least: Range, greatest: Range) ->
     return runs * max(b - middle, Fraction(0)) * max(middle - a, Fraction(0))
 
 
-def root(value: Fraction, digits: int = 12) -> tuple[Fraction, Fraction]:
+def root(value: Fraction) -> tuple[Fraction, Fraction]:
     """Bounds of the square root, equal where it is a short decimal or a ratio of squares. Raises ValueError below 0."""
     if value < 0:
         raise ValueError("the square root of a negative number")
@@ -123,7 +123,7 @@ def root(value: Fraction, digits: int = 12) -> tuple[Fraction, Fraction]:
     if top * top == value.numerator and bottom * bottom == value.denominator:
         exact = Fraction(top, bottom)
         return exact, exact
-    scale = 10**digits
+    scale = 10**12
     low = isqrt(value.numerator * scale * scale // value.denominator)
     return Fraction(low, scale), Fraction(low + 1, scale)
 

@@ -54,7 +54,7 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], effort
     for condition in failed:
         if condition.name != "pre":
             continue
-        for values in _models(condition, triple, program, wanted, effort):
+        for values in _models(condition, program, wanted, effort):
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
@@ -116,7 +116,7 @@ def _holds(term: Term, state: Mapping[str, Value]) -> bool:
 
 
 def _models(
-    condition: Condition, triple: Triple, program: Program, wanted: tuple[Variable, ...], effort: int
+    condition: Condition, program: Program, wanted: tuple[Variable, ...], effort: int
 ) -> Iterator[dict[Variable, Value]]:
     """The solver's inputs: first with every number a simple one, then as they come."""
     formulas: list[Term] = [*condition.hypotheses, Not(condition.goal)]

@@ -119,7 +119,7 @@ class Translator(Expressions):
                 raise Refusal(
                     self.parts.node.lineno, f"__init__ makes self.{attribute} {_a(have)}, and {port} is {_a(wanted)}"
                 )
-        body = self._method("step", {})
+        body = self._method("step")
         unknown = sorted(set(self.changed) - set(self.memory.values()))
         if unknown:
             line = self.changed[unknown[0]]
@@ -187,7 +187,7 @@ class Translator(Expressions):
 
     # -- methods -----------------------------------------------------------------------------------------
 
-    def _method(self, name: str, given: Mapping[str, Expr]) -> tuple[Statement, ...]:
+    def _method(self, name: str) -> tuple[Statement, ...]:
         method = self.parts.methods[name]
         arguments = plain_arguments(method)
         if not arguments:

@@ -43,7 +43,7 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
     fitting = [[suits(part, wire, holder, known, values) for _, wire, holder in places] for part in wanted]
     ways = _ways(fitting, len(places))
     if ways == 1:
-        return tuple(places[at][0] for at in _only(fitting, len(places)))
+        return tuple(places[at][0] for at in _only(fitting))
     hint = _hint(wanted, places, known, values)
     told = [
         f"{'.'.join(map(str, path)) or 'the whole message'} : {wire}"
@@ -132,7 +132,7 @@ def _ways(fitting: Sequence[Sequence[bool]], places: int) -> int:
     return counts[-1]
 
 
-def _only(fitting: Sequence[Sequence[bool]], places: int) -> list[int]:
+def _only(fitting: Sequence[Sequence[bool]]) -> list[int]:
     """The one way: each part takes the first place after the last that fits."""
     found: list[int] = []
     at = 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
@@ -40,8 +40,6 @@ class Silence:
     """That it was broken since, has been told."""
     spared: Fraction | None = None
     """Where the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
-    arrived: set[str] = field(default_factory=set)
-    """The inputs of which a message came since."""
 
     def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
         """How long after the latest step silence breaks the clause; None where it never does. Raises NotEvaluable."""

@@ -223,8 +223,6 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
     setup = Setup(
         program,
         program[0].name,
-        tmp_path,
-        "",
         draws,
         tmp_path,
         (),

@@ -8,7 +8,7 @@ matches, and the monitor's answer is false. A message that its rule cannot read 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
@@ -347,7 +347,7 @@ class _Machine:
         for constructor in sort.constructors:
             if constructor.name not in rule.arguments:
                 continue
-            words = _words(constructor.name, rule.names, set(rule.arguments))
+            words = _words(constructor.name, rule.names)
             if not words:
                 continue
             tag = (rule.tag, " | ".join(words))
@@ -404,14 +404,13 @@ def _seen_at_start(symbol: Tracked, first: Value, sort: Sort) -> dict[str, Numer
     return {flag: Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
 
 
-def _field_cases(path: FieldPath, sort: Sort, name: str, names: dict[str, str] | object) -> list[_Case]:
+def _field_cases(path: FieldPath, sort: Sort, name: str, names: Mapping[str, str]) -> list[_Case]:
     """A field's content: a constant for each element of an enumeration, else a variable."""
     match sort:
         case EnumSort(members=members):
-            table = names if isinstance(names, dict) else {}
             found = []
             for member in members:
-                words = _words(member, table, set(members))
+                words = _words(member, names)
                 if words:
                     found.append(_Case(((path, " | ".join(words)),), (Number(Fraction(code(sort, member))),), ()))
             return found
@@ -428,11 +427,10 @@ def _field_cases(path: FieldPath, sort: Sort, name: str, names: dict[str, str] |
             raise NotRml(f"a field holds a value of {show_sort(sort)}")
 
 
-def _words(member: str, names: dict[str, str] | object, known: set[str]) -> list[str]:
+def _words(member: str, names: Mapping[str, str]) -> list[str]:
     """The patterns of the words that mean a member: its own name unless that means another one, and its aliases."""
-    table = names if isinstance(names, dict) else {}
-    words = [word for word, meaning in table.items() if meaning == member]
-    if table.get(member, member) == member:
+    words = [word for word, meaning in names.items() if meaning == member]
+    if names.get(member, member) == member:
         words.append(member)
     found = [string(word) for word in dict.fromkeys(words)]
     found += [word for word in words if word.isascii() and word.isdigit() and str(int(word)) == word]
