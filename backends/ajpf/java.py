@@ -298,7 +298,7 @@ def environment_class(environment: Environment, *, agents: int = 1, scripted: bo
         tell_start="" if not scripted else '            tell("start");\n',
         tell_action="" if not scripted else _TELL_ACTION,
         draw=_CHANCE if not scripted else _SCRIPTED,
-        script="" if not scripted else _scripted(agents),
+        script="" if not scripted else _SCRIPT % (SCRIPT, MARK, (_TURNS if agents > 1 else "") + _PROBE),
         percepts="\n".join(lines),
         quiet=" || ".join(f"action.equals({_text(action)})" for action in quiet),
         after="\n".join(after),
@@ -320,10 +320,6 @@ def _scheduler(agents: int, scripted: bool) -> str:
     if agents == 1:
         return "        setScheduler(new SingleAgentScheduler());\n"
     return "" if not scripted else "        setup_scheduler(this, new Scripted());\n"
-
-
-def _scripted(agents: int) -> str:
-    return _SCRIPT % (SCRIPT, MARK, (_TURNS if agents > 1 else "") + _PROBE)
 
 
 def _options(groups: Sequence[tuple[str, object]], places: Mapping[str, tuple[int, ...]]) -> str:

@@ -141,8 +141,9 @@ class Mind:
                 event = self.intentions.number(of_event(Event(Sign.ADD, sent)))
                 return self.after(base, goals, intention, {}, (event,), action=action)
             case DeedKind.ACTION:
-                action = self.actions.number(_named(term))
-                bindings = compute(self.actions.items[action]) if _functor(term) in COMPUTING else {}
+                done = _named(term)
+                action = self.actions.number(done)
+                bindings = compute(done) if done.functor in COMPUTING else {}
                 return self.after(base, goals, intention, bindings, action=action)
             case DeedKind.ADD_BELIEF:
                 return self._add_belief(goals, intention, beliefs, base, _named(term))
@@ -309,10 +310,6 @@ def _own(term: Term, suffix: str) -> Term:
 def _own_condition(condition: Condition, suffix: str) -> Condition:
     names = {name for term in condition.terms() for name in variables(term)}
     return renamed_condition(condition, {name: Var(name + suffix) for name in names}) if names else condition
-
-
-def _functor(term: Term) -> str:
-    return term.functor if isinstance(term, Struct) else ""
 
 
 def _named(term: Term) -> Struct:

@@ -206,12 +206,9 @@ def _constructs(operator: str, left: Construct, right: Construct) -> Term:
     """Constructors are injective, and differ from each other."""
     if left.constructor != right.constructor:
         return FALSE if operator == "==" else TRUE
-    same = _and(tuple(_equal(a, b) for a, b in zip(left.arguments, right.arguments, strict=True)))
+    pairs = zip(left.arguments, right.arguments, strict=True)
+    same = _and(tuple(_compare(Compare("==", a, b)) for a, b in pairs))
     return same if operator == "==" else opposite(same)
-
-
-def _equal(left: Term, right: Term) -> Term:
-    return _compare(Compare("==", left, right))
 
 
 def _number(term: Term) -> Fraction | None:

@@ -36,7 +36,7 @@ from avow.language.terms import (
 )
 
 from .checker import Checked
-from .program import Predicate, Reading, variable
+from .program import Reading, variable
 from .simplify import simplify
 
 
@@ -195,7 +195,7 @@ def _translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
                 for child in current.arguments:
                     argument: Term = yield steps(child)
                     arguments.append(argument)
-                return _instance(predicate, arguments)
+                return substitute(predicate.meaning, dict(zip(predicate.parameters, arguments, strict=True)))
         parts: list[Term] = []
         for child in current.children:
             part: Term = yield steps(child)
@@ -206,10 +206,6 @@ def _translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
     if missing:
         raise Rejected(*(_missing(v, clause) for v in dict.fromkeys(missing)))
     return conjunction((*dict.fromkeys(widened), result))
-
-
-def _instance(predicate: Predicate, arguments: list[Term]) -> Term:
-    return substitute(predicate.meaning, dict(zip(predicate.parameters, arguments, strict=True)))
 
 
 def _pointwise(compared: Compare) -> Term:

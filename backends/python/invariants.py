@@ -21,7 +21,6 @@ from avow.language.terms import (
     TRUE,
     And,
     Apply,
-    Arithmetic,
     Compare,
     Implies,
     Literal,
@@ -34,7 +33,7 @@ from avow.language.terms import (
 )
 
 from .program import Assign, For, Item, Name, View, parts
-from .symbolic import ZERO, Candidate, Turn, widest
+from .symbolic import ZERO, Candidate, Turn, plus, widest
 from .tuning import CANDIDATES
 
 _NUMBERS = (INTEGER, REAL)
@@ -133,7 +132,7 @@ def _promised(loop: For, first: Turn, promised: Sequence[Term], known: Sequences
                 output: Variable = output,
                 meaning: Callable[[Turn], Term] = meaning,
             ) -> Term | None:
-                done = {length: _plus(turn.done, start) for length, start in lengths.items()}
+                done = {length: plus(turn.done, start) for length, start in lengths.items()}
                 return substitute(formula, {output: meaning(turn), **done})
 
             yield Candidate(loop.counter, f"{name} as {output.qualified} in {_hash_text(formula)}", build)
@@ -154,8 +153,8 @@ def _shapes(loop: For, first: Turn, known: Sequences) -> Iterator[Candidate]:
                 zero = ZERO if sort == INTEGER else Literal(0, REAL)
                 yield _compared(loop, name, operator, lambda turn, zero=zero: zero, "0")  # type: ignore[misc]
             if sort == INTEGER:
-                yield _compared(loop, name, "<=", lambda turn, name=name: _plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
-                yield _compared(loop, name, "==", lambda turn, name=name: _plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
+                yield _compared(loop, name, "<=", lambda turn, name=name: plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
+                yield _compared(loop, name, "==", lambda turn, name=name: plus(turn.done, turn.entry[name]), "turns")  # type: ignore[misc]
         for view in views:
             _, elements = known.of(view.sequence)
             assert isinstance(elements.sort, FunctionSort)
@@ -190,7 +189,7 @@ def _every_item(name: str, operator: str, view: View, elements: Variable) -> Cal
 def _position(view: View, elements: Variable) -> tuple[Variable, Term]:
     assert isinstance(elements.sort, FunctionSort)
     at = Variable(Role.BOUND, "at", NATURAL)
-    return at, Apply(elements, (_plus(at, view.start),), elements.sort.result)
+    return at, Apply(elements, (plus(at, view.start),), elements.sort.result)
 
 
 def _compared(loop: For, name: str, operator: str, other: Callable[[Turn], Term], what: str) -> Candidate:
@@ -206,12 +205,6 @@ def _views(loop: For) -> Iterator[View]:
             for part in parts(statement.value):
                 if isinstance(part, Item) and isinstance(part.index, Name):
                     yield part.view
-
-
-def _plus(term: Term, more: Term | int) -> Term:
-    if isinstance(more, int):
-        return term if more == 0 else Arithmetic("+", term, Literal(more, INTEGER), INTEGER)
-    return Arithmetic("+", term, more, INTEGER)
 
 
 __all__ = ["Sequences", "candidates"]

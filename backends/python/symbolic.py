@@ -273,7 +273,7 @@ class Run:
         leaving = self._left.pop()
         for gone, word in (*leaving, *(((end, "continue"),) if end is not None else ())):
             if word == "continue":
-                after = Turn(gone.values, _plus_one(done), entry, loop, carried)
+                after = Turn(gone.values, plus(done, 1), entry, loop, carried)
                 for candidate in own:
                     goal = candidate.build(after) or FALSE
                     self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
@@ -475,8 +475,10 @@ def zero(term: Term) -> Literal:
     return Literal(Fraction(0), REAL) if term.sort == REAL else ZERO
 
 
-def _plus_one(term: Term) -> Term:
-    return Arithmetic("+", term, Literal(1, INTEGER), INTEGER)
+def plus(term: Term, more: Term | int) -> Term:
+    if isinstance(more, int):
+        return term if more == 0 else Arithmetic("+", term, Literal(more, INTEGER), INTEGER)
+    return Arithmetic("+", term, more, INTEGER)
 
 
 def wider(one: Sort, other: Sort) -> Sort:

@@ -11,6 +11,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
+from avow.language.terms import Role
 from avow.system.paths import inside
 
 from .coverage import Tally
@@ -38,7 +39,7 @@ def judge(job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         seen += monitor.finish()
         return JudgedRun(
             {name: _judged(monitor, name, seen, unsaid[name] or monitor.backwards) for name in names},
-            next((_assumption(v) for v in seen if _breaks(used, v)), None),
+            next(((v.index, f"{v.clause}: {v.explanation}") for v in seen if _breaks(used, v)), None),
         )
 
     return run
@@ -86,13 +87,10 @@ def _breaks(found: Setup, violation: Violation) -> bool:
     )
 
 
-def _assumption(violation: Violation) -> tuple[int, str]:
-    return violation.index, f"{violation.clause}: {violation.explanation}"
-
-
 def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str) -> Judged:
     tally: Tally = monitor.tallies[name]
-    outputs = {v for v in _spoken(monitor, name) if v.startswith("out.")}
+    spoken = free_variables(monitor.setup.node.clause(name).formula)
+    outputs = {v.qualified for v in spoken if v.role is Role.OUTPUT}
     first = next(
         (
             v
@@ -117,7 +115,3 @@ def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str)
         first.index if first is not None else 0,
         unsaid or tally.reason,
     )
-
-
-def _spoken(monitor: Monitor, name: str) -> set[str]:
-    return {v.qualified for v in free_variables(monitor.setup.node.clause(name).formula)}

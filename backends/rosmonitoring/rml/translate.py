@@ -272,7 +272,8 @@ class _Machine:
                 if isinstance(symbol, Tracked):
                     values.update(_seen_at_start(symbol, first, rule.variable.sort))
                 else:
-                    values.update(zip(components(symbol), _parts(first, rule.variable.sort), strict=True))
+                    sort = rule.variable.sort
+                    values.update(zip(components(symbol), _numbers(constant(first, sort), sort), strict=True))
         return [values[name] for name in state]
 
     def _steps(
@@ -464,12 +465,8 @@ def _object(tree: dict[str, object]) -> str:
     return "{" + ", ".join(f"{k}: {_object(v) if isinstance(v, dict) else v}" for k, v in tree.items()) + "}"
 
 
-def _parts(value: Value, sort: Sort) -> list[Numeric]:
-    """A known value as the numbers that its components carry."""
-    return _numbers(constant(value, sort), sort)
-
-
 def _numbers(symbol: Symbol, sort: Sort) -> list[Numeric]:
+    """A known value as the numbers that its components carry."""
     match symbol:
         case Scalar(number=number):
             return [number]
