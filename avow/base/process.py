@@ -254,6 +254,37 @@ def end_orphans() -> bool:
     return found
 
 
+def guard(*, tied: bool) -> None:
+    """Returns in a fork, which goes on; this process only watches it from now on, and ends as it ends. Whatever the
+    fork leaves running, however it ends, is ended as well. `tied`: so it is when the process that started this one
+    ends. Only on Linux: elsewhere nothing is watched."""
+    if _LIBC is None:
+        return
+    adopt_orphans()
+    signals = {signal.SIGCHLD, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    if tied:  # until here it was to die at once, and nothing was running
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    watching, pid = os.getpid(), os.fork()
+    if pid == 0:
+        forget_orphans()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
+        os.setsid()
+        if tied:
+            die_with(watching)
+        return
+    code = 1
+    try:
+        os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # whose connections they are is to hear that it ended
+        ended, status = 0, 0
+        while not ended and signal.sigwait(signals) == signal.SIGCHLD:
+            ended, status = os.waitpid(pid, os.WNOHANG)
+        end_orphans()
+        code = os.waitstatus_to_exitcode(status) if ended else -signal.SIGTERM
+    finally:
+        os._exit(128 - code if code < 0 else code)
+
+
 def _children(pid: int) -> list[int]:
     return _parents().get(pid, [])
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from avow.base.process import die_with, forget_orphans, kill_tree
+from avow.base import process
 from avow.base.tuning.running import FORK_MESSAGE
 from avow.pipeline import worker
 
@@ -55,6 +55,7 @@ def serve(control: socket.socket) -> int:
     os.close(os.pidfd_open(os.getpid()))  # where that is forbidden, better now than with a fork under way
     gc.collect()
     gc.freeze()  # what is shared with the forks stays shared: the collector does not write to it
+    process.adopt_orphans()
     control.send(b"ready")
     forks: set[_Fork] = set()
     with selectors.DefaultSelector() as events:
@@ -94,6 +95,7 @@ def _next(control: socket.socket, events: selectors.BaseSelector) -> _Fork | Non
     if pid == 0:
         open_here = [control.fileno(), user, *_descriptors(events)]
         _work(json.loads(message), server, errors, open_here)
+    process.watch(pid)
     os.close(errors)
     return _Fork(pid, os.pidfd_open(pid), socket.socket(fileno=user))
 
@@ -108,8 +110,8 @@ def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequenc
     code = 1
     try:
         os.setsid()
-        forget_orphans()
-        die_with(server)
+        process.forget_orphans()
+        process.die_with(server)
         os.dup2(errors, 2)
         for descriptor in {*open_here, errors}:
             with contextlib.suppress(OSError):
@@ -124,12 +126,15 @@ def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequenc
 
 
 def _end(fork: _Fork) -> None:
-    kill_tree(fork.pid)  # before it is waited for: until then, its number cannot be another's
+    process.kill_tree(fork.pid)  # before it is waited for: until then, its number cannot be another's
     _, status = os.waitpid(fork.pid, 0)
+    process.unwatch(fork.pid)
+    process.end_orphans()  # what it left, if it was killed itself
     os.close(fork.handle)
     with fork.user, contextlib.suppress(OSError):
         fork.user.send(str(os.waitstatus_to_exitcode(status)).encode())
 
 
 if __name__ == "__main__":
+    process.guard(tied=False)
     sys.exit(serve(socket.socket(fileno=int(sys.argv[1]))))

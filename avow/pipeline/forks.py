@@ -244,6 +244,7 @@ class OwnFork:
 def _forks(control: socket.socket) -> int:
     from avow.pipeline import fork_server
 
+    process.guard(tied=False)  # it ends as `control` closes
     return fork_server.serve(control)
 
 

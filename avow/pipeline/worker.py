@@ -195,4 +195,5 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
 
 
 if __name__ == "__main__":
+    process.guard(tied=True)
     sys.exit(entry(sys.argv[1:]))

@@ -208,13 +208,29 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     started = pids(odd)
     family = process._descendants(run.pid)
     assert started[0] in family
+    assert set(started) <= set(family)
     run.send_signal(signal.SIGKILL)
     run.wait()
-    # what the work started by itself, without `process.run`, is its own business where nobody is left to look for it
-    bound = set(family) - set(started[1:])
-    until(lambda: not any(map(alive, bound)))
-    for pid in filter(alive, started[1:]):
-        os.kill(pid, signal.SIGKILL)
+    until(lambda: not any(map(alive, family)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("whose", ["the work's process", "the server"])
+def test_nothing_outlives_a_process_that_is_killed_on_the_way(odd: Path, way: str, whose: str) -> None:
+    """The run itself goes on."""
+    if whose == "the server" and way == "anew":
+        pytest.skip("there is none")
+    (odd / "pids").unlink(missing_ok=True)
+    found: list[Outcome] = []
+    thread = threading.Thread(target=lambda: found.append(settle(odd, "hangs")[0]))
+    thread.start()
+    started = pids(odd)
+    (above,) = [pid for pid in process._descendants(os.getpid()) if started[0] in process._children(pid)]
+    os.kill(started[0] if whose == "the work's process" else above, signal.SIGKILL)
+    thread.join(30)
+    assert found[0].verdict is Verdict.ERROR
+    until(lambda: not any(map(alive, started)))
+    assert settle(odd, "answers")[0].verdict is Verdict.TESTED
 
 
 @pytest.mark.nightly
