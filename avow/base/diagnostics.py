@@ -6,6 +6,7 @@ of them. Only at a boundary where nothing more can be done are they raised, toge
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import field
 from enum import StrEnum
 
@@ -56,3 +57,10 @@ class Rejected(Exception):  # noqa: N818 - it reads as what happened to the inpu
     def __init__(self, *diagnostics: Diagnostic) -> None:
         super().__init__("; ".join(f"{d.span or '<input>'}: {d.message} [{d.code}]" for d in diagnostics))
         self.diagnostics = diagnostics
+
+
+def refuse(found: Iterable[Diagnostic]) -> None:
+    """Raises Rejected with the errors among them, where there are any."""
+    errors = [diagnostic for diagnostic in found if diagnostic.is_error]
+    if errors:
+        raise Rejected(*errors)

@@ -89,13 +89,11 @@ def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLim
 
 def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
     """As `discharge`, of derivations that are made already (they remember what was settled)."""
-    return tuple(settle_each(composition, obligations, limits))
+    return tuple(settle_each(composition, obligations, Bounds(from_seconds(limits.seconds), limits.seed)))
 
 
-def settle_each(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> Iterator[Outcome]:
+def settle_each(composition: Composition, obligations: Sequence[Obligation], bounds: Bounds) -> Iterator[Outcome]:
     """As `settle_all`, each outcome as soon as it is there."""
-    bounds = Bounds(from_seconds(limits.seconds), limits.seed)
-
     made = tuple(_tasks(composition))
     resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}

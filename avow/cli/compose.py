@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option, system_of
 from avow.cli.progress import progress
 from avow.solving.limits import from_seconds
 
@@ -42,24 +42,21 @@ def command(
     a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's stderr tells the
     answers as they come; who interrupts it gets those so far.
     """
-    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected, refuse
     from avow.base.verdict import Verdict
-    from avow.base.workspace import system_folder
     from avow.calculus.composition import compose
     from avow.calculus.discharge import Bounds
     from avow.calculus.obligations import composition_obligations, settle_each
-    from avow.system.load import load_path
 
-    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    system = system_of(path)
     composition = compose(system)
-    errors = [finding for finding in composition.frame.graph.findings if finding.is_error]
-    if errors:
-        raise Rejected(*errors)
+    refuse(composition.frame.graph.findings)
     known = [goal.name for goal in composition.goals]
     if unknown := [name for name in goals if name not in known]:
         hint = f"known: {', '.join(known)}"
         raise Rejected(Diagnostic("CLI005", f"there is no derivation '{unknown[0]}'", hint=hint))
 
+    bounds = Bounds(from_seconds(seconds), seed)
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
     if as_latex:
         from avow.calculus.notation import write_goal
@@ -74,7 +71,7 @@ def command(
         parts = list(goal.inner_first())
         with progress(sum(len(part.conditions) for part in parts)) as telling:
             composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
-            standing = composition.stands(goal, Bounds(from_seconds(seconds), seed))
+            standing = composition.stands(goal, bounds)
         if standing is not Verdict.PROVED:
             click.echo(f"{goal.name} is {standing}: no contract follows from it (see `avow compose {path}`)", err=True)
             return 1
@@ -85,12 +82,11 @@ def command(
     prefixes = tuple(f"{goal.name}." for goal in chosen) if goals else ("",)
     obligations = [o for o in composition_obligations(system) if o.name.startswith(prefixes)]
 
-    limits = _Limits(seconds, seed)
     asked = {o.name for o in obligations} | {f"{goal.name}.{c.about}" for goal in chosen for c in goal.conditions}
     with progress(len(asked)) as telling:
         composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
         settled = []
-        for obligation, outcome in zip(obligations, settle_each(composition, obligations, limits), strict=True):
+        for obligation, outcome in zip(obligations, settle_each(composition, obligations, bounds), strict=True):
             telling.tell(obligation.name, str(outcome.verdict))
             settled.append(outcome)
     outcomes = tuple(settled)
@@ -102,12 +98,6 @@ def command(
         _listing(composition, chosen, obligations, outcomes)
     fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
     return 1 if any(fails) else 0
-
-
-class _Limits:
-    def __init__(self, seconds: float, seed: int) -> None:
-        self.seconds = seconds
-        self.seed = seed
 
 
 _COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refuted": "red"}

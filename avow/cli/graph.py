@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from avow.base.codec import document
-from avow.cli.options import ContractArgument, json_option
+from avow.cli.options import ContractArgument, json_option, system_of
 
 
 @click.command()
@@ -22,19 +22,15 @@ def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
     of each topic its type, who publishes it and who listens, what comes from the environment, and what arrives one
     step later. Several publishers of one topic are heard each, at any step.
     """
-    from avow.base.diagnostics import Rejected
-    from avow.base.workspace import system_folder
+    from avow.base.diagnostics import refuse
     from avow.system.folding import seen
     from avow.system.graph import dataflow
     from avow.system.graph_svg import sheet, texts
-    from avow.system.load import load_path
     from avow.system.wiring import wiring
 
-    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    system = system_of(path)
     graph = dataflow(system)
-    errors = [finding for finding in graph.findings if finding.is_error]
-    if errors:
-        raise Rejected(*errors)
+    refuse(graph.findings)
     found = wiring(system, graph)
     if as_json:
         click.echo(document({"system": system.name, **found.json()}))

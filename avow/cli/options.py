@@ -12,7 +12,10 @@ from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+
+    from avow.language.contract import Contract
+    from avow.system.plan import System
 
 Command = TypeVar("Command", bound="Callable[..., object]")
 
@@ -31,6 +34,23 @@ class ContractArgument(PathArgument):
         path = super().convert(value, param, ctx)
         assert isinstance(path, Path)
         return named_folder(path) or path
+
+
+def system_of(path: Path) -> System:
+    """The system that a `ContractArgument` names. Raises Rejected."""
+    from avow.base.workspace import system_folder
+    from avow.system.load import load_path
+
+    return load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+
+
+def has_nodes(contract: Contract, wanted: Iterable[str]) -> None:
+    """Raises Rejected for a node that the contract does not have."""
+    from avow.base.diagnostics import Diagnostic, Rejected
+
+    known = [node.name for node in contract.nodes]
+    if unknown := [name for name in wanted if name not in known]:
+        raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
 
 
 class _Seconds(click.ParamType[float]):

@@ -77,15 +77,13 @@ def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
 
     if not path.is_dir():
         return load_contract([path]).nodes, Verdict.PROVED
-    from avow.base.diagnostics import Rejected
+    from avow.base.diagnostics import refuse
     from avow.calculus.composition import compose
     from avow.calculus.export import derived_contract
     from avow.system.load import load_system
 
     composition = compose(load_system(path))
-    errors = [finding for finding in composition.frame.graph.findings if finding.is_error]
-    if errors:
-        raise Rejected(*errors)
+    refuse(composition.frame.graph.findings)
     whole = composition.whole
     return derived_contract(composition, whole).nodes, composition.stands(whole, bounds)
 

@@ -20,16 +20,8 @@ def command(file: str, as_json: bool) -> int:
 
     found = read_requirements(Path(file))
     if as_json:
-        listed = [
-            {
-                "id": r.id,
-                "text": r.text,
-                "formula": r.formula,
-                "temporal": r.temporal,
-                "supported_by": list(r.supported_by),
-            }
-            for r in found
-        ]
+        keys = ("id", "text", "formula", "temporal", "supported_by")
+        listed = [{key: getattr(r, key) for key in keys} for r in found]
         click.echo(document({"requirements": listed}))
     else:
         click.echo(plan_section(found), nl=False)

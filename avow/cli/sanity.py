@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.cli.options import ContractArgument, json_option, node_option, seconds_option, seed_option
+from avow.cli.options import (
+    ContractArgument,
+    has_nodes,
+    json_option,
+    node_option,
+    seconds_option,
+    seed_option,
+    system_of,
+)
 from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
@@ -33,20 +41,15 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     SYSTEM is a system's name or folder, or an .rcl file. Code 1 where something is refuted that is an error, or where
     two solvers contradict each other, 2 for bad input.
     """
-    from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.verdict import Verdict
-    from avow.base.workspace import system_folder
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
     from avow.calculus.variables import frame
     from avow.sanity.analysis import Bounds, analyse
     from avow.sanity.document import SanityDocument, told
-    from avow.system.load import load_path
 
-    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
-    known = [node.name for node in system.contract.nodes]
-    if unknown := [name for name in nodes if name not in known]:
-        raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
+    system = system_of(path)
+    has_nodes(system.contract, nodes)
     bounds = Bounds(from_seconds(seconds), seed)
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
@@ -67,13 +70,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     return 1 if any(result.fails or result.verdict is Verdict.ERROR for result in results) else 0
 
 
-_COLOURS = {
-    "proved": "green",
-    "checked": "cyan",
-    "unknown": "yellow",
-    "refuted": "red",
-    "error": "red",
-}
+_COLOURS = {"proved": "green", "checked": "cyan", "unknown": "yellow", "refuted": "red", "error": "red"}
 
 
 def _listing(results: list[SanityResult], everything: bool) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option, system_of
 from avow.solving.limits import from_seconds
 
 
@@ -31,15 +31,13 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
 
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.tuning.bounds import WALKS
-    from avow.base.workspace import system_folder
     from avow.calculus.scenario import CannotRun, world
     from avow.calculus.transition import Machine
     from avow.calculus.variables import frame
     from avow.formulas.temporal.ages import CLOCK
     from avow.formulas.values import show
-    from avow.system.load import load_path
 
-    loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    loaded = system_of(path)
     try:
         machine = Machine(replace(world(frame(loaded)), effort=from_seconds(seconds)), seed)
         scenario = loaded.plan.scenario

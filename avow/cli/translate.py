@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.cli.options import ContractArgument, json_option, node_option
+from avow.cli.options import ContractArgument, has_nodes, json_option, node_option
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
@@ -115,11 +115,7 @@ def _by_backend(
 def _only(contract: Contract, nodes: tuple[str, ...]) -> Contract:
     from dataclasses import replace
 
-    from avow.base.diagnostics import Diagnostic, Rejected
-
-    known = [node.name for node in contract.nodes]
-    if unknown := [name for name in nodes if name not in known]:
-        raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
+    has_nodes(contract, nodes)
     return replace(contract, nodes=tuple(n for n in contract.nodes if n.name in nodes)) if nodes else contract
 
 

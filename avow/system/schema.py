@@ -49,10 +49,7 @@ def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
 
 
 def _wrong_places(root: Piece) -> Iterator[tuple[str | int, ...]]:
-    from jsonschema import Draft202012Validator, validators
-
-    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(plan_schema())  # type: ignore[no-untyped-call]
-    for error in validator.iter_errors(root.data):
+    for error in _errors(root, plan_schema()):
         path = tuple(error.absolute_path)
         if "propertyNames" in error.absolute_schema_path:
             yield (*path, str(error.instance))
@@ -102,11 +99,16 @@ def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | 
 
 
 def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
+    found = [d for error in _errors(piece, schema) for d in _explain(error, piece, whole)]
+    return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
+
+
+def _errors(piece: Piece, schema: Mapping[str, Any]) -> Iterable[Any]:
     from jsonschema import Draft202012Validator, validators  # slow to import
 
     validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(schema)  # type: ignore[no-untyped-call]
-    found = [d for error in validator.iter_errors(piece.data) for d in _explain(error, piece, whole)]
-    return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
+    found: Iterable[Any] = validator.iter_errors(piece.data)
+    return found
 
 
 def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
