@@ -9,7 +9,7 @@ prove itself. Where proofs would do that, others are looked for; where there are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from avow.base.files import sha256
@@ -23,7 +23,7 @@ from avow.calculus.induction import Deeper, steps
 from avow.calculus.invariants import INVARIANT, further
 from avow.calculus.kept_answers import keep_not_proved, not_proved_before
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
-from avow.calculus.variables import Facts, Frame, closest, indexed
+from avow.calculus.variables import Facts, Frame, bearing, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
 
@@ -244,9 +244,11 @@ class _Solver:
         guaranteed = {
             f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
         }
-        phases = self.phases(condition, before)
-        cases = tuple(self.case(condition, phase, same, before, True, NARROW_EFFORT, guaranteed) for phase in phases)
-        answer = _settled(condition, cases)
+        cases: list[Case] = []
+        for phase in self.phases(condition, before):
+            hypotheses, goal = self.question(condition, phase, same, before, True)
+            cases.append(self.ask(phase, hypotheses | guaranteed, goal, NARROW_EFFORT))
+        answer = _settled(condition, tuple(cases))
         if answer.verdict is not Verdict.PROVED:
             return None
         return replace(answer, verdict=Verdict.REFUTED, circle=(consumer,))
@@ -265,10 +267,10 @@ class _Solver:
             frame = self.frame
             asked = steps(
                 frame,
-                self.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0)
+                self.frame.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0)
                 | frame.environment()
                 | frame.memory(),
-                self.contracts(same, 0) | frame.environment() | frame.memory() | self.own(condition.consumer),
+                self.frame.contracts(same) | frame.environment() | frame.memory() | self.own(condition.consumer),
                 frame.initials(self.selected) | frame.blank(),
                 frame.clause(condition.consumer, condition.clause),
             )
@@ -322,19 +324,6 @@ class _Solver:
     def feeds(self, provider: str, consumer: str, *, delayed: bool) -> bool:
         return any(e.source.node == provider and e.delayed is delayed for e in self.frame.graph.feeding(consumer))
 
-    def case(
-        self,
-        condition: SideCondition,
-        phase: Phase,
-        same: tuple[str, ...],
-        before: tuple[str, ...],
-        wide: bool,
-        patience: int,
-        more: Mapping[str, Term] | None = None,
-    ) -> Case:
-        hypotheses, goal = self.question(condition, phase, same, before, wide)
-        return self.ask(phase, hypotheses | dict(more or {}), goal, patience)
-
     def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int, *, whether: bool = False) -> Case:
         """`whether`: what does not prove it is looked at no further."""
         answer = implied(hypotheses, goal, effort=patience, seed=self.bounds.seed, whether=whether)
@@ -352,46 +341,21 @@ class _Solver:
         self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...], wide: bool
     ) -> tuple[Hypotheses, Term]:
         goal = self.frame.clause(condition.consumer, condition.clause)
-        hypotheses = self.contracts(same, 0)
+        hypotheses = self.frame.contracts(same)
         around = self.frame.environment(0) | self.frame.memory(0) | self.own(condition.consumer)
         if phase is Phase.LATER:
-            hypotheses |= self.contracts(before, 1)
+            hypotheses |= self.frame.contracts(before, 1)
             around |= self.frame.environment(1) | self.frame.memory(1)
         elif phase is Phase.INITIAL:
             around |= self.frame.initials(self.selected) | self.frame.blank()
-        hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
+        spoken = free_variables(goal).union(*map(free_variables, hypotheses.values()))
+        hypotheses |= bearing(around, spoken, direct=not wide)
         return hypotheses, goal
 
     def own(self, consumer: str) -> Hypotheses:
         """What a consumer assumes that stays assumed."""
         names = (ClauseName(consumer, clause.name) for clause in self.frame.node(consumer).assumptions)
         return {str(name): self.frame.clause(name.node, name.clause) for name in names if name in self.kept}
-
-    def contracts(self, nodes: Iterable[str], earlier: int) -> Hypotheses:
-        """Assumptions and guarantees of some nodes, labelled ``navigation.somewhere``."""
-        suffix = " one step before" if earlier else ""
-        return {
-            f"{node}.{clause.name}{suffix}": self.frame.clause(node, clause.name, earlier)
-            for node in nodes
-            for clause in self.frame.node(node).clauses
-        }
-
-
-def _about(facts: Hypotheses, terms: Iterable[Term], *, direct: bool) -> Hypotheses:
-    """The facts that share a variable with the terms, or (unless `direct`) with one another down to the terms.
-
-    What shares none cannot help a proof, and may keep the solver busy for long.
-    """
-    known = {variable for term in terms for variable in free_variables(term)}
-    variables = {label: free_variables(fact) for label, fact in facts.items()}
-    found: Hypotheses = {}
-    growing = True
-    while growing:
-        near = [label for label in facts if label not in found and variables[label] & known]
-        found |= {label: facts[label] for label in near}
-        known.update(*(variables[label] for label in near))
-        growing = bool(near) and not direct
-    return found
 
 
 def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:

@@ -54,19 +54,45 @@ class TooLong(Exception):  # noqa: N818 - it names what happened
     """No answer with the effort for it, or the property is too large to be asked about."""
 
 
+Judge = Callable[[int, State], bool]
+
+
 def violation(
     formula: Property,
     initial: Iterable[int],
     successors: Callable[[int], Sequence[int]],
-    holds: Callable[[int, State], bool],
+    holds: Judge,
     deadline: float | None = None,
 ) -> Lasso | None:
     """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count.
 
     `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
     """
+    automaton, label, tick = _search(normal(formula, positive=False), holds, deadline)
+    return accepted_run(initial, successors, label, automaton, tick=tick)
+
+
+def refuted_prefix(
+    formula: Property,
+    initial: Iterable[int],
+    successors: Callable[[int], Sequence[int]],
+    holds: Judge,
+    deadline: float | None = None,
+) -> tuple[int, ...] | None:
+    """The steps of a shortest beginning of a run that breaks the property however the run goes on, or None.
+
+    `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
+    """
+    automaton, label, tick = _search(normal(formula), holds, deadline)
+    return rejected_prefix(initial, successors, label, monitor(automaton), tick)
+
+
+def _search(
+    wanted: ltl.Normal[State], holds: Judge, deadline: float | None
+) -> tuple[ltl.Automaton[State], Callable[[int], int], Callable[[], None]]:
+    """The automaton of a property, what it reads of each step, and what counts a search through it."""
     try:
-        automaton = ltl.build(normal(formula, positive=False))
+        automaton = ltl.build(wanted)
     except TooLarge:
         raise TooLong from None
 
@@ -79,34 +105,7 @@ def violation(
         if deadline is not None and spent() > deadline:
             raise TooLong
 
-    return accepted_run(initial, successors, label, automaton, tick=tick)
-
-
-def refuted_prefix(
-    formula: Property,
-    initial: Iterable[int],
-    successors: Callable[[int], Sequence[int]],
-    holds: Callable[[int, State], bool],
-    deadline: float | None = None,
-) -> tuple[int, ...] | None:
-    """The steps of a shortest beginning of a run that breaks the property however the run goes on, or None.
-
-    `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
-    """
-    try:
-        automaton = ltl.build(normal(formula))
-    except TooLarge:
-        raise TooLong from None
-
-    def label(step: int) -> int:
-        return sum(1 << at for at, state in enumerate(automaton.leaves) if holds(step, state))
-
-    def tick() -> None:
-        spend(PRODUCT_STEPS)
-        if deadline is not None and spent() > deadline:
-            raise TooLong
-
-    return rejected_prefix(initial, successors, cache(label), monitor(automaton), tick)
+    return automaton, label, tick
 
 
 def refuted_at(formula: Property, run: Sequence[Mapping[State, bool]]) -> int | None:

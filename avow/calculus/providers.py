@@ -18,13 +18,13 @@ from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.variables import Frame, indexed
+from avow.calculus.variables import Frame, bearing, indexed
 from avow.formulas.formula import digest, free_variables
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.subterms import ports_of
-from avow.language.terms import TRUE, Term, Variable
+from avow.language.terms import TRUE, Term
 from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
 from avow.sanity.claims import Claim, Property
 from avow.solving.questions import solve
@@ -96,7 +96,8 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
     spoken = free_variables(goal)
     if whole.environment() or whole.blank():  # of many consumers each would go through all that the provider promises
         spoken = spoken.union(*(p.speaking for p in given.values()))
-    assumed = {about: goal} | _bearing(whole, spoken)
+    # what is not tied to these variables cannot exclude anything here
+    assumed = {about: goal} | bearing(whole.environment(), spoken)
     providers = tuple(dict.fromkeys(provider for provider, _ in given))
     names = " and ".join(providers)
     verb = "guarantees" if len(providers) == 1 else "guarantee"
@@ -124,19 +125,6 @@ def _meaning(assumed: Mapping[str, Term], promised: Iterable[str]) -> str:
     """`promised`: the providers' digests (`avow.calculus.variables.Facts.digest`)."""
     meanings = sorted(f"{label} {digest(fact)}" for label, fact in assumed.items())
     return sha256("\n".join(["providers", *meanings, *sorted(promised)]))
-
-
-def _bearing(whole: Frame, spoken: frozenset[Variable]) -> dict[str, Term]:
-    """What the plan assumes of the environment and is tied to some variables, directly or by another such assumption.
-    What is not cannot exclude anything here."""
-    left = {label: (fact, free_variables(fact)) for label, fact in whole.environment().items()}
-    found: dict[str, Term] = {}
-    known = set(spoken)
-    while near := [label for label, (_, variables) in left.items() if not variables.isdisjoint(known)]:
-        for label in near:
-            found[label], variables = left.pop(label)
-            known |= variables
-    return found
 
 
 def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:

@@ -378,12 +378,7 @@ class JointQuestion:
         frame = composition.frame
         if frame.left_out:
             return Answer(Verdict.UNKNOWN, f"whether there is room cannot be told: {_not_kept_to(frame)}")
-        hypotheses = {
-            f"{name}.{clause.name}": frame.clause(name, clause.name)
-            for name in self.members
-            for clause in frame.node(name).clauses
-        }
-        hypotheses |= frame.environment() | frame.memory()
+        hypotheses = frame.contracts(self.members) | frame.environment() | frame.memory()
         about = f"{self.node}.{self.clause}"
         shown: list[str] = []
         for situation in triggers(frame.clause(self.node, self.clause)):

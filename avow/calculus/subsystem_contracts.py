@@ -19,7 +19,7 @@ from dataclasses import field, replace
 from avow.base.records import dataclass
 from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Frame, bearing
 from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.language.contract import Clause, ClauseKind, Node, Port
@@ -207,14 +207,7 @@ def _carrying(frame: Frame, goal: Goal, name: ClauseName) -> tuple[ClauseName, .
             known |= {
                 ClauseName(provider, c.name): frame.clause(provider, c.name) for c in frame.node(provider).clauses
             }
-    spoken = free_variables(claim)
-    near: dict[ClauseName, Term] = {}
-    growing = True
-    while growing:  # what shares no value with the claim cannot help
-        found = {k: term for k, term in known.items() if k not in near and not spoken.isdisjoint(free_variables(term))}
-        near |= found
-        spoken = spoken.union(*map(free_variables, found.values()))
-        growing = bool(found)
+    near = bearing(known, free_variables(claim))
     return tuple(each for each in known if each in near)
 
 

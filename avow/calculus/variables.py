@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
+from typing import TypeVar
 
 from avow.base.files import sha256
 from avow.base.records import dataclass
@@ -84,6 +85,24 @@ def closest(parts: Iterable[Facts], goal: Term) -> dict[str, Term]:
     return found
 
 
+Label = TypeVar("Label")
+
+
+def bearing(facts: Mapping[Label, Term], spoken: Iterable[Variable], *, direct: bool = False) -> dict[Label, Term]:
+    """The facts that share a variable with some that are spoken of, or (unless `direct`) with one another down to
+    these. What shares none cannot help a proof, and may keep the solver busy for long."""
+    left = {label: free_variables(fact) for label, fact in facts.items()}
+    known = set(spoken)
+    found: dict[Label, Term] = {}
+    while near := [label for label, variables in left.items() if not variables.isdisjoint(known)]:
+        for label in near:
+            found[label] = facts[label]
+            known |= left.pop(label)
+        if direct:
+            break
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Observed:
     """A requirement that speaks of other steps: its formula as one of a step, over ``node.port`` and its cells. What it
@@ -156,17 +175,20 @@ class Frame:
         return self._terms[key]
 
     def promised(self, node: str, earlier: int = 0) -> Facts:
-        """All that a node's contract says, `earlier` steps ago, labelled ``navigation.somewhere``."""
+        """As `contracts`, of one node."""
         key = (node, earlier)
         if key not in self._facts:
-            suffix = " one step before" if earlier else ""
-            self._facts[key] = indexed(
-                {
-                    f"{node}.{clause.name}{suffix}": self.clause(node, clause.name, earlier)
-                    for clause in self.node(node).clauses
-                }
-            )
+            self._facts[key] = indexed(self.contracts((node,), earlier))
         return self._facts[key]
+
+    def contracts(self, nodes: Iterable[str], earlier: int = 0) -> dict[str, Term]:
+        """All that some nodes' contracts say, `earlier` steps ago, labelled ``navigation.somewhere``."""
+        suffix = " one step before" if earlier else ""
+        return {
+            f"{node}.{clause.name}{suffix}": self.clause(node, clause.name, earlier)
+            for node in nodes
+            for clause in self.node(node).clauses
+        }
 
     def surroundings(self, earlier: int = 0) -> Facts:
         """As `environment`."""
