@@ -12,6 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, assert_never
 
 from avow.base.graphs import components, reached
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, Phase, Settled
@@ -124,12 +125,11 @@ class Certificates:
         return self._existing(self.kept.get(existence_scope(name)), name)
 
     def _existing(self, certificate: Certificate | None, name: str) -> list[Established] | None:
-        found = [
+        found = complete(
             next((one for claim in part if (one := self.established(certificate, claim)) is not None), None)
             for part in self.parts(name)
-        ]
-        established = [one for one in found if one is not None]
-        return established if established and len(established) == len(found) else None
+        )
+        return found or None
 
     def _examples(self, claim: Statement) -> Iterator[tuple[Entry, ...]]:
         """Certificates to try, that something is possible or left no room. First values of a loop may be there only

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
 from avow.base.tuning.effort import CERTIFICATE_NET_MS, CERTIFICATE_STEPS
@@ -269,10 +270,10 @@ class Finder:
 
     def kept(self, item: Item, base: tuple[_Base, ...], step: _Uses) -> _Proof | None:
         """The proof, if the kernel finds its questions valid; with a witness where one is needed."""
-        begun = [self.begun(b) for b in base]
-        base = tuple(b for b in begun if b is not None)
-        if len(base) < len(begun):
+        begun = complete(map(self.begun, base))
+        if begun is None:
             return None
+        base = tuple(begun)
         items = list(dict.fromkeys([*(i for uses in (*(b for b, _ in base), step) for i, _ in uses), item]))
         ranks = {i: k for k, i in enumerate(items)}
         # ranks and conditions are another matter: here only the questions are asked

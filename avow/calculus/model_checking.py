@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import field
 from random import Random
 
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
 from avow.base.tuning.shown import STEP_VARIABLES
@@ -385,9 +386,8 @@ def _doubt_of(
     loose = tuple(unsupported(machine, steps, None if stays or cut else back))
     if loose:
         return f"but over the scenario's values only is it sure that {', '.join(loose[:4])} holds"
-    run = [truths(machine, formula, step) for step in steps]
-    known = [truth for truth in run if truth is not None]
-    if len(known) < len(run):
+    known = complete(truths(machine, formula, step) for step in steps)
+    if known is None:
         return "but over the scenario's values only is it sure that the property is broken"
     # up to its last step it is broken however the run goes on, or the run goes round
     broken = refuted_at(formula, known) is not None if cut else back is not None and not holds(formula, known, back)

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.verdict import Outcome
 from avow.calculus import questions
@@ -142,8 +143,8 @@ def reestablished(certificates: Certificates, obligation: str) -> Reestablished 
 
 
 def _all_told(obligation: str, asked: Sequence[Established | None], scope: str) -> Reestablished | None:
-    found = [one for one in asked if one is not None]
-    if len(found) < len(asked):
+    found = complete(asked)
+    if found is None:
         return None
     return Reestablished(obligation, min((one.solvers for one in found), default=1), questions.common_key(found), scope)
 

@@ -6,14 +6,13 @@ where it has to know more, and says what (`Undecided`); where another part settl
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from itertools import product
 from typing import Any
 
 from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
-from avow.evaluation.evaluate import Domains, NotEvaluable, finite_values
+from avow.evaluation.compiler import combinations
+from avow.evaluation.evaluate import Domains, NotEvaluable
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
 from avow.language.sorts import FunctionSort, SequenceSort
@@ -64,18 +63,13 @@ Lazy = tuple[tuple[str, tuple[Point, ...] | None], ...]
 def lazy_names(formula: Term, domains: Domains | None = None) -> Lazy:
     """The free variables of a formula whose values may be open. `domains`: for quantifiers over these values only."""
     return tuple(
-        (v.qualified, _points(v.sort, domains) if isinstance(v.sort, FunctionSort) else None)
+        (
+            v.qualified,
+            combinations(v.sort.parameters, domains, POINTS_OF_ARGUMENTS) if isinstance(v.sort, FunctionSort) else None,
+        )
         for v in free_variables(formula)
         if isinstance(v.sort, FunctionSort | SequenceSort)
     )
-
-
-def _points(sort: FunctionSort, domains: Domains | None) -> tuple[Point, ...] | None:
-    ranges = [finite_values(parameter, domains) for parameter in sort.parameters]
-    known = [values for values in ranges if values is not None]
-    if len(known) < len(ranges) or math.prod(map(len, known)) > POINTS_OF_ARGUMENTS:
-        return None
-    return tuple(product(*known))
 
 
 def decided(value: Value, point: Point, result: Value) -> Value:

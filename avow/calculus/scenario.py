@@ -5,10 +5,8 @@ The scenario restricts which values are *tried*; whether a guarantee holds of th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import product
 
 from avow.base.diagnostics import Rejected
 from avow.base.plain import listed
@@ -17,6 +15,7 @@ from avow.base.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.base.tuning.shown import DOMAIN_VALUES
 from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
+from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
 from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
@@ -129,10 +128,8 @@ class World:
     def tuples(self, sorts: Sequence[Sort]) -> tuple[Point, ...] | None:
         """The combinations of values that are tried: of the given ranges if every sort has one, else the places that
         the interpreted tables speak of (a relation on REAL x REAL x NATURAL speaks of pairs of reals)."""
-        ranges = [finite_values(sort, self.domains) for sort in sorts]
-        known = [r for r in ranges if r is not None]
-        if len(known) == len(ranges):
-            return tuple(product(*known)) if math.prod(map(len, known)) <= VALUES_OF_A_PORT else None
+        if all(finite_values(sort, self.domains) is not None for sort in sorts):
+            return combinations(sorts, self.domains, VALUES_OF_A_PORT)
         found: dict[Point, None] = {}
         for signature, rows in self.rows():
             for start in range(len(signature) - len(sorts) + 1):

@@ -10,6 +10,7 @@ from fractions import Fraction
 from itertools import product
 from typing import Any, Protocol, assert_never
 
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import VALUES_ENUMERATED
 from avow.formulas import values
@@ -85,13 +86,13 @@ def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ..
         case EnumSort(members=members):
             return tuple(Element(member) for member in members)
         case TupleSort(items=items):
-            return _tuples(items, domains)
+            return combinations(items, domains)
         case DataSort(constructors=constructors):
             found: list[Value] = []
             for constructor in constructors:
                 if any(isinstance(p, DataSort) for p in constructor.parameters):
                     return None
-                arguments = _tuples(constructor.parameters, domains)
+                arguments = combinations(constructor.parameters, domains)
                 if arguments is None:
                     return None
                 found.extend(Data(constructor.name, a) for a in arguments)
@@ -100,12 +101,12 @@ def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ..
             return None
 
 
-def _tuples(sorts: Sequence[Sort], domains: Domains | None) -> tuple[tuple[Value, ...], ...] | None:
-    ranges = [finite_values(sort, domains) for sort in sorts]
-    known = [r for r in ranges if r is not None]
-    if len(known) != len(ranges) or math.prod(len(r) for r in known) > VALUES_ENUMERATED:
-        return None
-    return tuple(product(*known))
+def combinations(
+    sorts: Sequence[Sort], domains: Domains | None = None, most: int = VALUES_ENUMERATED
+) -> tuple[tuple[Value, ...], ...] | None:
+    """Every combination of values of some sorts, or None where one has no end of values, or there are too many."""
+    ranges = complete(finite_values(sort, domains) for sort in sorts)
+    return None if ranges is None or math.prod(map(len, ranges)) > most else tuple(product(*ranges))
 
 
 class Candidates(Protocol):

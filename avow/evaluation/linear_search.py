@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 
+from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import LINEAR_CASES
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
@@ -204,8 +205,8 @@ def _sum(left: dict[str, Fraction], right: dict[str, Fraction], factor: Fraction
 
 
 def _all(sides: Sequence[Alternatives | None]) -> Alternatives | None:
-    known = [side for side in sides if side is not None]
-    if len(known) < len(sides):
+    known = complete(sides)
+    if known is None:
         return None
 
     def run(env: Env) -> list[tuple[Constraint, ...]]:
@@ -218,8 +219,8 @@ def _all(sides: Sequence[Alternatives | None]) -> Alternatives | None:
 
 
 def _any(sides: Sequence[Alternatives | None]) -> Alternatives | None:
-    known = [side for side in sides if side is not None]
-    if len(known) < len(sides):
+    known = complete(sides)
+    if known is None:
         return None
     return lambda env: [system for side in known for system in side(env)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.base.optional import complete
 from avow.base.plain import count
 from avow.language.check_names import Names
 from avow.language.conversions import WHOLE, common, joined
@@ -113,11 +114,9 @@ class Applications(Names):
             message = f"`{name}` takes {wanted} and is given {len(given) or 'none'}"
             self.error("RCL305", message, tree, hint=f"its parameters are ({shown})" if parameters else None)
             return None
-        made: list[Term | None] = []
-        for argument, parameter in zip(given, parameters, strict=True):
-            made.append(self.wanted(argument, parameter, f"this argument of `{name}`"))
-        done = tuple(m for m in made if m is not None)
-        return done if len(done) == len(made) else None
+        pairs, what = zip(given, parameters, strict=True), f"this argument of `{name}`"
+        made: list[Term] | None = complete([self.wanted(each, sort, what) for each, sort in pairs])
+        return None if made is None else tuple(made)
 
     def construct(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
         sort = self.scope.environment.elements[name]
@@ -167,9 +166,8 @@ class Applications(Names):
 
     def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
         formulas = OPERATORS[name].typing.takes_formulas
-        made = [self.formula(a) if formulas else self.term(a) for a in arguments]
-        terms = [m for m in made if m is not None]
-        if len(terms) != len(made):
+        terms: list[Term] | None = complete([self.formula(a) if formulas else self.term(a) for a in arguments])
+        if terms is None:
             return None
         found = operation(name, terms, self.span(tree))
         if not isinstance(found, Mistyped):
@@ -185,16 +183,14 @@ class Applications(Names):
         wanted: Sequence[Sort | None] = [None] * len(tree.items)
         if isinstance(expected, TupleSort) and len(expected.items) == len(tree.items):
             wanted = expected.items
-        made = [self.term(t, w) for t, w in zip(tree.items, wanted, strict=True)]
-        items = tuple(m for m in made if m is not None)
-        if len(items) != len(made):
+        items: list[Term] | None = complete([self.term(t, w) for t, w in zip(tree.items, wanted, strict=True)])
+        if items is None:
             return None
-        return TupleTerm(items, TupleSort(tuple(i.sort for i in items)), self.span(tree))
+        return TupleTerm(tuple(items), TupleSort(tuple(i.sort for i in items)), self.span(tree))
 
     def items(self, trees: Sequence[TermSyntax], what: str, expected: Sort | None) -> list[Term] | None:
-        made = [self.term(t, expected) for t in trees]
-        items = [m for m in made if m is not None]
-        if len(items) != len(made):
+        items: list[Term] | None = complete([self.term(t, expected) for t in trees])
+        if items is None:
             return None
         unified = common(items)
         if unified is None:

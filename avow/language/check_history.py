@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+from avow.base.optional import complete
 from avow.base.plain import count
 from avow.language.check_relations import Relations
 from avow.language.conversions import WHOLE, common, joined, widen
@@ -160,8 +161,8 @@ class Histories(Relations):
             made = self.terms(arguments)
         else:
             made = [self.formula(each) for each in arguments]
-        terms = [term for term in made if term is not None]
-        if len(terms) != len(made):
+        terms: list[Term] | None = complete(made)
+        if terms is None:
             return None
         if operator is Past.ARRIVED:
             return self._input(arguments[0], terms[0])

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.optional import complete
 from avow.base.suggestions import did_you_mean
 from avow.language.chains import equivalence, implication
 from avow.language.check_definitions import Definitions
@@ -136,10 +137,10 @@ class Checker(Definitions):
     # --- connectives -------------------------------------------------------------------------------------------------
 
     def connective(self, tree: Connective) -> Term | None:
-        made = [self.formula(t) for t in tree.items]
-        items = tuple(m for m in made if m is not None)
-        if len(items) != len(made):
+        made: list[Term] | None = complete([self.formula(t) for t in tree.items])
+        if made is None:
             return None
+        items = tuple(made)
         match tree.sign:
             case Sign.AND:
                 return And(items, self.span(tree))

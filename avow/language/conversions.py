@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
+from avow.base.optional import complete
 from avow.language.sorts import (
     INTEGER,
     NATURAL,
@@ -25,25 +27,21 @@ NUMERIC = (IntegerSort, NaturalSort, RealSort)
 
 def alike(left: Sort, right: Sort) -> bool:
     """Whether the sorts are one for a comparison: equal, NATURAL and INTEGER counting as one."""
-    if left == right or (isinstance(left, WHOLE) and isinstance(right, WHOLE)):
-        return True
-    match left, right:
-        case TupleSort(items=a), TupleSort(items=b):
-            return left.labels == right.labels and len(a) == len(b) and all(map(alike, a, b))
-        case SequenceSort(item=a_), SequenceSort(item=b_):
-            return alike(a_, b_)
-    return False
+    return left == right or (isinstance(left, WHOLE) and isinstance(right, WHOLE)) or _in_parts(left, right, alike)
 
 
 def fits(sort: Sort, wanted: Sort) -> bool:
     """Whether every value of `sort` is one of `wanted` as it stands."""
-    if sort == wanted or (sort == NATURAL and wanted == INTEGER):
-        return True
-    match sort, wanted:
+    return sort == wanted or (sort == NATURAL and wanted == INTEGER) or _in_parts(sort, wanted, fits)
+
+
+def _in_parts(left: Sort, right: Sort, same: Callable[[Sort, Sort], bool]) -> bool:
+    """Whether two tuples or sequences are of a kind, and their items are the `same`."""
+    match left, right:
         case TupleSort(items=a), TupleSort(items=b):
-            return sort.labels == wanted.labels and len(a) == len(b) and all(map(fits, a, b))
+            return left.labels == right.labels and len(a) == len(b) and all(map(same, a, b))
         case SequenceSort(item=a_), SequenceSort(item=b_):
-            return fits(a_, b_)
+            return same(a_, b_)
     return False
 
 
@@ -64,19 +62,17 @@ def convert(term: Term, wanted: Sort) -> Term | None:
         return widen(term)
     match term, wanted:
         case TupleTerm(items=items), TupleSort(items=sorts) if _as_record(term.sort, wanted):
-            made = [convert(i, s) for i, s in zip(items, sorts, strict=True)]
-            if all(m is not None for m in made):
-                kept = tuple(m for m in made if m is not None)
-                return replace(term, items=kept, sort=TupleSort(tuple(m.sort for m in kept), wanted.labels))
+            made: list[Term] | None = complete(map(convert, items, sorts))
+            if made is not None:
+                return replace(term, items=tuple(made), sort=TupleSort(tuple(m.sort for m in made), wanted.labels))
         case Conditional(then=then, otherwise=otherwise), _:
             one, other = convert(then, wanted), convert(otherwise, wanted)
             if one is not None and other is not None:
                 return replace(term, then=one, otherwise=other, sort=joined([one, other]))
         case SequenceTerm(items=items), SequenceSort(item=item):
-            made = [convert(i, item) for i in items]
-            if all(m is not None for m in made):
-                kept = tuple(m for m in made if m is not None)
-                return replace(term, items=kept, sort=SequenceSort(joined(list(kept)) if kept else item))
+            made = complete(convert(i, item) for i in items)
+            if made is not None:
+                return replace(term, items=tuple(made), sort=SequenceSort(joined(made) if made else item))
     return None
 
 
@@ -95,12 +91,8 @@ def widest(left: Sort, right: Sort) -> Sort | None:
         return REAL if REAL in (left, right) else INTEGER
     match left, right:
         case TupleSort(items=a), TupleSort(items=b) if _as_record(left, right) or _as_record(right, left):
-            items = [widest(x, y) for x, y in zip(a, b, strict=True)]
-            return (
-                None
-                if None in items
-                else TupleSort(tuple(i for i in items if i is not None), left.labels or right.labels)
-            )
+            items: list[Sort] | None = complete(map(widest, a, b))
+            return None if items is None else TupleSort(tuple(items), left.labels or right.labels)
         case SequenceSort(item=a_), SequenceSort(item=b_):
             item = widest(a_, b_)
             return None if item is None else SequenceSort(item)
@@ -116,9 +108,7 @@ def common(terms: list[Term]) -> list[Term] | None:
         target = widest(target, term.sort) if target is not None else None
     if target is None:
         return None
-    made = [t if alike(t.sort, target) else convert(t, target) for t in terms]
-    kept = [m for m in made if m is not None]
-    return kept if len(kept) == len(made) else None
+    return complete(t if alike(t.sort, target) else convert(t, target) for t in terms)
 
 
 def joined(terms: list[Term]) -> Sort:

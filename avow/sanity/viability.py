@@ -13,9 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
+from avow.base.optional import complete
 from avow.base.tuning.bounds import AHEAD_SIZE, GAME_ANSWERS, GAME_MEMORIES, INPUTS_AHEAD, VIABILITY_ROUNDS
 from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Verdict
+from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, equation, free_variables, negation, substitute
@@ -126,15 +128,11 @@ class Contract:
         wanted = self.promised if region == TRUE else {**self.promised, "memory": self.after(region)}
         known = self.assumed if region == TRUE else {**self.assumed, "memory": region}
         inputs = (*self.remembering.before, *self.inputs)
-        values = [finite_values(v.sort) for v in self.outputs]
-        few = [v for v in values if v is not None]
-        if len(few) == len(values) and math.prod(map(len, few)) <= GAME_ANSWERS:
+        few = combinations([v.sort for v in self.outputs], most=GAME_ANSWERS)
+        if few is not None:
             whole = conjunction(wanted.values())
-            terms = ([value_term(value, v.sort) for value in some] for v, some in zip(self.outputs, few, strict=True))
-            fails = [
-                negation(substitute(whole, dict(zip(self.outputs, choice, strict=True)))) for choice in product(*terms)
-            ]
-            none = [*known.values(), *fails]
+            choices = ({v: value_term(x, v.sort) for v, x in zip(self.outputs, some, strict=True)} for some in few)
+            none = [*known.values(), *(negation(substitute(whole, choice)) for choice in choices)]
             if solve(none, effort=self.effort, seed=self.seed, values="unused").status != "unsat":
                 return False
             self.asked_again([conjunction(none)])
@@ -248,9 +246,8 @@ class _Game:
     def explored(self) -> bool:
         remembering = self.contract.remembering
         ports = (*self.contract.inputs, *self.contract.outputs)
-        found = [finite_values(v.sort) for v in ports]
-        values = [v for v in found if v is not None]
-        if len(values) < len(found) or math.prod(map(len, values)) > GAME_ANSWERS:
+        values = complete(finite_values(v.sort) for v in ports)
+        if values is None or math.prod(map(len, values)) > GAME_ANSWERS:
             return False
         count = len(self.contract.inputs)
         try:
