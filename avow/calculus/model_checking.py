@@ -25,11 +25,10 @@ from avow.calculus.node_outputs import Doubts, Stuck, judge
 from avow.calculus.open_values import Holds
 from avow.calculus.questions import Answer
 from avow.calculus.replaying import completions, holds, truths, unsupported
-from avow.calculus.scenario import CannotRun, restrictions, world
+from avow.calculus.scenario import CannotRun, key, restrictions, world
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Value
 from avow.language.terms import Term
 from avow.solving.limits import spent, tried, until
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
@@ -411,15 +410,9 @@ def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]
         for variable in sorted(free_variables(system_term(frame, state.term)), key=lambda v: v.qualified)
     ]
     given = [values for choices in machine.environment.values() for values in choices]
-    chosen = [name for name in given[0] if len({_key(values[name]) for values in given}) > 1]
+    chosen = [name for name in given[0] if len({key(values[name]) for values in given}) > 1]
     outputs = [f"{node}.{port.name}" for node in machine.order for port in frame.node(node).outputs]
     return list(dict.fromkeys([*about, *chosen, *outputs]))[:STEP_VARIABLES]
-
-
-def _key(value: Value) -> object:
-    from avow.calculus.scenario import key
-
-    return key(value)
 
 
 def _cannot_run(frame: Frame, name: str, formula: Property, reason: str) -> Answer:

@@ -116,7 +116,8 @@ def possible(world: World, node: str, port: Port) -> Choices:
                 return Choices(world.candidates(node, port), natural=isinstance(sort, NaturalSort))
     except CannotRun as reason:
         shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]
-        return Choices(None, str(reason), shells, natural=isinstance(_values_of(sort), NaturalSort))
+        at_a_point = sort.result if isinstance(sort, FunctionSort) else sort
+        return Choices(None, str(reason), shells, natural=isinstance(at_a_point, NaturalSort))
 
 
 def _are_all(values: Sequence[Value], sort: Sort) -> bool:
@@ -244,7 +245,8 @@ class Answerer:
     ) -> tuple[Values, ...]:
         """Relations and plain outputs together; or the relations alone, if other outputs cannot be put to Z3 so."""
         plain = [(port, self.choices[name].values) for name, port in self.others.items()]
-        together = [(port, values) for port, values in plain if values is not None and not _is_lazy(port)]
+        lazy = FunctionSort | SequenceSort
+        together = [(port, values) for port, values in plain if values is not None and not isinstance(port.sort, lazy)]
         alone = len(together) < len(plain)
         own = {port.variable for port, _ in searched} | {p.variable for p, *_ in self.defined}
         constraints = [] if free else [clause.formula for clause in self.node.guarantees]
@@ -302,14 +304,6 @@ class Answerer:
         except (Unsupported, z3.Z3Exception):
             pass
         return Stuck(node.name, shown, names, False)
-
-
-def _values_of(sort: Sort) -> Sort:
-    return sort.result if isinstance(sort, FunctionSort) else sort
-
-
-def _is_lazy(port: Port) -> bool:
-    return isinstance(port.sort, FunctionSort | SequenceSort)
 
 
 def known_of(translator: Translator, variable: Variable, value: Value) -> list[object]:

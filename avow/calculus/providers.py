@@ -145,11 +145,12 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             verdict, text = Verdict.ERROR, CONTRADICTED
         case "unsat" if about in answer.core:
             others = [label for label in answer.core if label != about]
-            verdict, text = Verdict.REFUTED, f"no provider can meet it: {listing(others)} {_exclude(others)} it"
+            verb = "excludes" if len(others) == 1 else "exclude"
+            verdict, text = Verdict.REFUTED, f"no provider can meet it: {listing(others)} {verb} it"
         case "unsat":
             # The providers' own contracts leave no room for anything: a finding of theirs.
             verdict, text = Verdict.REFUTED, f"{listing(answer.core)} cannot hold together: no value comes from there"
-            because = f"{_owner(answer.core)}/consistent"
+            because = f"{answer.core[0].partition('.')[0]}/consistent"
         case "unknown":
             verdict, text = Verdict.UNKNOWN, answer.reason
         case _:
@@ -170,11 +171,3 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
         seconds=answer.seconds,
         span=claim.span,
     )
-
-
-def _exclude(labels: Sequence[str]) -> str:
-    return "excludes" if len(labels) == 1 else "exclude"
-
-
-def _owner(labels: Iterable[str]) -> str:
-    return next(iter(labels)).partition(".")[0]

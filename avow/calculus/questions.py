@@ -198,15 +198,12 @@ def _why(frame: Frame, settled: Settled) -> str:
 
 
 def _induction_fails(condition: SideCondition, case: Case) -> str:
-    at = f" at {', '.join(f'{name} = {value}' for name, value in shown)}" if (shown := _few(case)) else ""
+    shown = case.counterexample.values[:6] if case.counterexample is not None else ()
+    at = f" at {', '.join(f'{name} = {value}' for name, value in shown)}" if shown else ""
     return (
         f"not inductive: {condition.about} holds at the first step, but induction fails{at}: that such a step is ever "
         "reached is not shown"
     )
-
-
-def _few(case: Case) -> tuple[tuple[str, str], ...]:
-    return case.counterexample.values[:6] if case.counterexample is not None else ()
 
 
 def _why_not(condition: SideCondition, case: Case) -> str:

@@ -54,7 +54,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
-        own = analyse(node, system.contract, scenario=scenario, ranges=found[node.name], bounds=bounds)
+        own = analyse(node, scenario=scenario, ranges=found[node.name], bounds=bounds)
         return own + providers.settle(linked[node.name], node, bounds)
 
     whole = frame(system)

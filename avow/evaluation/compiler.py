@@ -382,7 +382,7 @@ def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
             return _members(items, domains)
         case DataSort(constructors=constructors):
             made = {c.name: test for c in constructors if (test := _members(c.parameters, domains)) is not None}
-            return (lambda value: made.get(value.constructor, _all_belong)(value.arguments)) if made else None
+            return (lambda value: made.get(value.constructor, lambda _: True)(value.arguments)) if made else None
         case SequenceSort(item=item):
             each = member_of(item, domains)
             return None if each is None else lambda value: all(map(each, value.items))
@@ -395,7 +395,3 @@ def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
 def _members(sorts: Sequence[Sort], domains: Domains) -> Callable[[Any], bool] | None:
     tests = [(k, test) for k, sort in enumerate(sorts) if (test := member_of(sort, domains)) is not None]
     return (lambda values: all(test(values[k]) for k, test in tests)) if tests else None
-
-
-def _all_belong(_: Any) -> bool:
-    return True

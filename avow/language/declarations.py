@@ -62,7 +62,7 @@ from avow.language.syntax import (
     unparenthesised,
     walk,
 )
-from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Term, Variable
+from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
 
 
 @dataclass(slots=True)
@@ -101,8 +101,9 @@ class Declarations:
             new = _Declared(tree, reports)
             old = self.declared.get(new.name.text)
             if old is None:
-                for element in _elements(tree):
-                    self.owners.setdefault(element, new.name.text)
+                for part in walk(tree):
+                    if isinstance(part, Element):
+                        self.owners.setdefault(part.name.text, new.name.text)
                 self.declared[new.name.text] = new
             elif old.reports is reports or not _same_text(old, new):
                 name = new.name.text
@@ -235,7 +236,7 @@ class Declarations:
         term = Checker(Scope(environment), declared.reports).term(value)
         if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
             return
-        if term is not None and _has_quantifier(term):
+        if term is not None and any(isinstance(part, Quantified) for part in subterms(term)):
             message = "a constant is a value: no quantifier stands in it"
             declared.reports.error("RCL220", message, value.start, value.end, hint="write the formula where it is used")
             term = None
@@ -446,15 +447,6 @@ def _same_set(known: Sort, new: EnumSort | DataSort) -> bool:
 
 def _same_text(one: _Declared, other: _Declared) -> bool:
     return flat(one.tree) == flat(other.tree)
-
-
-def _has_quantifier(term: Term) -> bool:
-    return any(isinstance(part, Quantified) for part in subterms(term))
-
-
-def _elements(tree: Declaration) -> set[str]:
-    """Every element and constructor that a declaration's types write down."""
-    return {part.name.text for part in walk(tree) if isinstance(part, Element)}
 
 
 def _names(tree: Syntax) -> set[str]:

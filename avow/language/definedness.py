@@ -15,6 +15,7 @@ from typing import assert_never
 
 from avow.base.tuning.bounds import GUARDS
 from avow.language.bounds import constant
+from avow.language.operators import OPPOSITE
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import subterms
 from avow.language.terms import (
@@ -239,7 +240,7 @@ def _denial(term: Term) -> Term:
         case Implies(left=left, right=right):
             return _all((left, _denial(right)))
         case Compare(operator=sign, left=left, right=right):
-            return Compare(_DENIED[sign], left, right, term.span)
+            return Compare(OPPOSITE[sign], left, right, term.span)
         case Literal(value=bool() as value):
             return FALSE if value else TRUE
     return Not(term, term.span)
@@ -250,7 +251,6 @@ def _denial(term: Term) -> Term:
 _Sum = dict[Term, Fraction]
 _ONE = Literal(1, INTEGER)
 """Its coefficient is the constant of a sum."""
-_DENIED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 
 
 def _follows(goal: Compare, facts: Facts) -> bool:
@@ -279,7 +279,7 @@ def _below(fact: Term) -> list[_Sum]:
             return [_added(_sum(left), _times(_sum(right), -1), _strict(sign, left, right))]
         case Compare(operator=">" | ">=" as sign, left=left, right=right):
             return _below(Compare("<" if sign == ">" else "<=", right, left))
-        case Compare(operator="==", left=left, right=right) if _is_number(left):
+        case Compare(operator="==", left=left, right=right) if left.sort in (INTEGER, NATURAL, REAL):
             return [*_below(Compare("<=", left, right)), *_below(Compare("<=", right, left))]
         case Compare(operator="!=", left=left, right=right):
             for one, other in ((left, right), (right, left)):
@@ -301,10 +301,6 @@ def _strict(sign: str, left: Term, right: Term) -> _Sum:
         return {}
     whole = all(part.sort in (INTEGER, NATURAL) for part in (left, right))
     return {_ONE: Fraction(1)} if whole else {_TINY: Fraction(1)}
-
-
-def _is_number(term: Term) -> bool:
-    return term.sort in (INTEGER, NATURAL, REAL)
 
 
 def _sum(term: Term) -> _Sum:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import assert_never
 
-from avow.language.lexer import Token
 from avow.language.syntax import (
     Application,
     Binder,
@@ -114,7 +113,7 @@ def flat(tree: Syntax) -> str:
         case Lasting(word=word, left=one, limit=bound, right=other):
             return f"{flat(one)} {word}{'' if bound is None else flat(bound)} {flat(other)}"
         case Binder(names=names, domain=domain):
-            return f"{_texts(names)} in {flat(domain)}"
+            return f"{', '.join(name.text for name in names)} in {flat(domain)}"
         case FunctionType(parameters=left, result=right):
             return f"{flat(left)} --> {flat(right)}"
         case ProductType(factors=factors, signs=signs):
@@ -154,10 +153,6 @@ def quantifier_head(tree: Quantification) -> str:
 
 def _listed(trees: Iterable[Syntax]) -> str:
     return ", ".join(map(flat, trees))
-
-
-def _texts(names: Iterable[Token]) -> str:
-    return ", ".join(name.text for name in names)
 
 
 def _between(trees: Sequence[Syntax], signs: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, assert_never
 
 from avow.base.codec import document, plain
@@ -177,16 +178,6 @@ def _factor(sort: Sort, names: Mapping[str, Sort]) -> str:
 # --- for people ------------------------------------------------------------------------------------------------------
 
 
-def _to_text(contract: Contract) -> str:
-    """The contract in words."""
-    return _for_people(contract, "text")
-
-
-def _to_unicode(contract: Contract) -> str:
-    """The contract in mathematical signs."""
-    return _for_people(contract, "unicode")
-
-
 def _for_people(contract: Contract, style: StyleName) -> str:
     out: list[str] = []
     if contract.types:
@@ -276,8 +267,8 @@ def _data(value: Any) -> Any:
 
 FORMATS: dict[str, Callable[[Contract], str]] = {
     "rcl": to_rcl,
-    "text": _to_text,
-    "unicode": _to_unicode,
+    "text": partial(_for_people, style="text"),
+    "unicode": partial(_for_people, style="unicode"),
     "latex": to_latex,
     "json": to_json,
 }

@@ -158,7 +158,7 @@ def main(parent: int) -> None:
                 result.counterexample.text() if result.counterexample is not None else "",
                 result.because or "",
             )
-            for result in analyse(node, contract)
+            for result in analyse(node)
         )
         print(canonical(to_json((key, answers))), flush=True)
 

@@ -20,7 +20,7 @@ from avow.formulas.finite import Ranges
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
-from avow.language.contract import ClauseKind, Contract, Node
+from avow.language.contract import ClauseKind, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
@@ -50,7 +50,6 @@ Given = Mapping[Variable, Value]
 
 def analyse(
     node: Node,
-    contract: Contract | None = None,
     *,
     scenario: Given | None = None,
     ranges: Ranges | None = None,
@@ -61,8 +60,6 @@ def analyse(
     them is asked all the same: claims that stay open leave less effort for later ones, and no answer is to depend on
     what is wanted. `scenario` fixes some inputs, `ranges` says which few values others (and quantified variables) have,
     where no answer for all is found.
-
-    `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
     """
     from avow.solving.translation import translating_once
 
@@ -257,7 +254,8 @@ class _Analysis:
             if allowed.verdict is Verdict.REFUTED:
                 return Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
             verdict = Verdict.CHECKED if bounded else Verdict.PROVED
-            return Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
+            given = f"given {listing(answer.needed)}" if answer.needed else ""
+            return Finding(verdict, given, answer.needed, engine=answer.engine, bounded=bounded)
         if answer.verdict is not Verdict.REFUTED:
             return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
         found, complete = conflicts(
@@ -319,9 +317,8 @@ class _Analysis:
             because = "assumptions-satisfiable" if empty else self._if_refuted(f"not-tautological-{name}")
             clauses = tuple(c for c in first.clauses if c in self.assumptions)
             text = "what it demands is never demanded: its condition cannot come about"
-            return Finding(
-                Verdict.REFUTED, text + _given(clauses), (name, *clauses), because=because, engine=first.engine
-            )
+            text += f" (given {listing(clauses)})" if clauses else ""
+            return Finding(Verdict.REFUTED, text, (name, *clauses), because=because, engine=first.engine)
         return undecided or Finding(Verdict.PROVED)
 
     def _not_redundant(self, name: str) -> Finding:
@@ -485,11 +482,3 @@ def _are_endless(formulas: Iterable[Term]) -> bool:
     sorts = {v.sort for formula in formulas for v in free_variables(formula)}
     parameters = {p for sort in sorts if isinstance(sort, FunctionSort) for p in sort.parameters}
     return any(isinstance(p, RealSort | IntegerSort | NaturalSort) for p in parameters)
-
-
-def _resting(needed: tuple[str, ...]) -> str:
-    return f"given {listing(needed)}" if needed else ""
-
-
-def _given(clauses: tuple[str, ...]) -> str:
-    return f" (given {listing(clauses)})" if clauses else ""

@@ -111,7 +111,7 @@ def _here(term: Term) -> Iterator[tuple[str, Term]]:
             step: int | Fraction = max(1, abs(int(value)) // 10)
             for new in (value + step, value - step):
                 if isinstance(sort, RealSort) or new >= 0 or value < 0:
-                    yield f"{_number(value)} becomes {_number(new)}", _literal(new, term)
+                    yield f"{value} becomes {new}", _literal(new, term)
         case EnumValue(name=name, sort=EnumSort(members=members) as sort) if len(members) > 1:
             other = members[(members.index(name) + 1) % len(members)]
             yield f"{name} becomes {other}", EnumValue(other, sort, term.span)
@@ -148,7 +148,3 @@ def _literal(value: int | Fraction, old: Literal) -> Term:
     if isinstance(old.sort, RealSort):
         return Literal(Fraction(value), REAL, old.span)
     return Literal(int(value), old.sort, old.span)
-
-
-def _number(value: int | Fraction) -> str:
-    return str(value)

@@ -17,7 +17,7 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
-from avow.sanity.witnesses import Cases, Fixed, Witness, applied, instantiate, meanings_of, witnesses
+from avow.sanity.witnesses import Fixed, Witness, applied, instantiate, meanings_of, witnesses
 from avow.solving.limits import allowed, effort_left, spend, spent, tried, until
 from avow.solving.questions import Translator, Unsupported, check, entails, search_tables, solve
 from avow.solving.replay import replay
@@ -312,8 +312,6 @@ def _mentioned(witness: Witness) -> frozenset[Variable]:
     found: frozenset[Variable] = frozenset()
     for value in witness.values():
         match value:
-            case Cases(body=body, cases=cases):
-                found = found.union(free_variables(body), *(free_variables(t) for case in cases for t in case))
             case Definition(body=body):
                 found |= free_variables(body)
             case Fixed():

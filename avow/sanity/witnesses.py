@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import chain, islice, pairwise, product
+from itertools import islice, pairwise, product
 from typing import assert_never
 
 from avow.base.tuning.bounds import WITNESS_ARGUMENTS, WITNESSES, WITNESSES_PER_OUTPUT
@@ -67,17 +67,6 @@ from avow.solving.z3_module import z3
 
 
 @dataclass(frozen=True, slots=True)
-class Cases(Definition):
-    """A function by cases: the first whose condition holds, else the default."""
-
-    cases: tuple[tuple[Term, Term], ...] = ()
-
-    @property
-    def default(self) -> Term:
-        return self.body
-
-
-@dataclass(frozen=True, slots=True)
 class Fixed:
     """A concrete value."""
 
@@ -121,9 +110,9 @@ def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Ter
 
 
 def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Iterable[Term | Definition]:
+    parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
     if sort.result == BOOL:
         lower, upper = found.lower.get(function, []), found.upper.get(function, [])
-        parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
         least = Definition(parameters, disjunction(_at(d, parameters) for d in lower))
         most = Definition(parameters, conjunction(negation(_at(d, parameters)) for d in upper))
         yield least
@@ -135,14 +124,14 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
         yield Definition(parameters, FALSE)
         yield Definition(parameters, TRUE)
         return
-    parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
     yield from dict.fromkeys(_partly_applied(found, parameters, sort))
     branches = found.branches.get(function, [])
     for default in _ground(found, sort.result)[:8]:
-        cases = tuple(
-            (_at(d, parameters), substitute(v, dict(zip(d.parameters, parameters, strict=True)))) for d, v in branches
-        )
-        yield Cases(parameters, default, cases)
+        whole = default  # the first case whose condition holds, else that
+        for d, v in reversed(branches):
+            value = substitute(v, dict(zip(d.parameters, parameters, strict=True)))
+            whole = Conditional(_at(d, parameters), value, whole, sort.result)
+        yield Definition(parameters, whole)
     if branches:
         for value in _ground(found, sort.result)[:4]:
             yield Definition(parameters, value)
@@ -257,10 +246,7 @@ def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) ->
         if not isinstance(value, Definition):
             witness[output] = terms[output]
             continue
-        parts = (
-            [value.body, *(part for case in value.cases for part in case)] if isinstance(value, Cases) else [value.body]
-        )
-        if any(free_variables(part) & outputs - set(terms) for part in parts):
+        if free_variables(value.body) & outputs - set(terms):
             return None  # a function defined by another function that is an output: not tried
         witness[output] = value
     return witness
@@ -306,13 +292,9 @@ def applied(formula: Term, witness: Witness) -> Term:
         if not isinstance(part, Apply) or part.function not in defined:
             return part
         definition = defined[part.function]
-        whole = definition.body
-        for condition, value in reversed(definition.cases if isinstance(definition, Cases) else ()):
-            whole = Conditional(condition, value, whole, part.sort)
-        return substitute(whole, dict(zip(definition.parameters, part.arguments, strict=True)))
+        return substitute(definition.body, dict(zip(definition.parameters, part.arguments, strict=True)))
 
-    terms = (term for d in defined.values() for term in (d.body, *chain(*(d.cases if isinstance(d, Cases) else ()))))
-    return transform(rename_apart(formula, {v.name for term in terms for v in free_variables(term)}), at)
+    return transform(rename_apart(formula, {v.name for d in defined.values() for v in free_variables(d.body)}), at)
 
 
 def meanings_of(
@@ -339,12 +321,6 @@ def _function(
     translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
 ) -> Callable[..., Expr]:
     def function(*arguments: Expr) -> Expr:
-        bound = dict(zip(definition.parameters, arguments, strict=True))
-        if not isinstance(definition, Cases):
-            return translator.term(definition.body, meanings, bound)
-        result = translator.term(definition.default, meanings, bound)
-        for condition, value in reversed(definition.cases):
-            result = z3.If(translator.term(condition, meanings, bound), translator.term(value, meanings, bound), result)
-        return result
+        return translator.term(definition.body, meanings, dict(zip(definition.parameters, arguments, strict=True)))
 
     return function

@@ -244,12 +244,10 @@ def _real_polynomials(exprs: Iterable[Expr]) -> bool:
     plain = all(z3.is_bool(e) or z3.is_real(e) for e in parts) and not any(map(_is_applied, parts))
     divided = any(z3.is_div(e) and not z3.is_rational_value(e.arg(1)) for e in parts)
     return (
-        plain and not divided and any(z3.is_mul(e) and sum(not _is_number(a) for a in e.children()) > 1 for e in parts)
+        plain
+        and not divided
+        and any(z3.is_mul(e) and sum(not z3.is_rational_value(a) for a in e.children()) > 1 for e in parts)
     )
-
-
-def _is_number(expr: Expr) -> bool:
-    return bool(z3.is_rational_value(expr))
 
 
 def _is_applied(expr: Expr) -> bool:

@@ -167,7 +167,7 @@ def test_with_next_to_no_effort_the_analysis_of_a_node_ends_at_once(effort: int,
     contract = load_path(root / "contracts" / "remote_inspection").contract
     agent = next(node for node in contract.nodes if node.name == "agent")
     before = spent()
-    results = analyse(agent, contract, bounds=Bounds(effort))
+    results = analyse(agent, bounds=Bounds(effort))
     assert spent() - before < 400
     realizable = next(r for r in results if r.name == "realizable")
     assert realizable.verdict is Verdict.UNKNOWN
