@@ -9,16 +9,7 @@ from avow.calculus.variables import Frame
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.contract import Node, Port
-from avow.language.sorts import (
-    BoolSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    Sort,
-    StringSort,
-)
+from avow.language.sorts import BoolSort, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.terms import Variable
 from avow.system.plan import Scenario
 

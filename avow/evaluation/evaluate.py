@@ -16,12 +16,7 @@ from avow.evaluation.quantifier_search import Plan, Search
 from avow.formulas.disjunctions import Part
 from avow.formulas.renaming import rename_apart
 from avow.formulas.values import Value
-from avow.language.terms import (
-    Quantified,
-    Quantifier,
-    Term,
-    Variable,
-)
+from avow.language.terms import Quantified, Quantifier, Term, Variable
 
 __all__ = [
     "Domains",

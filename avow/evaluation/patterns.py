@@ -11,16 +11,7 @@ from avow.formulas import values
 from avow.formulas.renaming import bound_names
 from avow.formulas.values import Data
 from avow.language.sorts import IntegerSort, NaturalSort
-from avow.language.terms import (
-    Arithmetic,
-    Construct,
-    Negative,
-    SequenceTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
+from avow.language.terms import Arithmetic, Construct, Negative, SequenceTerm, Term, TupleTerm, Variable, Widen
 
 Match = Callable[[Env, Any], bool]
 """Whether the value fits the pattern; binds the pattern's variables where it does."""

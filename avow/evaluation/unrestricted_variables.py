@@ -22,14 +22,7 @@ from avow.evaluation.linear_search import linear_step
 from avow.formulas import values
 from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, FunctionValue
-from avow.language.sorts import (
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    Sort,
-    StringSort,
-    components,
-)
+from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort, StringSort, components
 from avow.language.subterms import subterms
 from avow.language.terms import (
     Apply,

@@ -14,16 +14,7 @@ from typing import Literal
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import ASSIGNMENTS_SAMPLED, LETTERS_EXHAUSTED, SAMPLES_BY_SIZE
 from avow.base.tuning.shown import FORMULA_PARTS
-from avow.language.syntax import (
-    Connective,
-    Negation,
-    Parentheses,
-    Sign,
-    Syntax,
-    TermSyntax,
-    Truth,
-    children,
-)
+from avow.language.syntax import Connective, Negation, Parentheses, Sign, Syntax, TermSyntax, Truth, children
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,16 +10,7 @@ from avow.language.check_names import Names
 from avow.language.conversions import WHOLE, common, joined
 from avow.language.operators import OPERATORS, Mistyped, operation
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    INTEGER,
-    NATURAL,
-    EnumSort,
-    FunctionSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    TupleSort,
-)
+from avow.language.sorts import INTEGER, NATURAL, EnumSort, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.syntax import (
     Application,
     BuiltinName,

@@ -10,13 +10,7 @@ from avow.language.conversions import convert
 from avow.language.lexer import Token
 from avow.language.printer import show_sort
 from avow.language.scope import Scope
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    FunctionSort,
-    Sort,
-)
+from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, Sort
 from avow.language.source import Reports
 from avow.language.syntax import Syntax, TermSyntax
 from avow.language.terms import Construct, EnumValue, Past, Term

@@ -27,18 +27,7 @@ from avow.language.syntax import (
     TermSyntax,
     unparenthesised,
 )
-from avow.language.terms import (
-    RESPONSES,
-    Arithmetic,
-    History,
-    Limit,
-    Literal,
-    Past,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
+from avow.language.terms import RESPONSES, Arithmetic, History, Limit, Literal, Past, Quantifier, Role, Term, Variable
 
 _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
 _PLACE = "a response stands as the whole right side of a clause's outermost `->`, or is the clause"

@@ -11,26 +11,9 @@ from avow.language.check_base import Base
 from avow.language.foreign import FIELDS, FOREIGN_NAMES
 from avow.language.lexer import KEYWORDS, unquote
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    REAL,
-    STRING,
-    EnumSort,
-    Sort,
-    TupleSort,
-)
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, STRING, EnumSort, Sort, TupleSort
 from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, Text
-from avow.language.terms import (
-    Construct,
-    EnumValue,
-    Item,
-    Literal,
-    Role,
-    Term,
-    Variable,
-)
+from avow.language.terms import Construct, EnumValue, Item, Literal, Role, Term, Variable
 
 BUILTINS: dict[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
 

@@ -10,17 +10,7 @@ from avow.language.check_applications import Applications
 from avow.language.conversions import NUMERIC, alike, common, convert, joined
 from avow.language.lexer import Token
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    REAL,
-    STRING,
-    EnumSort,
-    FunctionSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-)
+from avow.language.sorts import BOOL, INTEGER, REAL, STRING, EnumSort, FunctionSort, SequenceSort, SetSort, Sort
 from avow.language.syntax import (
     Calculation,
     Comparison,
@@ -33,16 +23,7 @@ from avow.language.syntax import (
     TupleDisplay,
     unparenthesised,
 )
-from avow.language.terms import (
-    And,
-    Compare,
-    In,
-    Literal,
-    Negative,
-    Not,
-    SetTerm,
-    Term,
-)
+from avow.language.terms import And, Compare, In, Literal, Negative, Not, SetTerm, Term
 
 _ORDERINGS = frozenset(("<", "<=", ">", ">="))
 _OPERATORS = {"EQ": "==", "NE": "!=", "LE": "<=", "GE": ">=", "LT": "<", "GT": ">"}

@@ -13,6 +13,7 @@ from typing import assert_never
 from avow.base.diagnostics import Span
 from avow.base.optional import complete
 from avow.base.suggestions import did_you_mean
+from avow.language import syntax
 from avow.language.chains import equivalence, implication
 from avow.language.check_definitions import Definitions
 from avow.language.check_names import BUILTINS
@@ -20,115 +21,65 @@ from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.operators import conditional
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    BOOL,
-    REAL,
-    FunctionSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    TupleSort,
-)
-from avow.language.syntax import (
-    Application,
-    BuiltinName,
-    Calculation,
-    Comparison,
-    Connective,
-    FieldOf,
-    IfThenElse,
-    Lasting,
-    Limited,
-    Minus,
-    Name,
-    Negation,
-    NodePort,
-    Number,
-    PaceSyntax,
-    Parentheses,
-    PortName,
-    Quantification,
-    Quantity,
-    RangeDisplay,
-    SequenceDisplay,
-    SetDisplay,
-    Sign,
-    TermSyntax,
-    Text,
-    Truth,
-    TupleDisplay,
-    unparenthesised,
-)
-from avow.language.terms import (
-    And,
-    Implies,
-    In,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
+from avow.language.sorts import BOOL, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.terms import And, Implies, In, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
 
 
 class Checker(Definitions):
     """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
 
-    def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
+    def term(self, tree: syntax.TermSyntax, expected: Sort | None = None) -> Term | None:
         match tree:
-            case PortName(role=role, name=name):
+            case syntax.PortName(role=role, name=name):
                 return self.port(Role(role), name, tree)
-            case Name():
+            case syntax.Name():
                 return self.name(tree, expected)
-            case FieldOf(body=body, name=name):
+            case syntax.FieldOf(body=body, name=name):
                 return self.field(self.term(body), name.text, tree)
-            case Parentheses(body=body):
+            case syntax.Parentheses(body=body):
                 return self.term(body, expected)
-            case Comparison():
+            case syntax.Comparison():
                 return self.comparison(tree)
-            case Connective():
+            case syntax.Connective():
                 return self.connective(tree)
-            case Application():
+            case syntax.Application():
                 return self.application(tree)
-            case Number():
+            case syntax.Number():
                 return self.number(tree, self.span(tree))
-            case Truth(value=value):
+            case syntax.Truth(value=value):
                 return Literal(value, BOOL, self.span(tree))
-            case Negation(body=negated):
+            case syntax.Negation(body=negated):
                 formula = self.formula(negated)
                 return None if formula is None else Not(formula, self.span(tree))
-            case Calculation():
+            case syntax.Calculation():
                 return self.arithmetic(tree)
-            case Minus():
+            case syntax.Minus():
                 return self.negative(tree)
-            case Quantification():
+            case syntax.Quantification():
                 return self.quantified(tree)
-            case IfThenElse():
+            case syntax.IfThenElse():
                 return self.if_then_else(tree, expected)
-            case Limited():
+            case syntax.Limited():
                 return self.limited(tree)
-            case PaceSyntax():
+            case syntax.PaceSyntax():
                 return self.pace(tree)
-            case Lasting():
+            case syntax.Lasting():
                 return self.lasting(tree)
-            case Quantity():
+            case syntax.Quantity():
                 return self.quantity(tree)
-            case NodePort():
+            case syntax.NodePort():
                 return self.node_port(tree)
-            case TupleDisplay():
+            case syntax.TupleDisplay():
                 return self.tuple_of(tree, expected)
-            case SetDisplay():
+            case syntax.SetDisplay():
                 return self.set_of(tree, expected)
-            case SequenceDisplay():
+            case syntax.SequenceDisplay():
                 return self.sequence(tree, expected)
-            case RangeDisplay():
+            case syntax.RangeDisplay():
                 return self.range_of(tree)
-            case Text():
+            case syntax.Text():
                 return self.string(tree)
-            case BuiltinName():
+            case syntax.BuiltinName():
                 self.builtin(tree)
                 return None
             case _:
@@ -136,24 +87,24 @@ class Checker(Definitions):
 
     # --- connectives -------------------------------------------------------------------------------------------------
 
-    def connective(self, tree: Connective) -> Term | None:
+    def connective(self, tree: syntax.Connective) -> Term | None:
         made: list[Term] | None = complete([self.formula(t) for t in tree.items])
         if made is None:
             return None
         items = tuple(made)
         match tree.sign:
-            case Sign.AND:
+            case syntax.Sign.AND:
                 return And(items, self.span(tree))
-            case Sign.OR:
+            case syntax.Sign.OR:
                 return Or(items, self.span(tree))
-            case Sign.IMPLIES:
+            case syntax.Sign.IMPLIES:
                 return implication(items, self.places(tree.items))
-            case Sign.IFF:
+            case syntax.Sign.IFF:
                 return equivalence(items, self.places(tree.items))
             case _:
                 assert_never(tree.sign)
 
-    def if_then_else(self, tree: IfThenElse, expected: Sort | None) -> Term | None:
+    def if_then_else(self, tree: syntax.IfThenElse, expected: Sort | None) -> Term | None:
         condition = self.formula(tree.condition)
         then, otherwise = self.term(tree.then, expected), self.term(tree.otherwise, expected)
         if condition is None or then is None or otherwise is None:
@@ -174,7 +125,7 @@ class Checker(Definitions):
 
     # --- quantifiers -------------------------------------------------------------------------------------------------
 
-    def quantified(self, tree: Quantification) -> Term | None:
+    def quantified(self, tree: syntax.Quantification) -> Term | None:
         quantifier = tree.quantifier
         variables: list[Variable] = []
         guards: list[Term] = []
@@ -223,9 +174,9 @@ class Checker(Definitions):
         self.error("RCL207", f"`{name.text}` is already {what}", name, hint=hint, notes=notes)
         return False
 
-    def domain(self, tree: TermSyntax) -> tuple[Sort, Term | None] | None:
+    def domain(self, tree: syntax.TermSyntax) -> tuple[Sort, Term | None] | None:
         """What a quantified variable ranges over: a sort, and the set or sequence of it where it is less than that."""
-        tree = unparenthesised(tree)
+        tree = syntax.unparenthesised(tree)
         sort = self.type_in_term(tree)
         if sort is not None:
             if isinstance(sort, FunctionSort):
@@ -233,7 +184,7 @@ class Checker(Definitions):
                 self.error("RCL310", message, tree, hint="RCL is first-order logic")
                 return None
             return sort, None
-        if isinstance(tree, Name) and self.scope.taken(tree.text) is None:
+        if isinstance(tree, syntax.Name) and self.scope.taken(tree.text) is None:
             name = tree.text
             if not self.scope.is_broken(name):
                 environment = self.scope.environment
@@ -242,7 +193,7 @@ class Checker(Definitions):
                 hint = f"did you mean `{near}`?" if near else did_you_mean(name, known)
                 self.error("RCL208", f"the type or set `{name}` is not declared", tree, hint=hint)
             return None
-        if isinstance(tree, PortName) and self.scope.environment.sort(tree.name) is not None:
+        if isinstance(tree, syntax.PortName) and self.scope.environment.sort(tree.name) is not None:
             role, name = tree.role, tree.name
             if name not in self.scope.ports(Role(role)):
                 message = f"`{name}` is declared in the context, not an {'input' if role == 'in' else 'output'}"
@@ -255,17 +206,17 @@ class Checker(Definitions):
         assert isinstance(sort, SetSort | SequenceSort)
         return sort.item, collection
 
-    def type_in_term(self, tree: TermSyntax) -> Sort | None:
+    def type_in_term(self, tree: syntax.TermSyntax) -> Sort | None:
         """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None where it names none."""
         match tree:
-            case BuiltinName(text=text):
+            case syntax.BuiltinName(text=text):
                 return BUILTINS.get(text, REAL)
-            case Name(text=name):
+            case syntax.Name(text=name):
                 return None if name in self.scope.bound else self.scope.environment.sort(name)
-            case TupleDisplay(items=parts):
+            case syntax.TupleDisplay(items=parts):
                 items = [self.type_in_term(t) for t in parts]
                 return TupleSort(tuple(i for i in items if i is not None)) if all(items) else None
-            case SequenceDisplay(items=(only,)):
+            case syntax.SequenceDisplay(items=(only,)):
                 item = self.type_in_term(only)
                 return None if item is None else SequenceSort(item)
             case _:  # a term that names no sort

@@ -14,6 +14,7 @@ from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
+from avow.language import syntax
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment
@@ -35,39 +36,12 @@ from avow.language.sorts import (
 )
 from avow.language.source import Reports, Source
 from avow.language.subterms import subterms
-from avow.language.syntax import (
-    Binder,
-    BuiltinType,
-    ConstantDeclaration,
-    Declaration,
-    Define,
-    Element,
-    FunctionType,
-    Name,
-    NamedType,
-    NodePort,
-    PortDeclaration,
-    PortName,
-    ProductType,
-    RecordType,
-    SequenceType,
-    SetDisplay,
-    SetType,
-    Syntax,
-    TermSyntax,
-    TupleType,
-    TypeDeclaration,
-    TypeSyntax,
-    UnspecifiedType,
-    unparenthesised,
-    walk,
-)
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
 
 
 @dataclass(slots=True)
 class _Declared:
-    tree: Declaration
+    tree: syntax.Declaration
     reports: Reports
     state: str = "new"
     """new, open (being elaborated: meeting it again is a circle), or done."""
@@ -94,15 +68,15 @@ class Declarations:
     open: int = 0
     """How many declarations wait for one that they refer to."""
 
-    def add(self, trees: Sequence[Declaration], reports: Reports) -> None:
+    def add(self, trees: Sequence[syntax.Declaration], reports: Reports) -> None:
         for tree in trees:
             if reports.full:
                 return
             new = _Declared(tree, reports)
             old = self.declared.get(new.name.text)
             if old is None:
-                for part in walk(tree):
-                    if isinstance(part, Element):
+                for part in syntax.walk(tree):
+                    if isinstance(part, syntax.Element):
                         self.owners.setdefault(part.name.text, new.name.text)
                 self.declared[new.name.text] = new
             elif old.reports is reports or not _same_text(old, new):
@@ -117,7 +91,7 @@ class Declarations:
 
     def elaborate(self) -> None:
         for name, declared in self.declared.items():
-            if name in ("length", "indices") and (name == "length" or isinstance(declared.tree, Define)):
+            if name in ("length", "indices") and (name == "length" or isinstance(declared.tree, syntax.Define)):
                 declared.reports.error("RCL209", f"`{name}` is built in", declared.name.start, declared.name.end)
         for declared in self.declared.values():
             self.resolve(declared)
@@ -147,16 +121,16 @@ class Declarations:
         declared.state = "open"
         self.open += 1
         match declared.tree:
-            case TypeDeclaration(type=type_):
+            case syntax.TypeDeclaration(type=type_):
                 sort = self.type_of(type_, declared.reports, name)
                 if sort is None:
                     environment.broken.add(name)
                     environment.broken.update(_names(type_))
                 elif self.is_small(name, sort_extent(sort), declared.name, declared.reports):
                     environment.types[name] = sort
-            case ConstantDeclaration(value=value):
-                self.constant(declared, unparenthesised(value))
-            case Define():
+            case syntax.ConstantDeclaration(value=value):
+                self.constant(declared, syntax.unparenthesised(value))
+            case syntax.Define():
                 self.define(declared.tree, declared.reports, self.definitions, Scope(environment, bare=False))
             case _:
                 assert_never(declared.tree)
@@ -179,7 +153,7 @@ class Declarations:
 
     # --- definitions -------------------------------------------------------------------------------------------------
 
-    def define(self, tree: Define, reports: Reports, into: dict[str, Defined], scope: Scope) -> None:
+    def define(self, tree: syntax.Define, reports: Reports, into: dict[str, Defined], scope: Scope) -> None:
         """A definition by its name, its parameters read; its body is checked when it is looked up."""
         parameters: dict[str, Variable] = {}
         sound = True
@@ -206,10 +180,16 @@ class Declarations:
         waiting, seen = [name], {name}
         while waiting:
             tree = self.definitions[waiting.pop()].tree
-            for part in walk(tree.body) if tree is not None else ():
-                if isinstance(part, PortName):
+            for part in syntax.walk(tree.body) if tree is not None else ():
+                if isinstance(part, syntax.PortName):
                     return True
-                text = part.text if isinstance(part, Name) else part.node if isinstance(part, NodePort) else ""
+                text = (
+                    part.text
+                    if isinstance(part, syntax.Name)
+                    else part.node
+                    if isinstance(part, syntax.NodePort)
+                    else ""
+                )
                 if text in self.definitions and text not in seen:
                     seen.add(text)
                     waiting.append(text)
@@ -217,11 +197,11 @@ class Declarations:
 
     # --- constants ---------------------------------------------------------------------------------------------------
 
-    def constant(self, declared: _Declared, value: TermSyntax) -> None:
+    def constant(self, declared: _Declared, value: syntax.TermSyntax) -> None:
         environment, name = self.environment, declared.name.text
         self.needed_by(value)
-        fresh = self.fresh_names(value.items) if isinstance(value, SetDisplay) else []
-        if isinstance(value, SetDisplay) and fresh and len(fresh) == len(value.items):
+        fresh = self.fresh_names(value.items) if isinstance(value, syntax.SetDisplay) else []
+        if isinstance(value, syntax.SetDisplay) and fresh and len(fresh) == len(value.items):
             members = [Token("NAME", t.text, t.start, t.end) for t in fresh]
             sort = self.enumeration(name, members, declared.reports)
             if sort is None:
@@ -231,7 +211,7 @@ class Declarations:
             span = declared.reports.source.span(value.start, value.end)
             environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
             return
-        if isinstance(value, SetDisplay):
+        if isinstance(value, syntax.SetDisplay):
             self.half_known(value, fresh, declared.reports)
         term = Checker(Scope(environment), declared.reports).term(value)
         if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
@@ -245,7 +225,7 @@ class Declarations:
         else:
             environment.constants[name] = term
 
-    def half_known(self, value: SetDisplay, fresh: Sequence[Name], reports: Reports) -> None:
+    def half_known(self, value: syntax.SetDisplay, fresh: Sequence[syntax.Name], reports: Reports) -> None:
         """Reports the new names of a set that has known ones too: a set declares its elements, or collects them."""
         new = {t.start for t in fresh}
         known = [t for t in value.items if t.start not in new]
@@ -256,12 +236,12 @@ class Declarations:
             reports.error("RCL201", message, tree.start, tree.end, hint=hint)
             self.environment.broken.add(tree.text)
 
-    def fresh_names(self, trees: Sequence[TermSyntax]) -> list[Name]:
+    def fresh_names(self, trees: Sequence[syntax.TermSyntax]) -> list[syntax.Name]:
         """Those of the trees that are names which nothing has."""
         taken = (self.declared, self.owners, self.environment.elements)
-        return [t for t in trees if isinstance(t, Name) and not any(t.text in names for names in taken)]
+        return [t for t in trees if isinstance(t, syntax.Name) and not any(t.text in names for names in taken)]
 
-    def needed_by(self, value: TermSyntax) -> None:
+    def needed_by(self, value: syntax.TermSyntax) -> None:
         """Elaborates first what a constant's value mentions: other constants, and the types of elements."""
         for name in _names(value):
             owner = self.owners.get(name)
@@ -277,34 +257,34 @@ class Declarations:
 
     # --- types -------------------------------------------------------------------------------------------------------
 
-    def type_of(self, tree: TypeSyntax, reports: Reports, name: str) -> Sort | None:
+    def type_of(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> Sort | None:
         """The sort that a type denotes; `name` is what a new set of names is to be called."""
         match tree:
-            case BuiltinType(text=text):
+            case syntax.BuiltinType(text=text):
                 return BUILTINS.get(text, BUILTINS["REAL"])
-            case NamedType():
+            case syntax.NamedType():
                 return self.named(tree, reports)
-            case UnspecifiedType():
+            case syntax.UnspecifiedType():
                 return OpaqueSort(self.free_name(name))
-            case SetType(elements=elements):
+            case syntax.SetType(elements=elements):
                 return self.set_of(elements, reports, name)
-            case TupleType(items=(only,)):
+            case syntax.TupleType(items=(only,)):
                 return self.type_of(only, reports, name)
-            case TupleType(items=items):
+            case syntax.TupleType(items=items):
                 return _tuple_sort([self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(items)])
-            case RecordType(fields=fields):
+            case syntax.RecordType(fields=fields):
                 return self.record(fields, reports, name)
-            case SequenceType(item=of):
+            case syntax.SequenceType(item=of):
                 item = self.type_of(of, reports, f"{name}_item")
                 return None if item is None else SequenceSort(item)
-            case ProductType():
+            case syntax.ProductType():
                 return _tuple_sort(self.factors(tree, reports, name))
-            case FunctionType():
+            case syntax.FunctionType():
                 return self.function(tree, reports, name)
             case _:
                 assert_never(tree)
 
-    def record(self, fields: Sequence[PortDeclaration], reports: Reports, name: str) -> Sort | None:
+    def record(self, fields: Sequence[syntax.PortDeclaration], reports: Reports, name: str) -> Sort | None:
         sound, seen = True, dict[str, Span]()
         for part in fields:
             label = part.name
@@ -324,7 +304,7 @@ class Declarations:
         own = name if declared is not None and declared.state == "open" else ""
         return TupleSort(kept, tuple(seen), own) if sound and len(kept) == len(items) else None
 
-    def named(self, tree: NamedType, reports: Reports) -> Sort | None:
+    def named(self, tree: syntax.NamedType, reports: Reports) -> Sort | None:
         name = tree.text
         environment = self.environment
         other = self.declared.get(name)
@@ -350,9 +330,9 @@ class Declarations:
             reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
         return None
 
-    def factors(self, tree: TypeSyntax, reports: Reports, name: str) -> list[Sort | None]:
+    def factors(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> list[Sort | None]:
         """The sorts of a product, or of a function's parameters."""
-        if not isinstance(tree, ProductType):
+        if not isinstance(tree, syntax.ProductType):
             return [self.type_of(tree, reports, name)]
         sound = True
         for sign in tree.signs:
@@ -365,14 +345,14 @@ class Declarations:
             return [None]
         return [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.factors)]
 
-    def function(self, tree: FunctionType, reports: Reports, name: str) -> Sort | None:
+    def function(self, tree: syntax.FunctionType, reports: Reports, name: str) -> Sort | None:
         parameters = self.factors(tree.parameters, reports, name)
         result = self.type_of(tree.result, reports, f"{name}_result")
         if result is None or None in parameters:
             return None
         return FunctionSort(tuple(p for p in parameters if p is not None), result)
 
-    def set_of(self, elements: Sequence[Element], reports: Reports, name: str) -> Sort | None:
+    def set_of(self, elements: Sequence[syntax.Element], reports: Reports, name: str) -> Sort | None:
         if not any(e.parameters for e in elements):
             return self.enumeration(name, [e.name for e in elements], reports)
         constructors: list[Constructor] = []
@@ -449,18 +429,18 @@ def _same_text(one: _Declared, other: _Declared) -> bool:
     return flat(one.tree) == flat(other.tree)
 
 
-def _names(tree: Syntax) -> set[str]:
+def _names(tree: syntax.Syntax) -> set[str]:
     """Every name that occurs in a type or value."""
     found: set[str] = set()
-    for part in walk(tree):
-        if isinstance(part, Name | NamedType):
+    for part in syntax.walk(tree):
+        if isinstance(part, syntax.Name | syntax.NamedType):
             found.add(part.text)
-        elif isinstance(part, NodePort):
+        elif isinstance(part, syntax.NodePort):
             found.add(part.node)
-        elif isinstance(part, Element):
+        elif isinstance(part, syntax.Element):
             found.add(part.name.text)
-        elif isinstance(part, Binder):
+        elif isinstance(part, syntax.Binder):
             found.update(name.text for name in part.names)
-        elif isinstance(part, ProductType):
+        elif isinstance(part, syntax.ProductType):
             found.update(sign.text for sign in part.signs)
     return found

@@ -11,15 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from avow.base.records import dataclass
-from avow.language.sorts import (
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    StringSort,
-    components,
-)
+from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, OpaqueSort, RealSort, StringSort, components
 from avow.language.subterms import subterms
 from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable
 

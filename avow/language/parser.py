@@ -14,60 +14,9 @@ from typing import Any, Literal, NamedTuple, overload
 from avow.base.grammars import lark_of
 from avow.base.tuning.bounds import CHAIN
 from avow.base.tuning.sizes import NESTING
+from avow.language import syntax
 from avow.language.lexer import Token
 from avow.language.source import Reports
-from avow.language.syntax import (
-    Ahead,
-    Application,
-    Binder,
-    BuiltinName,
-    BuiltinType,
-    Calculation,
-    Comparison,
-    Connective,
-    ConstantDeclaration,
-    Declaration,
-    Define,
-    Element,
-    FieldOf,
-    FunctionType,
-    IfThenElse,
-    Lasting,
-    Limited,
-    LimitSyntax,
-    Minus,
-    Name,
-    NamedType,
-    Negation,
-    NodePort,
-    Number,
-    PaceSyntax,
-    Parentheses,
-    PortDeclaration,
-    PortList,
-    PortName,
-    ProductType,
-    Quantification,
-    Quantity,
-    RangeDisplay,
-    RecordType,
-    RosType,
-    SequenceDisplay,
-    SequenceType,
-    SetDisplay,
-    SetType,
-    Sign,
-    Syntax,
-    TermSyntax,
-    Text,
-    TopicDeclaration,
-    TopicList,
-    Truth,
-    TupleDisplay,
-    TupleType,
-    TypeDeclaration,
-    UnspecifiedType,
-)
 from avow.language.terms import Quantifier
 from avow.language.topic_names import topic_names
 
@@ -78,28 +27,30 @@ STARTS = ("declaration", "ports", "topics", "formula")
 @overload
 def parse(
     start: Literal["declaration"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> Declaration | None: ...
+) -> syntax.Declaration | None: ...
 
 
 @overload
 def parse(
     start: Literal["ports"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> PortList | None: ...
+) -> syntax.PortList | None: ...
 
 
 @overload
 def parse(
     start: Literal["topics"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> TopicList | None: ...
+) -> syntax.TopicList | None: ...
 
 
 @overload
 def parse(
     start: Literal["formula"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
-) -> TermSyntax | None: ...
+) -> syntax.TermSyntax | None: ...
 
 
-def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Syntax | None:
+def parse(
+    start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+) -> syntax.Syntax | None:
     """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
     and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
     if start == "topics":
@@ -141,7 +92,7 @@ class _Tables(NamedTuple):
     gotos: dict[int, dict[str, int]]
 
 
-def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> Syntax | Token:
+def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> syntax.Syntax | Token:
     """The LALR automaton, on Lark's tables. (Lark's own loop does the same and takes three times as long: it calls a
     function for every token, and makes a list and two calls for each of the many reductions that change nothing.)
     Gives the token where it cannot go on."""
@@ -176,7 +127,7 @@ def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> Syntax | Token
             states.append(state)
             if token is end and state == last:
                 break
-    tree: Syntax = values[-1]
+    tree: syntax.Syntax = values[-1]
     return tree
 
 
@@ -227,7 +178,7 @@ def _chain_depth(operands: Sequence[Any]) -> int:
     return _deepest(operands) - 1 + min(len(operands) - 1, CHAIN)
 
 
-_Binders = tuple[Binder, ...]
+_Binders = tuple[syntax.Binder, ...]
 
 
 class _Build:
@@ -235,199 +186,209 @@ class _Build:
 
     # --- declarations ------------------------------------------------------------------------------------------------
 
-    def type_declaration(self, c: list[Any]) -> TypeDeclaration:
-        return TypeDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
+    def type_declaration(self, c: list[Any]) -> syntax.TypeDeclaration:
+        return syntax.TypeDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def constant_declaration(self, c: list[Any]) -> ConstantDeclaration:
-        return ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
+    def constant_declaration(self, c: list[Any]) -> syntax.ConstantDeclaration:
+        return syntax.ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def plain_definition(self, c: list[Any]) -> Define:
-        return Define(c[0].start, c[3].end, c[3].depth + 1, c[1], (), c[3])
+    def plain_definition(self, c: list[Any]) -> syntax.Define:
+        return syntax.Define(c[0].start, c[3].end, c[3].depth + 1, c[1], (), c[3])
 
-    def definition(self, c: list[Any]) -> Define:
-        return Define(c[0].start, c[6].end, _deepest((c[3], c[6])), c[1], c[3].items, c[6])
+    def definition(self, c: list[Any]) -> syntax.Define:
+        return syntax.Define(c[0].start, c[6].end, _deepest((c[3], c[6])), c[1], c[3].items, c[6])
 
-    def ports(self, c: list[Any]) -> PortList:
+    def ports(self, c: list[Any]) -> syntax.PortList:
         ports = tuple(port for group in c[::2] for port in group)
-        return PortList(ports[0].start, ports[-1].end, _deepest(ports), ports) if c else PortList(0, 0, 1, ())
+        return (
+            syntax.PortList(ports[0].start, ports[-1].end, _deepest(ports), ports)
+            if c
+            else syntax.PortList(0, 0, 1, ())
+        )
 
-    def port(self, c: list[Any]) -> tuple[PortDeclaration, ...]:
+    def port(self, c: list[Any]) -> tuple[syntax.PortDeclaration, ...]:
         """``a, b : BOOL``: each name with the type."""
-        return tuple(PortDeclaration(name.start, c[-1].end, c[-1].depth + 1, name, c[-1]) for name in c[:-2:2])
+        return tuple(syntax.PortDeclaration(name.start, c[-1].end, c[-1].depth + 1, name, c[-1]) for name in c[:-2:2])
 
-    def topics(self, c: list[Any]) -> TopicList:
-        return TopicList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2])) if c else TopicList(0, 0, 1, ())
+    def topics(self, c: list[Any]) -> syntax.TopicList:
+        return (
+            syntax.TopicList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]))
+            if c
+            else syntax.TopicList(0, 0, 1, ())
+        )
 
-    def plain_topic(self, c: list[Any]) -> TopicDeclaration:
-        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, None)
+    def plain_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
+        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, None)
 
-    def bare_topic(self, c: list[Any]) -> TopicDeclaration:
-        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, c[4])
+    def bare_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
+        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, c[4])
 
-    def matched_topic(self, c: list[Any]) -> TopicDeclaration:
-        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], c[4].text, c[6])
+    def matched_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
+        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], c[4].text, c[6])
 
-    def ros_type(self, c: list[Any]) -> RosType:
-        return RosType(c[0].start, c[-1].end, 1, tuple(c[::2]))
+    def ros_type(self, c: list[Any]) -> syntax.RosType:
+        return syntax.RosType(c[0].start, c[-1].end, 1, tuple(c[::2]))
 
     # --- types -------------------------------------------------------------------------------------------------------
 
-    def function_type(self, c: list[Any]) -> FunctionType:
-        return FunctionType(c[0].start, c[2].end, max(c[0].depth, c[2].depth) + 1, c[0], c[2])
+    def function_type(self, c: list[Any]) -> syntax.FunctionType:
+        return syntax.FunctionType(c[0].start, c[2].end, max(c[0].depth, c[2].depth) + 1, c[0], c[2])
 
-    def product_type(self, c: list[Any]) -> ProductType:
-        return ProductType(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
+    def product_type(self, c: list[Any]) -> syntax.ProductType:
+        return syntax.ProductType(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
 
-    def named_type(self, c: list[Any]) -> NamedType:
-        return NamedType(c[0].start, c[0].end, 1, c[0].text)
+    def named_type(self, c: list[Any]) -> syntax.NamedType:
+        return syntax.NamedType(c[0].start, c[0].end, 1, c[0].text)
 
-    def builtin_type(self, c: list[Any]) -> BuiltinType:
-        return BuiltinType(c[0].start, c[0].end, 1, c[0].text)
+    def builtin_type(self, c: list[Any]) -> syntax.BuiltinType:
+        return syntax.BuiltinType(c[0].start, c[0].end, 1, c[0].text)
 
-    def unspecified_type(self, c: list[Any]) -> UnspecifiedType:
-        return UnspecifiedType(c[0].start, c[1].end, 1)
+    def unspecified_type(self, c: list[Any]) -> syntax.UnspecifiedType:
+        return syntax.UnspecifiedType(c[0].start, c[1].end, 1)
 
-    def set_type(self, c: list[Any]) -> SetType:
-        return SetType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
+    def set_type(self, c: list[Any]) -> syntax.SetType:
+        return syntax.SetType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def tuple_type(self, c: list[Any]) -> TupleType:
-        return TupleType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
+    def tuple_type(self, c: list[Any]) -> syntax.TupleType:
+        return syntax.TupleType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def sequence_type(self, c: list[Any]) -> SequenceType:
-        return SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
+    def sequence_type(self, c: list[Any]) -> syntax.SequenceType:
+        return syntax.SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
 
-    def record_type(self, c: list[Any]) -> RecordType:
+    def record_type(self, c: list[Any]) -> syntax.RecordType:
         fields = tuple(port for group in c[1:-1:2] for port in group)
-        return RecordType(c[0].start, c[-1].end, _deepest(fields), fields)
+        return syntax.RecordType(c[0].start, c[-1].end, _deepest(fields), fields)
 
-    def plain_element(self, c: list[Any]) -> Element:
-        return Element(c[0].start, c[0].end, 1, c[0], ())
+    def plain_element(self, c: list[Any]) -> syntax.Element:
+        return syntax.Element(c[0].start, c[0].end, 1, c[0], ())
 
-    def constructor(self, c: list[Any]) -> Element:
-        return Element(c[0].start, c[-1].end, _deepest(c[2:-1:2]), c[0], tuple(c[2:-1:2]))
+    def constructor(self, c: list[Any]) -> syntax.Element:
+        return syntax.Element(c[0].start, c[-1].end, _deepest(c[2:-1:2]), c[0], tuple(c[2:-1:2]))
 
     # --- formulas and terms ------------------------------------------------------------------------------------------
 
-    def iff(self, c: list[Any]) -> Connective:
+    def iff(self, c: list[Any]) -> syntax.Connective:
         items = tuple(c[::2])
-        return Connective(c[0].start, c[-1].end, _chain_depth(items), Sign.IFF, items)
+        return syntax.Connective(c[0].start, c[-1].end, _chain_depth(items), syntax.Sign.IFF, items)
 
-    def implies(self, c: list[Any]) -> Connective:
+    def implies(self, c: list[Any]) -> syntax.Connective:
         items = tuple(c[::2])
-        return Connective(c[0].start, c[-1].end, _chain_depth(items), Sign.IMPLIES, items)
+        return syntax.Connective(c[0].start, c[-1].end, _chain_depth(items), syntax.Sign.IMPLIES, items)
 
-    def disjunction(self, c: list[Any]) -> Connective:
+    def disjunction(self, c: list[Any]) -> syntax.Connective:
         items = tuple(c[::2])
-        return Connective(c[0].start, c[-1].end, _deepest(items), Sign.OR, items)
+        return syntax.Connective(c[0].start, c[-1].end, _deepest(items), syntax.Sign.OR, items)
 
-    def conjunction(self, c: list[Any]) -> Connective:
+    def conjunction(self, c: list[Any]) -> syntax.Connective:
         items = tuple(c[::2])
-        return Connective(c[0].start, c[-1].end, _deepest(items), Sign.AND, items)
+        return syntax.Connective(c[0].start, c[-1].end, _deepest(items), syntax.Sign.AND, items)
 
-    def negation(self, c: list[Any]) -> Negation:
-        return Negation(c[0].start, c[1].end, c[1].depth + 1, c[1])
+    def negation(self, c: list[Any]) -> syntax.Negation:
+        return syntax.Negation(c[0].start, c[1].end, c[1].depth + 1, c[1])
 
-    def comparison(self, c: list[Any]) -> Comparison:
-        return Comparison(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
+    def comparison(self, c: list[Any]) -> syntax.Comparison:
+        return syntax.Comparison(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
 
-    def arithmetic(self, c: list[Any]) -> Calculation:
+    def arithmetic(self, c: list[Any]) -> syntax.Calculation:
         operands = tuple(c[::2])
-        return Calculation(c[0].start, c[-1].end, _chain_depth(operands), operands, tuple(c[1::2]))
+        return syntax.Calculation(c[0].start, c[-1].end, _chain_depth(operands), operands, tuple(c[1::2]))
 
-    def negative(self, c: list[Any]) -> Minus:
-        return Minus(c[0].start, c[1].end, c[1].depth + 1, c[1])
+    def negative(self, c: list[Any]) -> syntax.Minus:
+        return syntax.Minus(c[0].start, c[1].end, c[1].depth + 1, c[1])
 
-    def application(self, c: list[Any]) -> Application:
+    def application(self, c: list[Any]) -> syntax.Application:
         arguments = tuple(c[2:-1:2])
-        return Application(c[0].start, c[-1].end, _deepest((c[0], *arguments)), c[0], arguments)
+        return syntax.Application(c[0].start, c[-1].end, _deepest((c[0], *arguments)), c[0], arguments)
 
-    def name(self, c: list[Any]) -> Name:
-        return Name(c[0].start, c[0].end, 1, c[0].text)
+    def name(self, c: list[Any]) -> syntax.Name:
+        return syntax.Name(c[0].start, c[0].end, 1, c[0].text)
 
-    def builtin(self, c: list[Any]) -> BuiltinName:
-        return BuiltinName(c[0].start, c[0].end, 1, c[0].text)
+    def builtin(self, c: list[Any]) -> syntax.BuiltinName:
+        return syntax.BuiltinName(c[0].start, c[0].end, 1, c[0].text)
 
-    def number(self, c: list[Any]) -> Number:
-        return Number(c[0].start, c[0].end, 1, c[0].text)
+    def number(self, c: list[Any]) -> syntax.Number:
+        return syntax.Number(c[0].start, c[0].end, 1, c[0].text)
 
-    def string(self, c: list[Any]) -> Text:
-        return Text(c[0].start, c[0].end, 1, c[0].text)
+    def string(self, c: list[Any]) -> syntax.Text:
+        return syntax.Text(c[0].start, c[0].end, 1, c[0].text)
 
-    def truth(self, c: list[Any]) -> Truth:
-        return Truth(c[0].start, c[0].end, 1, c[0].text == "TRUE")
+    def truth(self, c: list[Any]) -> syntax.Truth:
+        return syntax.Truth(c[0].start, c[0].end, 1, c[0].text == "TRUE")
 
-    def port_name(self, c: list[Any]) -> PortName:
-        return PortName(c[0].start, c[2].end, 1, c[0].text, c[2].text)
+    def port_name(self, c: list[Any]) -> syntax.PortName:
+        return syntax.PortName(c[0].start, c[2].end, 1, c[0].text, c[2].text)
 
-    def node_port(self, c: list[Any]) -> NodePort:
+    def node_port(self, c: list[Any]) -> syntax.NodePort:
         role = c[2].text if len(c) == 5 else None
-        return NodePort(c[0].start, c[-1].end, 1, c[0].text, role, c[-1].text)
+        return syntax.NodePort(c[0].start, c[-1].end, 1, c[0].text, role, c[-1].text)
 
-    def field(self, c: list[Any]) -> FieldOf:
-        return FieldOf(c[0].start, c[2].end, c[0].depth + 1, c[0], c[2])
+    def field(self, c: list[Any]) -> syntax.FieldOf:
+        return syntax.FieldOf(c[0].start, c[2].end, c[0].depth + 1, c[0], c[2])
 
-    def parenthesised(self, c: list[Any]) -> Parentheses:
-        inner = c[1].body if type(c[1]) is Parentheses else c[1]
-        return Parentheses(c[0].start, c[2].end, c[1].depth + 1, inner)
+    def parenthesised(self, c: list[Any]) -> syntax.Parentheses:
+        inner = c[1].body if type(c[1]) is syntax.Parentheses else c[1]
+        return syntax.Parentheses(c[0].start, c[2].end, c[1].depth + 1, inner)
 
-    def tuple(self, c: list[Any]) -> TupleDisplay:
-        return TupleDisplay(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
+    def tuple(self, c: list[Any]) -> syntax.TupleDisplay:
+        return syntax.TupleDisplay(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def set(self, c: list[Any]) -> SetDisplay:
+    def set(self, c: list[Any]) -> syntax.SetDisplay:
         items = tuple(c[1:-1:2])
-        return SetDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
+        return syntax.SetDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
 
-    def sequence(self, c: list[Any]) -> SequenceDisplay:
+    def sequence(self, c: list[Any]) -> syntax.SequenceDisplay:
         items = tuple(c[1:-1:2])
-        return SequenceDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
+        return syntax.SequenceDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
 
-    def range(self, c: list[Any]) -> RangeDisplay:
-        return RangeDisplay(c[0].start, c[4].end, max(c[1].depth, c[3].depth) + 1, c[1], c[3])
+    def range(self, c: list[Any]) -> syntax.RangeDisplay:
+        return syntax.RangeDisplay(c[0].start, c[4].end, max(c[1].depth, c[3].depth) + 1, c[1], c[3])
 
-    def quantified(self, c: list[Any]) -> Quantification:
+    def quantified(self, c: list[Any]) -> syntax.Quantification:
         binders: _Binders = c[2]
         depth = max(_deepest(binders) + 1, c[4].depth + 1)
-        return Quantification(c[0].start, c[5].end, depth, QUANTIFIERS[c[0].type], binders, c[4])
+        return syntax.Quantification(c[0].start, c[5].end, depth, QUANTIFIERS[c[0].type], binders, c[4])
 
-    def if_then_else(self, c: list[Any]) -> IfThenElse:
-        return IfThenElse(c[0].start, c[5].end, _deepest(c[1::2]), c[1], c[3], c[5])
+    def if_then_else(self, c: list[Any]) -> syntax.IfThenElse:
+        return syntax.IfThenElse(c[0].start, c[5].end, _deepest(c[1::2]), c[1], c[3], c[5])
 
-    def quantity(self, c: list[Any]) -> Quantity:
-        return Quantity(c[0].start, c[1].end, 1, c[0].text, c[1])
+    def quantity(self, c: list[Any]) -> syntax.Quantity:
+        return syntax.Quantity(c[0].start, c[1].end, 1, c[0].text, c[1])
 
-    def since(self, c: list[Any]) -> Lasting:
-        return Lasting(c[0].start, c[2].end, _deepest(c[::2]), c[1].text, c[0], None, c[2])
+    def since(self, c: list[Any]) -> syntax.Lasting:
+        return syntax.Lasting(c[0].start, c[2].end, _deepest(c[::2]), c[1].text, c[0], None, c[2])
 
     until = since
 
-    def ahead(self, c: list[Any]) -> Ahead:
-        return Ahead(c[0].start, c[1].end, c[1].depth + 1, Name(c[0].start, c[0].end, 1, c[0].text), (c[1],))
+    def ahead(self, c: list[Any]) -> syntax.Ahead:
+        return syntax.Ahead(
+            c[0].start, c[1].end, c[1].depth + 1, syntax.Name(c[0].start, c[0].end, 1, c[0].text), (c[1],)
+        )
 
-    def limited_since(self, c: list[Any]) -> Lasting:
-        return Lasting(c[0].start, c[3].end, _deepest((c[0], *c[2:])), c[1].text, c[0], c[2], c[3])
+    def limited_since(self, c: list[Any]) -> syntax.Lasting:
+        return syntax.Lasting(c[0].start, c[3].end, _deepest((c[0], *c[2:])), c[1].text, c[0], c[2], c[3])
 
-    def limited(self, c: list[Any]) -> Limited:
+    def limited(self, c: list[Any]) -> syntax.Limited:
         arguments = tuple(c[3:-1:2])
-        return Limited(c[0].start, c[-1].end, _deepest((c[1], *arguments)), c[0], c[1], arguments)
+        return syntax.Limited(c[0].start, c[-1].end, _deepest((c[1], *arguments)), c[0], c[1], arguments)
 
-    def pace(self, c: list[Any]) -> PaceSyntax:
-        length = Quantity(c[-3].start, c[-2].end, 1, c[-3].text, c[-2])
-        return PaceSyntax(c[0].start, c[-1].end, c[0].depth + 1, c[0], tuple(c[2:-3]), length)
+    def pace(self, c: list[Any]) -> syntax.PaceSyntax:
+        length = syntax.Quantity(c[-3].start, c[-2].end, 1, c[-3].text, c[-2])
+        return syntax.PaceSyntax(c[0].start, c[-1].end, c[0].depth + 1, c[0], tuple(c[2:-3]), length)
 
-    def plain_limit(self, c: list[Any]) -> LimitSyntax:
-        return LimitSyntax(c[0].start, c[2].end, c[1].depth + 1, "", c[1], None)
+    def plain_limit(self, c: list[Any]) -> syntax.LimitSyntax:
+        return syntax.LimitSyntax(c[0].start, c[2].end, c[1].depth + 1, "", c[1], None)
 
-    def related_limit(self, c: list[Any]) -> LimitSyntax:
-        return LimitSyntax(c[0].start, c[3].end, c[2].depth + 1, c[1].text, c[2], None)
+    def related_limit(self, c: list[Any]) -> syntax.LimitSyntax:
+        return syntax.LimitSyntax(c[0].start, c[3].end, c[2].depth + 1, c[1].text, c[2], None)
 
-    def named_limit(self, c: list[Any]) -> LimitSyntax:
-        return LimitSyntax(c[0].start, c[3].end, c[1].depth + 1, "", c[1], c[2])
+    def named_limit(self, c: list[Any]) -> syntax.LimitSyntax:
+        return syntax.LimitSyntax(c[0].start, c[3].end, c[1].depth + 1, "", c[1], c[2])
 
-    def related_named_limit(self, c: list[Any]) -> LimitSyntax:
-        return LimitSyntax(c[0].start, c[4].end, c[2].depth + 1, c[1].text, c[2], c[3])
+    def related_named_limit(self, c: list[Any]) -> syntax.LimitSyntax:
+        return syntax.LimitSyntax(c[0].start, c[4].end, c[2].depth + 1, c[1].text, c[2], c[3])
 
     def binders(self, c: list[Any]) -> _Binders:
         return tuple(c[::2])
 
-    def binder(self, c: list[Any]) -> Binder:
-        return Binder(c[0].start, c[-1].end, c[-1].depth + 1, tuple(c[:-2:2]), c[-1])
+    def binder(self, c: list[Any]) -> syntax.Binder:
+        return syntax.Binder(c[0].start, c[-1].end, c[-1].depth + 1, tuple(c[:-2:2]), c[-1])

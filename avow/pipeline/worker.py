@@ -37,15 +37,7 @@ from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.mutant_systems import alter
 from avow.pipeline.remarks import remarked
-from avow.pipeline.requests import (
-    Request,
-    Response,
-    Tools,
-    lay_out,
-    read_request,
-    request_digest,
-    response_bytes,
-)
+from avow.pipeline.requests import Request, Response, Tools, lay_out, read_request, request_digest, response_bytes
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
 from avow.pipeline.work import (
     COMPOSE,

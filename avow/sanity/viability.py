@@ -28,18 +28,7 @@ from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
 from avow.language.sorts import Sort, TupleSort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    Apply,
-    Conditional,
-    Implies,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
+from avow.language.terms import FALSE, TRUE, Apply, Conditional, Implies, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
 from avow.solving.questions import entails, solve

@@ -16,16 +16,7 @@ from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.language.operators import FLIPPED
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    REAL,
-    BoolSort,
-    EnumSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-)
+from avow.language.sorts import BOOL, INTEGER, REAL, BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     FALSE,
     TRUE,

@@ -32,12 +32,7 @@ from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.sequences import flatten
 from avow.formulas.values import FunctionValue, Value
 from avow.language.definedness import defined
-from avow.language.sorts import (
-    BOOL,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-)
+from avow.language.sorts import BOOL, FunctionSort, OpaqueSort, SequenceSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version

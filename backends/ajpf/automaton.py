@@ -8,20 +8,7 @@ from typing import assert_never
 from avow.formulas import ltl
 from avow.formulas.ltl import Automaton
 
-from .psl import (
-    Always,
-    And,
-    Atom,
-    Eventually,
-    Formula,
-    Implies,
-    Not,
-    Or,
-    Release,
-    Truth,
-    Until,
-    is_temporal,
-)
+from .psl import Always, And, Atom, Eventually, Formula, Implies, Not, Or, Release, Truth, Until, is_temporal
 
 
 def build(formula: Formula) -> Automaton[Formula]:

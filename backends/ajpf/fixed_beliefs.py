@@ -10,19 +10,7 @@ from collections.abc import Iterator, Sequence
 from . import psl
 from .beliefs import renamed_rule
 from .psl import Atom, Formula, Modality
-from .syntax import (
-    Bindings,
-    Condition,
-    DeedKind,
-    Program,
-    Rule,
-    Struct,
-    Term,
-    Var,
-    apply,
-    named_apart,
-    unify,
-)
+from .syntax import Bindings, Condition, DeedKind, Program, Rule, Struct, Term, Var, apply, named_apart, unify
 from .tautology import Laws
 from .tuning import STANDING_ATOMS, STANDING_INSTANCES
 

@@ -6,18 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, Sort
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Literal,
-    Or,
-    Quantified,
-    Role,
-    SetTerm,
-    Term,
-    Variable,
-)
+from avow.language.terms import And, Arithmetic, Compare, Literal, Or, Quantified, Role, SetTerm, Term, Variable
 
 Binding = Mapping[str, Term]
 

@@ -8,17 +8,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar, assert_never
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
-from .intentions import (
-    EMPTY,
-    PERCEPTION,
-    Frame,
-    Intention,
-    bind,
-    canonical,
-    goal_of,
-    of_event,
-    tail,
-)
+from .intentions import EMPTY, PERCEPTION, Frame, Intention, bind, canonical, goal_of, of_event, tail
 from .syntax import (
     SENT,
     Bindings,

@@ -27,20 +27,7 @@ from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 
 from .names import UNKNOWN, Names, assignments, expect, spread, vocabulary
 from .parser import parse_expression
-from .program import (
-    Assign,
-    Block,
-    If,
-    Match,
-    Predicate,
-    Program,
-    Reading,
-    Skip,
-    Statement,
-    Update,
-    While,
-    variable,
-)
+from .program import Assign, Block, If, Match, Predicate, Program, Reading, Skip, Statement, Update, While, variable
 from .syntax import (
     AssignStatement,
     Call,

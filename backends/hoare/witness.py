@@ -14,18 +14,7 @@ from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Value, show
 from avow.language.sorts import REAL, Sort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    Apply,
-    Arithmetic,
-    Compare,
-    Literal,
-    Negative,
-    Not,
-    Or,
-    Term,
-    Variable,
-    Widen,
-)
+from avow.language.terms import Apply, Arithmetic, Compare, Literal, Negative, Not, Or, Term, Variable, Widen
 from avow.solving.questions import solve
 from avow.solving.replay import replay
 

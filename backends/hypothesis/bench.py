@@ -46,17 +46,7 @@ from .judging import Trigger, blamed, guarantee, judged
 from .machine import EXACT, SPECIAL, as_double, rounded
 from .pools import constants, pools
 from .shrink import OutOfTime, configuration, smallest
-from .tuning import (
-    AFTER_COUNTING,
-    APART,
-    ASKED_AGAIN,
-    BATCH,
-    CASE_BYTES,
-    COUNTED,
-    EDGES,
-    SCOUT_PATIENCE,
-    TRIED,
-)
+from .tuning import AFTER_COUNTING, APART, ASKED_AGAIN, BATCH, CASE_BYTES, COUNTED, EDGES, SCOUT_PATIENCE, TRIED
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.

@@ -22,10 +22,7 @@ from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.rml.translate import translate
 from avow.backends.rosmonitoring.watched import Fault
 from avow.language.sorts import NATURAL, REAL
-from avow.language.terms import (
-    Term,
-    Variable,
-)
+from avow.language.terms import Term, Variable
 from avow.system.plan import System
 
 RCL = """

@@ -21,20 +21,7 @@ from avow.language.load import check_text
 from avow.language.printer import show_term
 from avow.language.sorts import BOOL, NATURAL
 from avow.language.subterms import histories
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Compare,
-    History,
-    Implies,
-    Limit,
-    Literal,
-    Not,
-    Or,
-    Past,
-    Term,
-)
+from avow.language.terms import FALSE, TRUE, And, Compare, History, Implies, Limit, Literal, Not, Or, Past, Term
 
 
 def judged(term: Term, run: list[Step]) -> list[Value]:

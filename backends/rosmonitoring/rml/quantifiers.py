@@ -18,14 +18,7 @@ from avow.formulas.disjunctions import Part, alternatives, conjunction
 from avow.formulas.one_point_rule import made_with, solved
 from avow.formulas.renaming import bound_names, rename_apart
 from avow.language.operators import OPERATORS, Why
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    DataSort,
-    FunctionSort,
-    RealSort,
-    TupleSort,
-)
+from avow.language.sorts import BOOL, BoolSort, DataSort, FunctionSort, RealSort, TupleSort
 from avow.language.terms import (
     And,
     Apply,
@@ -56,20 +49,7 @@ from avow.language.terms import (
 
 from ..tuning import COMPARISONS
 from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
-from .syntax import (
-    FALSE,
-    TRUE,
-    Calculation,
-    Condition,
-    NotRml,
-    Number,
-    Numeric,
-    compare,
-    every,
-    opposite,
-    size,
-    some,
-)
+from .syntax import FALSE, TRUE, Calculation, Condition, NotRml, Number, Numeric, compare, every, opposite, size, some
 
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 

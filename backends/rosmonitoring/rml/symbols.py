@@ -32,18 +32,7 @@ from avow.ros import definitions as wires
 
 from ..rules import Constant, Fields, Hold, Previous, Rule
 from ..tuning import TRACKED_TUPLES
-from .syntax import (
-    TRUE,
-    Comparison,
-    Condition,
-    Name,
-    NotRml,
-    Number,
-    Numeric,
-    compare,
-    every,
-    some,
-)
+from .syntax import TRUE, Comparison, Condition, Name, NotRml, Number, Numeric, compare, every, some
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,18 +40,7 @@ from ..options import Setup, same_topic
 from ..rules import Choice, Constant, FieldPath, Fields, Lookup, Previous, Rule
 from ..tuning import CASES
 from .quantifiers import Eliminator
-from .symbols import (
-    Points,
-    Scalar,
-    Symbol,
-    Tracked,
-    Variant,
-    carried,
-    code,
-    components,
-    constant,
-    no_pattern,
-)
+from .symbols import Points, Scalar, Symbol, Tracked, Variant, carried, code, components, constant, no_pattern
 from .syntax import (
     FALSE,
     TRUE,
