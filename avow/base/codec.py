@@ -70,6 +70,11 @@ _CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_asci
 """Made once: `json.dumps` makes one for each call that asks for anything but its defaults."""
 
 
+def line(value: object) -> bytes:
+    """A dataclass, or plain data, as a message between processes of ours: one line, which `from_text` reads."""
+    return f"{canonical(to_json(value))}\n".encode()
+
+
 def document(value: object) -> str:
     """JSON for people and other programs, an item a line. What is no character (half of one, which Python has for a
     file name's byte) is shown as unreadable: no reader of JSON takes it."""

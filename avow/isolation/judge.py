@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from avow.base import process
-from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
+from avow.base.codec import Unreadable, from_json, from_text, line
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 from avow.base.records import dataclass
@@ -98,7 +98,7 @@ class _Word:
 
 def say(channel: int, answer: object) -> None:
     """The judge's one word to whoever started it."""
-    data = canonical(to_json(_Word(answer, process.ended_by_others()))).encode() + b"\n"
+    data = line(_Word(answer, process.ended_by_others()))
     while data:
         data = data[os.write(channel, data) :]
     os.close(channel)

@@ -7,7 +7,6 @@ run generates the files itself.
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import threading
@@ -16,10 +15,20 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from avow.base import process
+from avow.base.codec import Unreadable, from_text, line
+from avow.base.records import dataclass
 from avow.pipeline.forks import OwnFork, may_fork
 
 Files = Mapping[str, str]
 """Name → text."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """What was made of a name; nothing: the run finds why, and says it."""
+
+    name: str
+    files: Files | None
 
 
 class Beside:
@@ -51,11 +60,11 @@ class Beside:
             return None
         with self._lock, self._near.makefile("rb") as answers:
             try:
-                self._near.sendall(json.dumps(name).encode() + b"\n")
-                found = json.loads(answers.readline())
-            except (OSError, ValueError):
+                self._near.sendall(line(name))
+                made = from_text(_Made, answers.readline())
+            except (OSError, Unreadable):
                 return None
-        return found if isinstance(found, dict) else None
+        return made.files if made.name == name else None
 
 
 def _close(near: socket.socket, fork: OwnFork) -> None:
@@ -70,11 +79,12 @@ def _wait(fork: OwnFork) -> None:
 
 def _serve(connection: socket.socket, make: Callable[[str], Files]) -> int:
     with connection.makefile("rwb") as stream:
-        for line in stream:
+        for asked in stream:
+            name = from_text(str, asked)
             try:
-                said = json.dumps(dict(make(json.loads(line))))
-            except Exception:  # the run finds the same, and says it
-                said = "null"
-            stream.write(said.encode() + b"\n")
+                said = line(_Made(name, dict(make(name))))
+            except Exception:
+                said = line(_Made(name, None))
+            stream.write(said)
             stream.flush()
     return 0

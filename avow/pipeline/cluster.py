@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import ipaddress
-import json
 import logging
 import os
 import queue
@@ -24,6 +23,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from avow.base.codec import Unreadable, from_text
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tuning.running import (
     CLUSTER_ANSWER,
@@ -34,7 +34,7 @@ from avow.base.tuning.running import (
     WORKER_GRACE,
 )
 from avow.pipeline.cluster_worker import needs, own_code, perform, tools_of
-from avow.pipeline.executors import Asked, Came
+from avow.pipeline.executors import Asked, Came, Failed
 
 _TLS = {"ca": "AVOW_TLS_CA", "cert": "AVOW_TLS_CERT", "key": "AVOW_TLS_KEY"}
 """Environment: files of the certificate authority, of this side's certificate and of its key."""
@@ -275,10 +275,10 @@ def _fetched(asked: Asked, future: Any) -> Came | None:
     if said[:1] == b"+":
         return Came(asked.key, said[1:])
     try:
-        failure, timed_out, log = json.loads(said[1:])
-        return Came(asked.key, failure=str(failure)[:500], timed_out=timed_out is True, log=str(log))
-    except (ValueError, TypeError, RecursionError):
-        return Came(asked.key, failure="the answer is none")
+        why = from_text(Failed, said[1:])
+    except Unreadable as error:
+        return Came(asked.key, failure=f"the answer is none: {error}"[:300])
+    return Came(asked.key, failure=why.failure[:500], timed_out=why.timed_out, log=why.log)
 
 
 def not_installed() -> Rejected:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import json
 import socket
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
@@ -20,12 +19,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from avow import __version__
 from avow.backend_kit.registry import backend, names
+from avow.base.codec import Unreadable, canonical, from_text, line
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import sha256
 from avow.base.tools import package_version
 from avow.base.tuning.running import CLUSTER_CONNECT
 from avow.pipeline.engine_code import backend_digest, code_mark, reading_digest
-from avow.pipeline.executors import answered
+from avow.pipeline.executors import Failed, answered
 from avow.pipeline.forks import Forks
 from avow.pipeline.requests import Request
 from avow.pipeline.work import ENGINES, engine_identity, is_portable, tool_identities
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @functools.cache
 def own_code() -> str:
     """This Avow and its Z3, as a resource."""
-    mark = sha256(json.dumps([reading_digest(), engine_identity()]))[:12]
+    mark = sha256(canonical([reading_digest(), engine_identity()]))[:12]
     return f"avow:{__version__} ({mark}) with Z3 {package_version('z3-solver')}"
 
 
@@ -58,12 +58,8 @@ def tools_of(resources: Iterable[str]) -> frozenset[tuple[str, ...]]:
     """The tools among a worker's resources, as `tool_identities` has them."""
     found = set()
     for text in (resource[5:] for resource in resources if resource.startswith("tool:")):
-        with contextlib.suppress(ValueError, RecursionError):
-            match json.loads(text):
-                case [str(name), str(version), str(program)]:
-                    found.add((name, version, program))
-                case _:  # whatever it offers, nobody asks for it
-                    pass
+        with contextlib.suppress(Unreadable):  # whatever it offers, nobody asks for it
+            found.add(from_text(tuple[str, str, str], text))
     return frozenset(found)
 
 
@@ -72,7 +68,7 @@ def _backend(name: str) -> str:
 
 
 def _tool(tool: Sequence[str]) -> str:
-    return f"tool:{json.dumps(list(tool))}"
+    return f"tool:{canonical(tool)}"
 
 
 @dataclass(slots=True)
@@ -106,7 +102,7 @@ def perform(data: bytes, key: str, seconds: float) -> bytes:
     if isinstance(came.data, bytes):
         return b"+" + came.data
     said = f"{came.failure} (on {socket.gethostname()})"
-    return b"-" + json.dumps([said, came.timed_out, came.log]).encode()
+    return b"-" + line(Failed(said, came.timed_out, came.log))
 
 
 def _leave(worker: Any, own: _Own, why: str) -> NoReturn:

@@ -47,6 +47,15 @@ class Came:
     log: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """Why there is no answer, as a worker says it."""
+
+    failure: str
+    timed_out: bool
+    log: str
+
+
 class Executor(Protocol):
     """Runs works somewhere."""
 

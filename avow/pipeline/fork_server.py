@@ -11,17 +11,18 @@ import atexit
 import contextlib
 import gc
 import importlib
-import json
 import os
 import selectors
 import socket
 import sys
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 from avow.base import process
+from avow.base.codec import from_text, line
 from avow.base.tuning.running import FORK_MESSAGE
 from avow.pipeline import worker
 
@@ -94,7 +95,7 @@ def _next(control: socket.socket, events: selectors.BaseSelector) -> _Fork | Non
     pid = os.fork()
     if pid == 0:
         open_here = [control.fileno(), user, *_descriptors(events)]
-        _work(json.loads(message), server, errors, open_here)
+        _work(message, server, errors, open_here)
     process.watch(pid)
     os.close(errors)
     return _Fork(pid, os.pidfd_open(pid), socket.socket(fileno=user))
@@ -105,7 +106,7 @@ def _descriptors(events: selectors.BaseSelector) -> list[int]:
     return [*own, *(key.fd for key in events.get_map().values())]
 
 
-def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequence[int]) -> NoReturn:
+def _work(message: bytes, server: int, errors: int, open_here: Sequence[int]) -> NoReturn:
     """In the fork, from here to its end."""
     code = 1
     try:
@@ -116,9 +117,12 @@ def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequenc
         for descriptor in {*open_here, errors}:
             with contextlib.suppress(OSError):
                 os.close(descriptor)  # a connection that stays open here would never close for its user
+        arguments = from_text(tuple[str, ...], message)
         sys.argv = [worker.__file__, *arguments]
         code = worker.entry(arguments)
         atexit._run_exitfuncs()
+    except Exception:
+        traceback.print_exc()  # into the work's own log
     finally:
         with contextlib.suppress(Exception):
             sys.stderr.flush()
@@ -132,7 +136,7 @@ def _end(fork: _Fork) -> None:
     process.end_orphans()  # what it left, if it was killed itself
     os.close(fork.handle)
     with fork.user, contextlib.suppress(OSError):
-        fork.user.send(str(os.waitstatus_to_exitcode(status)).encode())
+        fork.user.send(line(os.waitstatus_to_exitcode(status)))
 
 
 if __name__ == "__main__":

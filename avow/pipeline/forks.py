@@ -17,7 +17,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import gc
-import json
 import os
 import select
 import signal
@@ -33,6 +32,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from avow.base import process
+from avow.base.codec import Unreadable, from_text, line
 from avow.base.module_path import absolute_only, is_led_here
 from avow.base.process import Completed
 from avow.base.tuning.running import COLLECTED_IN_WORKS, FORK_LOOK, FORK_START, FORK_STOP
@@ -154,22 +154,23 @@ class _Server:
         with tempfile.TemporaryFile() as errors, mine:
             with theirs, self._sending:
                 try:
-                    message = json.dumps(list(arguments)).encode()
-                    socket.send_fds(self._control, [message], [theirs.fileno(), errors.fileno()])
+                    socket.send_fds(self._control, [line(list(arguments))], [theirs.fileno(), errors.fileno()])
                 except OSError:
                     return None
             code: int | None = None
-            ended = False
+            ended, fault = False, ""
             try:
                 code = _code(mine, start + seconds, stopped)
                 ended = True
             except TimeoutError:
                 pass
+            except Unreadable as error:
+                code, fault = 1, f"\nhow the work's process ended cannot be read: {error}"
             finally:
                 if not ended:
                     _end(mine)
             errors.seek(0)
-            text = errors.read(OUTPUT_KEPT).decode("utf-8", errors="replace")
+            text = errors.read(OUTPUT_KEPT).decode("utf-8", errors="replace") + fault
             return Completed((WORKER, *arguments), code, "", text, time.monotonic() - start)
 
     def close(self) -> None:
@@ -272,7 +273,7 @@ def _alone(control: socket.socket, cwd: Path, serve: Callable[[socket.socket], i
 
 
 def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | None) -> int:
-    """The fork's exit code. Raises TimeoutError."""
+    """The fork's exit code. Raises TimeoutError, and Unreadable."""
     said = b""
     while True:
         left = end - time.monotonic()
@@ -287,7 +288,7 @@ def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | N
             pass
         break
     # without a word: the server, and with it the fork, was killed from outside
-    return int(said) if said else -signal.SIGKILL
+    return from_text(int, said) if said else -signal.SIGKILL
 
 
 def _end(connection: socket.socket) -> None:

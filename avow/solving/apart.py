@@ -36,11 +36,10 @@ class Apart:
 
     def _ask(self, script: str, limit: int) -> tuple[Said, int]:
         try:
-            said, used = self._process.ask([self.solver, script, limit], NET_MS / 1000)
-            return Said(said), int(used)
+            return self._process.ask((self.solver, script, limit), tuple[Said, int], NET_MS / 1000)
         except TimeoutError:
             return Said.LATE, limit
-        except (NoAnswer, ValueError, TypeError):
+        except NoAnswer:
             return Said.UNKNOWN, limit
 
     def close(self) -> None:
@@ -82,4 +81,4 @@ def _said(question: tuple[str, str, int]) -> tuple[str, int]:
 
 
 if __name__ == "__main__":
-    serve(_said)
+    serve(_said, tuple[str, str, int])

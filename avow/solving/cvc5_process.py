@@ -50,4 +50,4 @@ def _steps(solver: Any) -> int:
 
 
 if __name__ == "__main__":
-    serve(lambda question: answer(*question)[0])
+    serve(lambda question: answer(*question)[0], tuple[str, int])

@@ -8,7 +8,6 @@ time is ended, and the next question gets another.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import select
 import subprocess
@@ -17,11 +16,22 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from avow.base import process
+from avow.base.codec import Unreadable, from_json, from_text, line
 from avow.base.files import sha256
 from avow.base.tuning.sizes import ANSWERED_BY_ONE
+
+T = TypeVar("T")
+Q = TypeVar("Q")
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    said: Any
+    of: str
+    """The digest of the question's line."""
 
 
 class NoAnswer(Exception):  # noqa: N818 - it says what it is
@@ -38,30 +48,29 @@ class Answering:
     _process: subprocess.Popen[bytes] | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def ask(self, question: Any, seconds: float) -> Any:
-        """Its answer. Raises NoAnswer, and TimeoutError."""
+    def ask(self, question: object, kind: type[T], seconds: float) -> T:
+        """Its answer, of that type. Raises NoAnswer, and TimeoutError."""
         if self._owner != os.getpid():  # of the process that this one is a fork of, and so is the lock
             self._process, self._lock, self._owner = None, threading.Lock(), os.getpid()
-        line = json.dumps(question) + "\n"
+        asked = line(question)
         with self._lock:
             try:
-                found, about = json.loads(self._answer(line.encode(), time.monotonic() + seconds))
-            except (OSError, ValueError, TypeError) as error:
+                found = from_text(_Answer, self._answer(asked, time.monotonic() + seconds))
+                if found.of != sha256(asked):
+                    raise Unreadable("it is the answer to another question")
+                return from_json(kind, found.said)
+            except (OSError, ValueError) as error:
                 self._end()
                 if isinstance(error, TimeoutError):
                     raise
-                raise NoAnswer from error
-        if about != sha256(line):
-            self.close()
-            raise NoAnswer
-        return found
+                raise NoAnswer(str(error)) from error
 
     def close(self) -> None:
         with self._lock:
             if self._owner == os.getpid():
                 self._end()
 
-    def _answer(self, line: bytes, end: float) -> bytes:
+    def _answer(self, asked: bytes, end: float) -> bytes:
         if self._process is None or self._asked >= ANSWERED_BY_ONE or self._process.poll() is not None:
             self._end()
             self._process = subprocess.Popen(
@@ -75,7 +84,7 @@ class Answering:
         self._asked += 1
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(line)
+        self._process.stdin.write(asked)
         self._process.stdin.flush()
         said = b""
         while not said.endswith(b"\n"):
@@ -100,8 +109,13 @@ class Answering:
         self._process = None
 
 
-def serve(answer: Callable[[Any], Any]) -> None:
-    """The far end, until there are no more questions."""
+def serve(answer: Callable[[Q], object], kind: type[Q]) -> None:
+    """The far end, until there are no more questions, or what comes is none."""
     process.die_with(int(sys.argv[1]))
-    for line in sys.stdin:
-        print(json.dumps([answer(json.loads(line)), sha256(line)]), flush=True)
+    for asked in sys.stdin.buffer:
+        try:
+            question = from_text(kind, asked)
+        except Unreadable as error:
+            sys.exit(f"what came is no question: {error}")
+        sys.stdout.buffer.write(line(_Answer(answer(question), sha256(asked))))
+        sys.stdout.buffer.flush()

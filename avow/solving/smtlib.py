@@ -84,7 +84,7 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
     steps, seconds = max(1, effort * CVC5_STEPS), net(effort) + CVC5_START_SECONDS
     for _ in range(2):  # another process may have been ended by somebody else
         try:
-            found: str | None = _cvc5.ask([script, steps], seconds)
+            found = _cvc5.ask((script, steps), str, seconds)
         except TimeoutError:
             return "unknown"
         except NoAnswer:
