@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from fractions import Fraction
 
+from avow.base.decimals import decimal
 from avow.base.records import dataclass
 
 
@@ -100,7 +101,7 @@ def show(value: Value) -> str:
         case Binary(digits=digits):
             return digits
         case Fraction():
-            return _decimal(value)
+            return (decimal(value) if value.denominator <= 10**9 else None) or str(value)
         case str():
             return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
         case tuple():
@@ -111,19 +112,3 @@ def show(value: Value) -> str:
 
 def _point(arguments: tuple[Value, ...]) -> str:
     return show(arguments[0]) if len(arguments) == 1 else show(arguments)
-
-
-def _decimal(value: Fraction) -> str:
-    if value.denominator == 1:
-        return str(value.numerator)
-    rest = value.denominator
-    for prime in (2, 5):
-        while rest % prime == 0:
-            rest //= prime
-    if rest != 1 or value.denominator > 10**9:
-        return f"{value.numerator}/{value.denominator}"
-    digits = 0
-    while (value * 10**digits).denominator != 1:
-        digits += 1
-    whole = f"{abs(value * 10**digits).numerator:0{digits + 1}d}"
-    return f"{'-' if value < 0 else ''}{whole[:-digits]}.{whole[-digits:]}"

@@ -58,12 +58,8 @@ def show_clause(clause: Clause, node: Node, style: StyleName = "unicode") -> str
 
 
 def _said(definition: Definition, known: Sequence[Definition], style: StyleName) -> str:
-    head: Term = Variable(Role.BOUND, definition.name, definition.body.sort)
-    if definition.parameters:
-        function = FunctionSort(tuple(p.sort for p in definition.parameters), definition.body.sort)
-        head = Apply(Variable(Role.BOUND, definition.name, function), definition.parameters, definition.body.sort)
     body = folded(definition.body, [d for d in known if d is not definition])
-    return f"{show_term(head, style)} = {show_term(body, style)}"
+    return f"{show_term(_by_name(definition, definition.parameters), style)} = {show_term(body, style)}"
 
 
 def used(text: str, definitions: Iterable[Definition]) -> tuple[Definition, ...]:
@@ -87,13 +83,17 @@ def folded(term: Term, definitions: Sequence[Definition]) -> Term:
             if values.keys() != set(definition.parameters):
                 continue
             given = tuple(folded(values[p], definitions) for p in definition.parameters)
-            sort = definition.body.sort
-            if not given:
-                return Variable(Role.BOUND, definition.name, sort, term.span)
-            function = FunctionSort(tuple(p.sort for p in definition.parameters), sort)
-            return Apply(Variable(Role.BOUND, definition.name, function), given, sort, term.span)
+            return _by_name(definition, given, term.span)
     parts = tuple(folded(child, definitions) for child in term.children)
     return term.rebuild(parts) if parts else term
+
+
+def _by_name(definition: Definition, given: tuple[Term, ...], span: Span | None = None) -> Term:
+    sort = definition.body.sort
+    if not given:
+        return Variable(Role.BOUND, definition.name, sort, span)
+    function = FunctionSort(tuple(p.sort for p in definition.parameters), sort)
+    return Apply(Variable(Role.BOUND, definition.name, function), given, sort, span)
 
 
 def _matches(

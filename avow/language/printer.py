@@ -5,10 +5,11 @@ Printing in the style ``rcl`` and reading that again gives the equal term (tests
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Container
 from fractions import Fraction
 from typing import assert_never
 
+from avow.base.decimals import decimal
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import (
     REAL,
@@ -72,31 +73,28 @@ def show_term(term: Term, style: StyleName = "unicode") -> str:
     return _Printer(STYLES[style]).show(term, _LOOSEST)
 
 
-def show_sort(sort: Sort, style: StyleName = "rcl") -> str:
-    """A sort by its name, or written out where it has none."""
+def show_sort(sort: Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
+    """A sort by its name, or written out where it has none (or none of those `named`)."""
     chosen = STYLES[style]
     match sort:
         case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
             return chosen.sorts[_BUILTIN[type(sort)]]
-        case EnumSort(name=name) | DataSort(name=name) | OpaqueSort(name=name):
+        case EnumSort(name=name) | DataSort(name=name) | OpaqueSort(name=name) | TupleSort(name=name) if (
+            name if named is None else name in named
+        ):
             return chosen.name(name)
         case FunctionSort(parameters=parameters, result=result):
-            left = chosen.times.join(_in_product(p, style) for p in parameters)
-            return f"{left}{chosen.arrow}{_in_product(result, style)}"
-        case TupleSort(name=name) if name:
-            return chosen.name(name)
-        case TupleSort(items=items, labels=labels) if labels:
-            pairs = zip(labels, items, strict=True)
-            return f"[{', '.join(f'{chosen.name(label)} : {show_sort(i, style)}' for label, i in pairs)}]"
-        case TupleSort(items=items):
-            return f"({', '.join(show_sort(i, style) for i in items)})"
+            left = chosen.times.join(_in_product(p, style, named) for p in parameters)
+            return f"{left}{chosen.arrow}{_in_product(result, style, named)}"
         case SequenceSort(item=item):
-            return f"{chosen.sequence[0]}{show_sort(item, style)}{chosen.sequence[1]}"
+            return f"{chosen.sequence[0]}{show_sort(item, style, named)}{chosen.sequence[1]}"
         case SetSort(item=item):
-            return f"a set of {show_sort(item, style)}"
+            return f"a set of {show_sort(item, style, named)}"
+        case EnumSort() | DataSort() | OpaqueSort() | TupleSort():
+            return show_type(sort, style, named)
 
 
-def show_type(sort: Sort, style: StyleName = "rcl") -> str:
+def show_type(sort: Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
     """The sort as its declaration writes it: ``{red, orange, green}``, ``{}``."""
     chosen = STYLES[style]
     match sort:
@@ -105,19 +103,22 @@ def show_type(sort: Sort, style: StyleName = "rcl") -> str:
         case DataSort(constructors=constructors):
             shown = []
             for c in constructors:
-                arguments = ", ".join(show_sort(p, style) for p in c.parameters)
+                arguments = ", ".join(show_sort(p, style, named) for p in c.parameters)
                 shown.append(f"{chosen.name(c.name)}({arguments})" if arguments else chosen.name(c.name))
             return chosen.braces(", ".join(shown))
         case OpaqueSort():
             return chosen.unspecified
-        case TupleSort(name=name) if name:
-            return show_sort(replace(sort, name=""), style)
+        case TupleSort(items=items, labels=labels):
+            shown = [show_sort(item, style, named) for item in items]
+            if not labels:
+                return f"({', '.join(shown)})"
+            return f"[{', '.join(f'{chosen.name(label)} : {s}' for label, s in zip(labels, shown, strict=True))}]"
         case _:  # written out anyway
-            return show_sort(sort, style)
+            return show_sort(sort, style, named)
 
 
-def _in_product(sort: Sort, style: StyleName) -> str:
-    shown = show_sort(sort, style)
+def _in_product(sort: Sort, style: StyleName, named: Container[str] | None) -> str:
+    shown = show_sort(sort, style, named)
     return f"({shown})" if isinstance(sort, FunctionSort) else shown
 
 
@@ -337,19 +338,10 @@ class _Printer:
 
 def show_number(value: Fraction) -> tuple[str, int]:
     """A number and how tightly its text binds: a decimal where it has one, else a division."""
-    level = UNARY if value < 0 else ATOM
-    denominator, twos, fives = value.denominator, 0, 0
-    while denominator % 2 == 0:
-        denominator, twos = denominator // 2, twos + 1
-    while denominator % 5 == 0:
-        denominator, fives = denominator // 5, fives + 1
-    if denominator != 1:
+    text = decimal(value)
+    if text is None:
         return f"{value.numerator} / {value.denominator}", PRODUCT
-    digits = max(twos, fives)
-    if digits == 0:
-        return str(value.numerator), level
-    scaled = str(abs(value.numerator) * 10**digits // value.denominator).rjust(digits + 1, "0")
-    return f"{'-' if value < 0 else ''}{scaled[:-digits]}.{scaled[-digits:]}", level
+    return text, UNARY if value < 0 else ATOM
 
 
 def _shows_real(term: Term) -> bool:

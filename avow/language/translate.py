@@ -8,9 +8,9 @@ them, formulas as text besides. It is not read back.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, assert_never
+from typing import Any
 
 from avow.base.codec import document, plain
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -20,23 +20,7 @@ from avow.language.format import format_text
 from avow.language.latex import to_latex
 from avow.language.lexer import quote
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language.sorts import BOOL, Constructor
 from avow.language.styles import StyleName
 from avow.language.subterms import subterms
 from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term
@@ -104,11 +88,11 @@ def _hidden_elements(node: Node) -> Iterator[Diagnostic]:
 
 def _declarations(contract: Contract) -> Iterator[str]:
     """The context's lines, in an order that keeps that of the types and that of the constants."""
-    names, constants = dict(contract.types), dict(contract.constants)
+    names, constants = dict(contract.types).keys(), dict(contract.constants)
     waiting = iter(contract.constants)
     for name, sort in contract.types:
         if name not in constants:
-            yield f"  {name} : {_written(sort, names, name)};"
+            yield f"  {name} : {show_sort(sort, named=names - {name})};"
             continue
         for constant, term in waiting:  # an enumeration that is a constant: first the constants before it
             if constant == name:
@@ -135,44 +119,6 @@ def _head(clause: Clause) -> str:
 def _topic(topic: Topic) -> str:
     matched = f" matches({topic.port.role}.{topic.port.name})" if topic.port is not None else ""
     return f"{topic.ros_type} {topic.name}{matched}"
-
-
-def _written(sort: Sort, names: Mapping[str, Sort], declared: str | None = None) -> str:
-    """The sort as a type: by its name where the contract declares one, else written out."""
-    match sort:
-        case EnumSort(name=name) | OpaqueSort(name=name) if name in names and name != declared:
-            return name
-        case EnumSort() | OpaqueSort():
-            return show_type(sort)
-        case DataSort(name=name, constructors=constructors):
-            if name in names and name != declared:
-                return name
-            shown = []
-            for c in constructors:
-                arguments = ", ".join(_written(p, names) for p in c.parameters)
-                shown.append(f"{c.name}({arguments})" if arguments else c.name)
-            return f"{{{', '.join(shown)}}}"
-        case FunctionSort(parameters=parameters, result=result):
-            left = " x ".join(_factor(p, names) for p in parameters)
-            return f"{left} --> {_factor(result, names)}"
-        case TupleSort(name=name) if name in names and name != declared:
-            return name
-        case TupleSort(items=items, labels=labels) if labels:
-            pairs = zip(labels, items, strict=True)
-            return f"[{', '.join(f'{label} : {_written(item, names)}' for label, item in pairs)}]"
-        case TupleSort(items=items):
-            return f"({', '.join(_written(i, names) for i in items)})"
-        case SequenceSort(item=item):
-            return f"<{_written(item, names)}>"
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | SetSort():  # a built-in sort
-            return show_sort(sort)
-        case _:
-            assert_never(sort)
-
-
-def _factor(sort: Sort, names: Mapping[str, Sort]) -> str:
-    shown = _written(sort, names)
-    return f"({shown})" if isinstance(sort, FunctionSort) else shown
 
 
 # --- for people ------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import reduce
 from typing import assert_never
 
+from avow.base.decimals import decimal
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
@@ -358,17 +359,11 @@ def _literal(term: Literal) -> _Text:
 
 
 def _real(value: Fraction) -> _Text:
-    rest = value.denominator
-    for prime in (2, 5):
-        while rest % prime == 0:
-            rest //= prime
-    if rest != 1:
+    text = decimal(abs(value))
+    if text is None:
         return f"({value.numerator}.0 / {value.denominator}.0)", True
-    digits = 1
-    while (value * 10**digits).denominator != 1:
-        digits += 1
-    whole = f"{abs(value * 10**digits).numerator:0{digits + 1}d}"
-    text = f"{whole[:-digits]}.{whole[-digits:]}"
+    if "." not in text:
+        text = f"{text}.0"
     return (text, True) if value >= 0 else (f"(-{text})", True)
 
 

@@ -12,8 +12,9 @@ from oracle.values import Meaning, domain
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import free_variables
-from avow.formulas.one_point_rule import without_points
+from avow.formulas.one_point_rule import made_with, solved, without_points
 from avow.formulas.traversal import run
+from avow.language.printer import show_term
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -30,6 +31,7 @@ from avow.language.sorts import (
 from avow.language.terms import (
     And,
     Apply,
+    Argument,
     Arithmetic,
     Compare,
     Construct,
@@ -58,7 +60,7 @@ from .contracts import contract, formula
 
 CONTRACT = contract(
     """context { Command : {move(REAL, REAL), inspect(NATURAL), halt}; }
-    node n { inputs( c : Command, p : (REAL, NATURAL), n : NATURAL, k : INTEGER, f : NATURAL --> BOOL )
+    node n { inputs( c : Command, p : (REAL, NATURAL), n : NATURAL, k : INTEGER, r : REAL, f : NATURAL --> BOOL )
       outputs( v : BOOL ) topics() guarantee( out.v ) }"""
 )
 
@@ -88,6 +90,8 @@ SAME = [
     ("forall(i in NATURAL | i < 0 -> in.f(i))", "TRUE"),
     ("forall(i in NATURAL | 2 > i -> exists(j in NATURAL | j < i and in.f(j)))", "FALSE"),
     ("exists(x in REAL | 0 < x and x < 1)", "TRUE"),
+    ("exists(i in NATURAL | in.f(i) and i == in.n)", "in.f(in.n)"),
+    ("exists(i in NATURAL | 0 < i and i < 3 and in.f(i))", "in.f(1) or in.f(2)"),
 ]
 
 
@@ -105,6 +109,7 @@ def test_the_meaning_stays(one: str, other: str) -> None:
         "forall(x, y in REAL | in.c == move(x, y) -> x < y)",
         "forall(x in REAL, i in NATURAL | in.p == (x, i) -> x > i)",
         "exists(i in NATURAL | i <= 4 and in.f(i))",
+        "exists(i in INTEGER | 0 < i and i < 3 and i * in.k == 4)",
     ],
 )
 def test_the_quantifier_goes(text: str) -> None:
@@ -113,6 +118,41 @@ def test_the_quantifier_goes(text: str) -> None:
         part = stack.pop()
         assert not z3.is_quantifier(part)
         stack.extend(part.children())
+
+
+@pytest.mark.parametrize(
+    ("equation", "values"),
+    [
+        ("x + 1 == in.r", {"x": "in.r - 1"}),
+        ("1 + x == in.r", {"x": "in.r - 1"}),
+        ("in.r == x - 1", {"x": "in.r + 1"}),
+        ("1 - x == in.r", {"x": "1 - in.r"}),
+        ("i + 1 == in.k", {"i": "in.k - 1"}),
+        ("(x, in.n - i) == (in.r, in.k)", {"x": "in.r", "i": "in.n - in.k"}),
+        ("x - x == in.r", None),
+        ("in.k - in.n == 3", None),
+        ("2 * i == in.k", None),
+        ("in.k + 1 != i", None),
+    ],
+)
+def test_an_equation_is_solved_for_what_it_determines(equation: str, values: dict[str, str] | None) -> None:
+    whole = term(f"exists(x in REAL, i in INTEGER | {equation})")
+    assert isinstance(whole, Quantified)
+    found = solved(whole.body, whole.variables)
+    assert (found and {v.name: show_term(value, "rcl") for v, value in found.values.items()}) == values
+    assert not found or all(value.sort == variable.sort for variable, value in found.values.items())
+
+
+def test_a_condition_says_what_a_value_was_made_with_only_of_its_own_parts() -> None:
+    one, other = (Variable(Role.INPUT, name, _DEED) for name in "de")
+
+    def made(value: Variable, constructor: str, operator: str = "==") -> Compare:
+        parts = tuple(Argument(value, constructor, k, s) for k, s in enumerate((_COLOUR, INTEGER)))
+        return Compare(operator, one, Construct("go", parts, _DEED))
+
+    assert made_with(made(one, "go")) == made_with(made(one, "go", "!=")) == "go"
+    assert made_with(made(other, "go")) is made_with(made(one, "dig")) is made_with(made(one, "go", "<")) is None
+    assert made_with(Compare("==", one, Construct("halt", (), _DEED))) is None
 
 
 # -- generated formulas, judged by enumeration -------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
 
+from avow.base.decimals import decimal
 from avow.formulas.flattening import flattened
 from avow.language.operators import OPPOSITE
 
@@ -225,15 +226,8 @@ def comment(text: str) -> str:
 def number(value: Fraction) -> str:
     """A non-negative decimal: of at most fifteen digits, or the shortest that means a number which a double holds.
     Raises NotRml where there is none."""
-    if value.denominator == 1:
-        return str(value.numerator)
-    digits = 0
-    while (value * 10**digits).denominator != 1:
-        digits += 1
-        if digits > 15:
-            return _of_double(value)
-    whole = f"{(value * 10**digits).numerator:0{digits + 1}d}"
-    return f"{whole[:-digits]}.{whole[-digits:]}"
+    text = decimal(value)
+    return _of_double(value) if text is None or len(text.partition(".")[2]) > 15 else text
 
 
 def _of_double(value: Fraction) -> str:
