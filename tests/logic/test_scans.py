@@ -15,13 +15,27 @@ from oracle.values import holds
 
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import compile_term
-from avow.formulas.formula import conjunction
+from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import SequenceValue
 from avow.language.contract import Node
+from avow.language.load import parse_formula
+from avow.language.printer import show_term
 from avow.language.sorts import NATURAL, REAL
-from avow.language.terms import And, Arithmetic, Compare, Implies, Index, Length, Literal, Role, Term, Variable
+from avow.language.terms import (
+    And,
+    Arithmetic,
+    Compare,
+    Implies,
+    Index,
+    Length,
+    Literal,
+    Quantified,
+    Role,
+    Term,
+    Variable,
+)
 from avow.sanity import witness_candidates, witness_search
-from avow.sanity.extremes import Extreme, bounded
+from avow.sanity.extremes import Extreme, bounded, measures
 from avow.sanity.realizability import Realizability, realizable
 from avow.sanity.witness_candidates import Candidates
 
@@ -166,6 +180,73 @@ def test_the_best_position_exists_and_is_one(seed: int) -> None:
 
 
 POSITION, CONSTANT = Variable(Role.BOUND, "i", NATURAL), Variable(Role.BOUND, "c", NATURAL)
+
+
+def inside(text: str, sort: str = "NATURAL") -> tuple[Variable, Term]:
+    """The position i, and what is said of it."""
+    ports = node("inputs( s : <REAL>, k : NATURAL, t : REAL ) outputs( m : REAL, at : NATURAL ) | guarantee( TRUE )")
+    whole = parse_formula(f"exists(i in {sort}, j in NATURAL | {text})", ports)
+    assert isinstance(whole, Quantified)
+    return whole.variables[0], whole.body
+
+
+@pytest.mark.parametrize(
+    ("guard", "finite"),
+    [
+        *((f"i {sign} k + 1", sign in ("<", "<=")) for sign in ("<", "<=", ">", ">=", "!=")),
+        *((f"k + 1 {sign} i", sign in (">", ">=")) for sign in ("<", "<=", ">", ">=", "!=")),
+        *((f"not (i {sign} k + 1)", sign in (">", ">=")) for sign in ("<", "<=", ">", ">=", "==")),
+        *((f"not (k + 1 {sign} i)", sign in ("<", "<=")) for sign in ("<", "<=", ">", ">=", "==")),
+        ("i in indices(s)", True),
+        ("i in <0 upto k>", True),
+        ("i in <1, k>", True),
+        ("k > 0 and (t < 1 or t > 3) and i < 3", True),
+        ("k > 0 or i < 3", False),
+        ("j < 3", False),
+        ("not (j > 3)", False),
+        ("j in <0 upto 3> and i > j", False),
+        ("i in <0 upto i>", False),
+        ("i < i + 1", False),
+        ("not (i > i + k)", False),
+    ],
+)
+def test_a_guard_is_met_by_finitely_many_positions_if_it_bounds_them(guard: str, finite: bool) -> None:
+    assert bounded(*inside(guard)) is finite
+
+
+def test_of_all_whole_numbers_below_one_none_is_the_least() -> None:
+    position, guard = inside("i < 3", "INTEGER")
+    assert not bounded(position, guard)
+    assert not Extreme(replace(CONSTANT, sort=position.sort), position, guard, position, True, False).exists(
+        frozenset()
+    )
+
+
+@pytest.mark.parametrize(
+    ("demand", "found"),
+    [
+        ("m <= s(i)", [("in.s(i)", False, False)]),
+        ("m >= s(i)", [("in.s(i)", True, False)]),
+        ("s(i) > m", [("in.s(i)", False, False)]),
+        ("not (m > s(i))", [("in.s(i)", False, False)]),
+        ("m <= t - s(i)", [("in.t - in.s(i)", False, False)]),
+        ("m - s(i) <= t", [("in.s(i)", False, False)]),
+        ("-(m + s(i)) < t", [("in.s(i)", False, False)]),
+        ("m <= -s(i)", [("-in.s(i)", False, False)]),
+        ("m + s(i) < t", [("in.s(i)", True, False)]),
+        ("s(i) - m < t", [("in.s(i)", True, False)]),
+        ("m == s(i)", []),
+        ("t <= s(i)", []),
+        ("m <= t", []),
+        ("m <= s(i) and at >= i", [("in.s(i)", False, True), ("i", True, True)]),
+        ("m <= s(i) and at <= i", [("in.s(i)", False, False), ("i", False, False)]),
+    ],
+)
+def test_a_demand_suggests_what_decides_it(demand: str, found: list[tuple[str, bool, bool]]) -> None:
+    position, said = inside(demand)
+    outputs = frozenset(v for v in free_variables(said) if v.role is Role.OUTPUT)
+    suggested = measures(position, said, outputs)
+    assert [(show_term(term, "rcl"), greatest, last) for term, greatest, last in suggested] == found
 
 
 def test_an_endless_guard_has_no_best() -> None:
