@@ -57,6 +57,7 @@ def test_an_answer_in_time(make_system: Make) -> None:
 def test_silence_breaks_a_response_at_its_deadline(make_system: Make) -> None:
     events = [at(0, a=False), at(0.1, b=False), at(1, a=True)]
     assert told(make_system, WITHIN, *events, {**OTHER, "time": 2.04}) == []  # a message may be on its way
+    assert told(make_system, WITHIN, *events, {**OTHER, "time": 2.05}) == []  # as late as one may be
     assert told(make_system, WITHIN, *events, {**OTHER, "time": 2.06}, OTHER) == [(Fault.GUARANTEE, "g", "2")]
     assert told(make_system, WITHIN, *events, at(2.04, b=True), OTHER) == []
     assert told(make_system, WITHIN, *events, at(3, b=True)) == [(Fault.GUARANTEE, "g", "2")]
@@ -149,6 +150,7 @@ def test_what_came_a_little_late_is_neither_held_nor_broken(make_system: Make) -
     events = [at(0, b=False), at(0, a=False), at(1, a=True)]
     assert tallied(make_system, short, *events, at(1.02, b=True), OTHER) == {"g": (3, 0, 0)}
     assert tallied(make_system, short, *events, at(1.021, b=True), OTHER) == {"g": (2, 0, 1)}
+    assert tallied(make_system, short, *events, at(1.07, b=True), OTHER) == {"g": (2, 0, 1)}
     assert tallied(make_system, short, *events, at(1.08, b=True), OTHER)["g"][1:] == (1, 0)
     pace = "guarantee g ( TRUE )\nguarantee steps ( steps(at most 20 ms) )"
     assert tallied(make_system, pace, *(at(k * 0.069, b=True) for k in range(9)))["steps"] == (1, 0, 8)
@@ -266,3 +268,18 @@ def test_verdicts_are_what_the_definitions_over_timed_words_say(seed: int, words
     results = [disagreement(known, rng) for _ in range(words)]
     assert [fault for _, wrong in results for fault in wrong] == []
     assert sum(judged for judged, _ in results) > words / 4
+
+
+def test_no_step_leaves_no_response_open(make_system: Make) -> None:
+    monitor = Monitor(found(made(make_system, WITHIN)))
+    monitor.step(OTHER)
+    assert monitor.finish() == []
+    assert monitor.tallies["g"].open == 0
+
+
+@pytest.mark.parametrize("clause", ["historically[1 s](out.b)", "once[1 s](in.a)"])
+def test_a_breach_at_a_step_is_not_told_again_of_the_silence_after_it(clause: str, make_system: Make) -> None:
+    events = [at(0, a=False), at(0.5, b=False)]
+    broken = told(make_system, f"guarantee g ( {clause} )", *events)
+    assert broken
+    assert told(make_system, f"guarantee g ( {clause} )", *events, OTHER, {**OTHER, "time": 20}) == broken
