@@ -8,6 +8,8 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import suggest
+from avow.system.load import load_system
 from avow.system.paths import inside
 
 
@@ -73,3 +75,18 @@ def _line(job: Job, diagnostic: Diagnostic) -> str:
     path, root = Path(span.file), job.root.resolve()
     name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
     return f"{name}:{span.line}: {diagnostic.message}"
+
+
+def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong: str, hint: str) -> Job:
+    """What a command works on: the job of the node's only method of a backend, or of the one of them with the id
+    `method`. Raises Rejected: with code `wrong` where there is none, or are several; `hint` says how to add one."""
+    system = load_system(folder)
+    known = [n.name for n in system.contract.nodes]
+    if node not in known:
+        raise Rejected(Diagnostic(wrong, f"system '{system.name}' has no node '{node}'", hint=suggest(node, known)))
+    found = [m for m in system.plan.node(node).methods if m.backend == backend and method in (None, m.id)]
+    if len(found) != 1:
+        what = f"{len(found)} of {backend} ({', '.join(m.id for m in found)})" if found else f"no {backend}"
+        message = f"the plan has {what} among the methods of node '{node}'"
+        raise Rejected(Diagnostic(wrong, message, hint="say which one: --method ID" if found else hint))
+    return Job(system, system.contract.node(node), found[0], ())

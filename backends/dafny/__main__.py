@@ -10,11 +10,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from avow.backend_kit.protocol import Job
+from avow.backend_kit.given import file_path, job_for
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
-from avow.system.load import load_system
-from avow.system.paths import inside
 
 from .modules import generate
 from .printer import NotExpressible
@@ -22,24 +20,16 @@ from .printer import NotExpressible
 
 def _write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
     """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, also where a file is."""
-    system = load_system(folder)
-    if node not in [n.name for n in system.contract.nodes]:
-        known = ", ".join(n.name for n in system.contract.nodes)
-        raise Rejected(Diagnostic("DFY101", f"system '{system.name}' has no node '{node}'", hint=f"known: {known}"))
-    methods = [m for m in system.plan.node(node).methods if m.backend == "dafny" and method in (None, m.id)]
-    if len(methods) != 1:
-        what = "no dafny" if not methods else f"{len(methods)} of dafny ({', '.join(m.id for m in methods)})"
-        hint = "say which one: --method ID" if methods else "add one: dafny: {implementation: models/….dfy}"
-        raise Rejected(Diagnostic("DFY101", f"the plan has {what} among the methods of node '{node}'", hint=hint))
-    job = Job(system, system.contract.node(node), methods[0], ())
-    name, place = job.options.get("implementation"), methods[0].options.at("implementation")
-    path = inside(job.root, name) if isinstance(name, str) and name else None
+    hint = "add one: dafny: {implementation: models/….dfy}"
+    job = job_for(folder, node, "dafny", method, wrong="DFY101", hint=hint)
+    name, place = job.options.get("implementation"), job.method.options.at("implementation")
+    path = file_path(job, "implementation") if name else None
     if path is None:
         raise Rejected(Diagnostic("DFY101", "dafny needs 'implementation': a file of the system's folder", place))
     if path.exists():
         raise Rejected(Diagnostic("DFY102", f"'{name}' is there already; nothing is ever written over it", place))
     try:
-        write(path, generate(job.node, methods[0].guarantees).skeleton)
+        write(path, generate(job.node, job.method.guarantees).skeleton)
     except NotExpressible as problem:
         message = f"node '{node}' cannot be put into Dafny: {problem.what}"
         raise Rejected(Diagnostic("DFY105", message, problem.span or job.node.span)) from None

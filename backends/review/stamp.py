@@ -12,13 +12,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.backend_kit.given import job_for
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, write
 from avow.language.contract import Node
-from avow.system.load import load_system
 from avow.system.paths import inside
-from avow.system.plan import Method
 from avow.system.strict_yaml import Piece, read_yaml
 
 from .backend import record_name
@@ -35,29 +34,20 @@ def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | 
     `method` tells several reviews of one node apart. `renewed` is the date (ISO) of a renewed review: without it, a
     digest that is there already is never replaced. Raises Rejected.
     """
-    path, job, guarantees = record_of(folder, node, method)
-    return stamp_record(path, job.root, job.node, guarantees, renewed=renewed)
+    path, job = record_of(folder, node, method)
+    return stamp_record(path, job.root, job.node, job.method.guarantees, renewed=renewed)
 
 
-def record_of(folder: Path, node: str, method: str | None) -> tuple[Path, Job, tuple[str, ...]]:
-    """Where the review of a node keeps its record, its job, and the guarantees that it is of. Raises Rejected."""
-    system = load_system(folder)
-    if node not in [n.name for n in system.contract.nodes]:
-        known = ", ".join(n.name for n in system.contract.nodes)
-        raise Rejected(Diagnostic("REV120", f"system '{system.name}' has no node '{node}'", hint=f"known: {known}"))
-    methods = [m for m in system.plan.node(node).methods if m.backend == "review" and method in (None, m.id)]
-    if len(methods) != 1:
-        what = "no review" if not methods else f"{len(methods)} reviews ({', '.join(m.id for m in methods)})"
-        hint = "say which one" if methods else "add one to plan.yaml: review: {record: reviews/….yaml}"
-        raise Rejected(Diagnostic("REV120", f"the plan has {what} of node '{node}'", hint=hint))
-    chosen: Method = methods[0]
-    job = Job(system, system.contract.node(node), chosen, ())
+def record_of(folder: Path, node: str, method: str | None) -> tuple[Path, Job]:
+    """Where the review of a node keeps its record, and its job. Raises Rejected."""
+    hint = "add one to plan.yaml: review: {record: reviews/….yaml}"
+    job = job_for(folder, node, "review", method, wrong="REV120", hint=hint)
     name = record_name(job)
     path = inside(job.root, name) if name else None
     if path is None:
-        place = chosen.options.span
+        place = job.method.options.span
         raise Rejected(Diagnostic("REV101", "the review names no record in the system's folder", place))
-    return path, job, chosen.guarantees
+    return path, job
 
 
 def stamp_record(

@@ -52,7 +52,7 @@ def main(arguments: list[str]) -> int:
 
 
 def test_one_of_two_reviews_is_stamped(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(Rejected, match="2 reviews"):
+    with pytest.raises(Rejected, match="2 of review"):
         stamp(folder, "n")
     assert main([str(folder), "n", "--method", "second"]) == 0
     assert "code.py: " in capsys.readouterr().out
