@@ -107,7 +107,7 @@ def pytest_collection_finish() -> None:
     """Thousands of collected tests stay till the end: the garbage collector need not walk them again and again."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)
+    gc.set_threshold(100_000, 20, 20)
 
 
 def pytest_sessionfinish() -> None:
