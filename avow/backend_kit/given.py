@@ -15,8 +15,13 @@ from avow.system.paths import inside
 
 def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:
     """The JSON schema (2020-12) of a method's options, which takes no others; `more` is what else is asked of them."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **mapping(properties, *required), **more}
+
+
+def mapping(properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
+    """An option that is a mapping, and takes no other keys."""
     closed = {"properties": dict(properties), "required": [*required], "additionalProperties": False}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "type": "object", **closed, **more}
+    return {"type": "object", **closed}
 
 
 def text(what: str) -> dict[str, Any]:

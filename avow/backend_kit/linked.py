@@ -215,17 +215,3 @@ def _differs(claim: Obligation, method: Method, step: Step, said: Step, names: I
     why = f"the program and the model of {method.id} differ: what is verified of the model is not verified of it"
     shown = Counterexample((*((n, show(v)) for n, v in step.items()), *model), why)
     return Outcome(claim.id, Verdict.REFUTED, shown.text(), shown)
-
-
-__all__ = [
-    "Recorded",
-    "beside",
-    "connected",
-    "models",
-    "reads_recordings",
-    "recorded",
-    "recordings",
-    "settled",
-    "told_too",
-    "unrun",
-]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from avow.backend_kit.given import text
+from avow.backend_kit.given import mapping, text
 
 PATH = text("a field of the message: pose.position.x, ranges[0]")
 DURATION = {
@@ -13,23 +13,28 @@ DURATION = {
     "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
     "description": "a time with a unit, such as 50 ms",
 }
-ARGUMENT = {
-    "oneOf": [
-        PATH,
-        {
-            "type": "object",
-            "additionalProperties": False,
-            "required": ["table", "key", "by", "column"],
-            "properties": {
-                "table": text("a table of the plan's scenario"),
-                "key": text("the message's field that names the row"),
-                "by": text("the table's column that the key is looked up in"),
-                "column": text("the column of the value"),
-                "as": text("the type in which the node holds the value: float64"),
-            },
-        },
-    ]
-}
+_CELL = mapping(
+    {
+        "table": text("a table of the plan's scenario"),
+        "key": text("the message's field that names the row"),
+        "by": text("the table's column that the key is looked up in"),
+        "column": text("the column of the value"),
+        "as": text("the type in which the node holds the value: float64"),
+    },
+    *("table", "key", "by", "column"),
+)
+ARGUMENT = {"oneOf": [PATH, _CELL]}
+_BECAUSE = {"because": {"type": "string", "minLength": 1}}
+_PORTS = {"input": PATH, "output": PATH}
+_LATENCY = {"by": {"const": "latency"}, "latency": DURATION, "jitter": DURATION, **_BECAUSE}
+_ANSWERS = (
+    mapping({"by": {"const": "arrival"}, **_BECAUSE}, "by", "because"),
+    mapping({"by": {"const": "order"}, **_BECAUSE}, "by", "because"),
+    mapping({"by": {"const": "call"}}, "by"),
+    mapping({"by": {"const": "stamp"}, **_PORTS}, "by"),
+    mapping({"by": {"const": "key"}, **_PORTS}, "by", "input", "output"),
+    mapping(_LATENCY, "latency", "jitter", "because"),
+)
 
 READING: dict[str, Any] = {
     "when": {
@@ -39,49 +44,7 @@ READING: dict[str, Any] = {
     },
     "answers": {
         "description": "which input an answer answered: without it, verdicts are shown and are no evidence",
-        "oneOf": [
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["by", "because"],
-                "properties": {"by": {"const": "arrival"}, "because": {"type": "string", "minLength": 1}},
-            },
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["by", "because"],
-                "properties": {"by": {"const": "order"}, "because": {"type": "string", "minLength": 1}},
-            },
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["by"],
-                "properties": {"by": {"const": "call"}},
-            },
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["by"],
-                "properties": {"by": {"const": "stamp"}, "input": PATH, "output": PATH},
-            },
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["by", "input", "output"],
-                "properties": {"by": {"const": "key"}, "input": PATH, "output": PATH},
-            },
-            {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["latency", "jitter", "because"],
-                "properties": {
-                    "by": {"const": "latency"},
-                    "latency": DURATION,
-                    "jitter": DURATION,
-                    "because": {"type": "string", "minLength": 1},
-                },
-            },
-        ],
+        "oneOf": [*_ANSWERS],
     },
     "mapping": {
         "type": "object",

@@ -193,6 +193,3 @@ def _until(left: Sequence[bool], right: Sequence[bool], following: Sequence[int]
         for k in reversed(range(len(found))):
             found[k] = found[k] or (left[k] and found[following[k]])
     return found
-
-
-__all__ = ["completions", "holds", "truths", "unsupported"]

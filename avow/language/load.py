@@ -382,6 +382,3 @@ def _checker(
         scope.outputs = {p.name: p for p in node.outputs}
         scope.node = node.name
     return Checker(scope, reports)
-
-
-__all__ = ["check_paths", "check_sources", "check_text", "load_contract", "parse_formula", "parse_term"]

@@ -21,7 +21,7 @@ from avow.language.subterms import subterms
 from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration
 from avow.language.terms import Quantified, Variable
 from avow.lsp.background import Answer
-from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
+from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
 from avow.lsp.renaming import all_occurrences, renamed_with
 from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
@@ -265,6 +265,3 @@ def _about_port(port: Port, node: Node) -> str:
     topics = [t for t in node.topics if t.port == port]
     carried = "".join(f"\n\ntopic `{t.name}` of `{t.ros_type}`" for t in topics)
     return f"`{port.role}.{port.name}` : `{port.type_name}`{more} ({words[port.role]} of {_plain(node.name)}){carried}"
-
-
-__all__ = ["CLAUSES", "PORTS", "Document", "Symbol", "analyse", "definition", "hover", "references", "symbols"]
