@@ -102,3 +102,26 @@ def test_the_plan_of_bare_files_stands_beside_them(tmp_path: Path) -> None:
     assert plan.contract_files == (file,)
     assert bare_plan("none", ()).path == Path("plan.yaml")
     assert bare_plan("none", ()).policy.span.file == ""
+
+
+def test_what_stands_in_a_plan_is_what_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.rcl").write_text("node a { inputs() outputs() topics() guarantee(TRUE) }")
+    (tmp_path / "plan.yaml").write_text(
+        "compose: {D: {select: [a], rule: R1}}\n"
+        "subsystems: {s: {nodes: [a], rule: R2}}\n"
+        "connections: [{from: a.x, to: [a.y, a.z], delayed: true, initial: true}]\n"
+        "scenario: {t: [{p: 1, q: 2, r: 3}], steps: 7}\n"
+        "pictures: {map: {table: t, x: p, y: q, label: r, places: [inspect]}}\n"
+    )
+    plan, _, wrong = read_plan(tmp_path / "plan.yaml")
+    assert wrong == ()
+    assert [(g.name, g.select, g.rule) for g in plan.compose] == [("D", ("a",), "R1")]
+    assert [(g.name, g.members, g.rule) for g in plan.subsystems] == [("s", ("a",), "R2")]
+    assert [(str(c.target), c.delayed, c.initial) for c in plan.connections] == [
+        ("a.y", True, "TRUE"),
+        ("a.z", True, "TRUE"),
+    ]
+    assert plan.scenario is not None
+    assert plan.scenario.steps == 7
+    (picture,) = plan.pictures
+    assert (picture.x, picture.y, picture.label, picture.places) == ("p", "q", "r", ("inspect",))
