@@ -21,7 +21,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from helpers import some
+from helpers import edit, some
 
 from avow.backend_kit.protocol import Limits
 from avow.backend_kit.registry import backend
@@ -238,8 +238,9 @@ class Machines:
         dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard", "--host", "127.0.0.1"]
         self.processes = [subprocess.Popen([*dask, "--port", str(self.port), *words], stderr=subprocess.DEVNULL)]
 
-    def worker(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
+    def worker(self, *around: str) -> subprocess.Popen[bytes]:
+        """`around`: a command that runs it."""
+        command = [*around, sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
         marked = {**os.environ, "AVOW_TEST_CLUSTER": self.url}
         self.processes.append(
             subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=marked)
@@ -340,6 +341,20 @@ def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
     until(lambda: not machines.left(), 5)
 
 
+def with_dafny(place: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    """Let the first node have a method by Dafny, for which this stands in."""
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "dafny").write_text(script)
+    (tools / "dafny").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    find_tool.cache_clear()
+    folder = place.contracts / "made"
+    (folder / "models" / "n0.dfy").write_text("method step(x0: int) returns (y0: int) { y0 := x0; }\n")
+    edit(folder / "plan.yaml", ("hoare: {program: models/n0.imp}", "dafny: {implementation: models/n0.dfy}"))
+
+
 HANGS = """#!/bin/sh
 case "$*" in *version*) echo 4.9.1;; *) exec sleep {seconds};; esac
 """
@@ -352,25 +367,14 @@ def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
 ) -> None:
     from avow.pipeline.cluster import Address, Cluster
 
-    tools = tmp_path / "tools"
-    tools.mkdir()
-    (tools / "dafny").write_text(HANGS.format(seconds=machines.seconds))
-    (tools / "dafny").chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    find_tool.cache_clear()
-    folder = place.contracts / "made"
-    (folder / "models" / "n0.dfy").write_text("method step(x0: int) returns (y0: int) { y0 := x0; }\n")
-    plan = (folder / "plan.yaml").read_text()
-    seconds = ", seconds: 3" if how == "out of time" else ""
-    named = plan.replace("hoare: {program: models/n0.imp}", f"dafny: {{implementation: models/n0.dfy{seconds}}}")
-    assert named != plan
-    (folder / "plan.yaml").write_text(named)
+    with_dafny(place, tmp_path, monkeypatch, HANGS.format(seconds=machines.seconds))
+    if how == "out of time":
+        edit(place.contracts / "made" / "plan.yaml", ("n0.dfy", "n0.dfy, seconds: 3"))
     worker = machines.worker()
     cluster = Cluster(Address.read(machines.url))
 
     def hanging() -> bool:
-        return any(b"sleep" in _command(pid) for pid in machines.left())
+        return any(b"sleep" in command(pid) for pid in machines.left())
 
     try:
         until(cluster.offers)
@@ -396,7 +400,7 @@ def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
         find_tool.cache_clear()
 
 
-def _command(pid: str) -> bytes:
+def command(pid: str) -> bytes:
     try:
         return (Path("/proc") / pid / "cmdline").read_bytes()
     except OSError:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.backend_kit.protocol import Report
 from avow.base.verdict import Verdict
@@ -23,9 +28,9 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
 from avow.pipeline.worker import answer
 
-from .test_executors import Odd, one, place, works
+from .test_executors import HANGS, Machines, Odd, command, machines, one, place, until, with_dafny, works
 
-__all__ = ["place"]  # a fixture
+__all__ = ["machines", "place"]  # fixtures
 
 
 class Seeing(Odd):
@@ -148,3 +153,72 @@ def test_a_refutation_stays_one_whatever_the_worker_saw(place: Workspace) -> Non
     report = asking._undeclared(dataclasses.replace(good, outcomes=bad, observed=(row,)), [row], "wk1")
     assert {o.verdict for o in report.outcomes} == {Verdict.REFUTED}
     assert all(o.details[RETRY] for o in report.outcomes)
+
+
+READS = """#!/bin/sh
+folder={folder}
+case "$*" in *version*) echo 4.9.1;; *) cat $folder/conf; exit 4;; esac
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("bwrap") is None or not tracing.traces(), reason="needs bubblewrap and strace")
+def test_of_two_machines_only_what_is_as_here_is_on_record(
+    place: Workspace,
+    machines: Machines,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """For real: one worker sees another file at the place of the tool's settings."""
+    from avow.pipeline.cluster import Address, Cluster
+
+    conf, theirs = tmp_path / "conf", tmp_path / "theirs"
+    conf.write_text("ours")
+    theirs.write_text("theirs")
+    with_dafny(place, tmp_path, monkeypatch, READS.format(folder=tmp_path))
+    other = ("bwrap", "--dev-bind", "/", "/", "--unshare-uts", "--hostname", "wk2", "--die-with-parent")
+    for around, told in (((), ""), ((*other, "--bind", str(theirs), str(conf)), f"{conf} (on wk2)")):
+        only = machines.worker(*around)
+        cluster = Cluster(Address.read(machines.url))
+        try:
+            until(cluster.offers)
+            there = asking.elsewhere(cluster)
+            work = next(w for w in works(place, there) if w.engine == "dafny")
+            report = asking.settle(place, work, work.obligations, tmp_path, Run("a", False, elsewhere=there))
+            (row,) = [o for o in report.observed if o.path == str(conf)]
+            assert row == as_it_is(Seen.READ, conf)
+            assert not asking.unlike_here(report.observed, place.root)
+            assert told in capsys.readouterr().err
+        finally:
+            only.kill()
+            only.wait()
+            cluster.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("signal_sent", some([signal.SIGKILL, signal.SIGINT], 1))
+def test_a_run_that_ends_leaves_no_tool_on_a_worker(
+    place: Workspace, machines: Machines, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, signal_sent: signal.Signals
+) -> None:
+    with_dafny(place, tmp_path, monkeypatch, HANGS.format(seconds=machines.seconds))
+    from avow.pipeline.cluster import Address, Cluster
+
+    machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+    until(cluster.offers)
+    cluster.close()
+
+    def hanging() -> bool:
+        return any(b"sleep" in command(pid) for pid in machines.left())
+
+    words = [sys.executable, "-m", "avow.cli", "verify", "--on", machines.url]
+    run = subprocess.Popen(words, cwd=place.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        until(hanging)
+        run.send_signal(signal_sent)
+        run.wait(60)
+        until(lambda: not hanging())
+    finally:
+        run.kill()
+        run.wait()
