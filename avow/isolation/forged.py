@@ -192,7 +192,7 @@ _READS = tuple(
     (word, re.compile(pattern.replace("^", r"(?:^|(?<=\n))").replace("$", r"(?=\n|$)").replace(r"\W", r"[^\w\n]")))
     for word, pattern in (
         # the subject's answers, the judge's line, what a judge answers, a campaign's end
-        ("replies", r"""["']replies["']\s*:\s*[\[(]"""),
+        ("replies", r"""["']replies["']\s*:\s*[\[(]\s*[{\])]"""),
         ("isolation", rf"""["']isolation["']\s*:\s*["'](?:{"|".join(Isolation)})["']"""),
         ("ended", _ENDED),
         ("seen", _SEEN),

@@ -1,14 +1,17 @@
 """Runs the subject, and nothing else, in a process of its own: what it prints, patches or breaks stays here.
 
-A script without imports from Avow, so without its codec: each module here is one that the subject can change, and
-is read at every start. Each line of JSON that comes in holds the inputs of some cases; a line with an answer for each
-goes out (`subject.Message`, read there, strictly).
+A script without imports from Avow, so without its codec: each module here is one that the subject can change, and is
+read at every start. What asks and answers runs in a copy of this file that no name leads to (`_apart`), with functions
+and types that are not looked up where the subject could put others. Each line of JSON that comes in holds the inputs of
+some cases; a line with an answer for each goes out (`subject.Message`, read there, strictly).
 Values of the contract are given to the subject as plain Python: an element of an enumeration is a string, a REAL is a
 `Fraction`, ``move(1, 2)`` is ``("move", 1, 2)``, a sequence is a tuple, a function or relation is a `Table`.
 """
 
 from __future__ import annotations
 
+import _thread
+import builtins
 import contextlib
 import enum
 import importlib.machinery
@@ -19,7 +22,10 @@ import os
 import posix
 import sys
 import tempfile
+import threading
+import time
 import traceback
+import types
 from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -71,7 +77,10 @@ def plain(data: Any) -> Any:
     """A value as the judge sends it, as the subject gets it."""
     match data:
         case {"q": [numerator, denominator]}:
-            return Fraction(numerator, denominator)
+            number = object.__new__(Fraction)  # in lowest terms; its own constructor is one that the subject can change
+            _NUMERATOR.__set__(number, numerator)
+            _DENOMINATOR.__set__(number, denominator)
+            return number
         case {"r": text}:
             return float.fromhex(text)
         case {"t": items}:
@@ -83,35 +92,62 @@ def plain(data: Any) -> Any:
 
 
 def coded(value: Any, depth: int = 0) -> Any:
-    """Whatever the subject returned, as JSON; what no contract has is named by its type."""
+    """Whatever the subject returned, as JSON; what no contract has is named by its type. Of a number, a text or a
+    container of a class of the subject's own counts what it is, not what that class says of it."""
     if depth > 20:
         return {"?": "something nested too deeply"}
     inner = depth + 1
-    if value is None or isinstance(value, bool):
+    if value is None or value is True or value is False:
         return value
-    if isinstance(value, enum.Enum):
-        return str(value.name)
-    if isinstance(value, str):
+    kinds = _MRO(type(value))
+    if enum.Enum in kinds:
+        return str.__str__(object.__getattribute__(value, "_name_"))
+    if str in kinds:
         return str.__str__(value)
-    if isinstance(value, int):
-        return {"q": [str(int(value)), "1"], "w": True}
-    if isinstance(value, Fraction | Decimal | float):
+    if int in kinds:
+        return {"q": [int.__repr__(int.__index__(value)), "1"], "w": True}
+    if Fraction in kinds:
+        return _ratio(_NUMERATOR.__get__(value), _DENOMINATOR.__get__(value))
+    if float in kinds or Decimal in kinds:
         try:
-            numerator, denominator = value.as_integer_ratio()
+            return _ratio(*(float.as_integer_ratio(value) if float in kinds else _DECIMAL(value)))
         except (ValueError, OverflowError):
-            return {"?": f"the number {value}"}
-        return {"q": [str(numerator), str(denominator)]}
-    if isinstance(value, Table):
+            return {"?": f"the number {float.__repr__(value) if float in kinds else value}"}
+    if Table in kinds:
         rows = [[[coded(a, inner) for a in k], coded(v, inner)] for k, v in value._table.items()]
         return {"f": rows, "d": coded(value.default, inner)}
-    if isinstance(value, Mapping):
-        rows = [[coded(k, inner) if k is not ... else {"...": True}, coded(v, inner)] for k, v in value.items()]
-        return {"m": rows}
-    if isinstance(value, set | frozenset):
-        return {"s": [coded(item, inner) for item in value]}
-    if isinstance(value, tuple | list):
-        return {"t": [coded(item, inner) for item in value]}
+    if dict in kinds or isinstance(value, Mapping):
+        items = dict.items(value) if dict in kinds else value.items()
+        return {"m": [[coded(k, inner) if k is not ... else {"...": True}, coded(v, inner)] for k, v in items]}
+    for kind, mark in _MANY.items():
+        if kind in kinds:
+            return {mark: [coded(item, inner) for item in kind.__iter__(value)]}
     return {"?": f"a value of type {type(value).__name__}"}
+
+
+def _ratio(numerator: int, denominator: int) -> dict[str, Any]:
+    return {"q": [int.__repr__(numerator), int.__repr__(denominator)]}
+
+
+_MRO: Any = type.__dict__["__mro__"].__get__
+_NUMERATOR: Any = Fraction.__dict__["_numerator"]
+_DENOMINATOR: Any = Fraction.__dict__["_denominator"]
+_DECIMAL = Decimal.as_integer_ratio
+_MANY: dict[Any, str] = {set: "s", frozenset: "s", tuple: "t", list: "t"}
+_READS_JSON = json.JSONDecoder().scan_once  # type: ignore[attr-defined]
+_WRITES_JSON: Any = json.encoder.c_make_encoder(  # type: ignore[attr-defined]
+    None, None, json.encoder.encode_basestring_ascii, None, ": ", ", ", False, False, True
+)
+
+
+def loads(text: str) -> Any:
+    """As `json.loads`, by nothing that the subject can change."""
+    return _READS_JSON(text, 0)[0]
+
+
+def dumps(data: Any) -> str:
+    """As `json.dumps`."""
+    return "".join(_WRITES_JSON(data, 0))
 
 
 def load(path: str, function: str, drive: Any = None) -> Any:
@@ -125,7 +161,7 @@ def load(path: str, function: str, drive: Any = None) -> Any:
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its own neighbours, as if it were run
     spec.loader.exec_module(module)
     if drive is not None:
-        driven = json.loads(function)
+        driven = loads(function)
         return drive(getattr(module, driven["class"]), driven)
     return getattr(module, function)
 
@@ -135,8 +171,9 @@ def driving(function: str) -> Any:
     before the file is loaded."""
     if not function.startswith("{"):
         return None
-    steps = _beside("../drive/steps.py")
-    ros = json.loads(function).get("ros")
+    steps = _beside("../drive/steps.py", apart=True)
+    steps.json = types.SimpleNamespace(loads=loads, dumps=dumps)
+    ros = loads(function).get("ros")
     if ros is None:
         return steps.driver
     return _beside(f"../drive/{ros['kind']}.py").modules(_beside("../drive/callbacks.py"), ros, steps)
@@ -171,174 +208,25 @@ def _read_sources_only(root: str) -> None:
     sys.path_importer_cache.clear()
 
 
-# -- what the subject does besides answering ----------------------------------------------------------------------
-
-_READS = frozenset({"os.chdir"})
-_LISTS = frozenset({"os.listdir", "os.scandir"})
-_CHANGES = {
-    **dict.fromkeys(("os.remove", "os.rmdir"), ((0, 1),)),
-    **dict.fromkeys(("os.mkdir", "os.chmod"), ((0, 2),)),
-    **dict.fromkeys(("os.chown", "os.utime"), ((0, 3),)),
-    **dict.fromkeys(("os.rename", "os.link"), ((0, 2), (1, 3))),  # what is linked to can be written by its new name
-    **dict.fromkeys(("os.truncate", "os.setxattr", "os.removexattr"), ((0, -1),)),
-    "os.symlink": ((1, 2),),
-}
-"""Event → where among its arguments the paths are that it changes, each with its folder's descriptor, if any."""
-
-_PROCESSES = frozenset({"os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "signal.pthread_kill", "pty.spawn"})
-_PROGRAMS = frozenset({"subprocess.Popen", "os.posix_spawn", "os.spawn", "os.system"})
-_NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", "imaplib.", "poplib.", "nntplib.")
-_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-
-
-def _beside(file: str) -> Any:
-    """A module near this one, which is no package's here."""
+def _beside(file: str, *, apart: bool = False) -> Any:
+    """A module near this one, which is no package's here; `apart`, with builtin functions of its own."""
     place = os.path.join(os.path.dirname(__file__), file)  # noqa: PTH118, PTH120
     name = "avow_" + os.path.basename(file).partition(".")[0]  # noqa: PTH119
     loader = importlib.machinery.SourceFileLoader(name, place)
     spec = importlib.util.spec_from_loader(name, loader)
     module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
+    if apart:
+        vars(module)["__builtins__"] = vars(builtins).copy()
     loader.exec_module(module)
     return module
 
 
-def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Callable[[], None]]:
-    """What it looks at, as [event, path], growing as it runs, and what is to be called at the end. What no subject may
-    do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
-    taken away."""
-    seen: list[list[str]] = []
-    known: set[tuple[str, str]] = set()
-    fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
-    readlink, dirname = os.readlink, os.path.dirname
-
-    def written(place: Any) -> str:
-        place = fspath(place)
-        if isinstance(place, bytes):
-            place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
-        return str.__str__(place)  # of no class of the subject's own
-
-    def path_of(place: Any) -> str | None:
-        if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
-            return None
-        text = written(place)
-        path = norm(text if isabs(text) else join(getcwd(), text))
-        return None if path == scratch or path.startswith(scratch + os.sep) else path
-
-    def opened(descriptor: int) -> str:
-        try:
-            return readlink(f"/proc/self/fd/{descriptor}")
-        except OSError:
-            return f"/a file of descriptor {descriptor}"
-
-    def at(place: Any, folder: Any) -> str:
-        """The path of what a call names, also by descriptors."""
-        if isinstance(place, int):
-            return opened(place)
-        return join(opened(folder), written(place)) if isinstance(folder, int) and folder >= 0 else written(place)
-
-    def told(event: str, place: Any) -> None:
-        path = place if event in ("outside", "program", "variable") else path_of(place)
-        if path is not None and (event, path) not in known:
-            known.add((event, path))
-            seen.append([event, path])
-
-    def fault(what: str) -> None:
-        end(what)
-        raise PermissionError(f"a subject {what}")
-
-    def changes(place: Any, what: str) -> None:
-        path = path_of(place)
-        if path is not None and path != "/dev/null":
-            fault(f"{what} {path}")
-
-    def opens(place: Any, mode: Any, flags: Any) -> None:
-        path = path_of(place)
-        if path is None:
-            return
-        if (isinstance(mode, str) and set(mode) & set("wax+")) or (isinstance(flags, int) and flags & _WRITES):
-            changes(path, "writes")
-        elif path.startswith("/proc/") and path.split("/")[2] not in _HARMLESS:
-            fault(f"looks at another process ({path})")
-        else:
-            told("read", path)
-
-    def hook(event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "open":
-            opens(*arguments)
-        elif event in _LISTS:
-            told("list", at(arguments[0] if arguments[0] is not None else ".", None))
-        elif event == "import":
-            told("read", arguments[1])
-            if arguments[0] in _READING or _is_extension(arguments[1]):
-                told("program", f"the module {arguments[0]}")
-        elif event == "cpython.PyInterpreterState_New":
-            told("outside", "another interpreter")  # which no hook looks into
-        elif event == "sqlite3.load_extension":
-            told("outside", "an extension of SQLite")
-        elif event == "ctypes.dlopen" and arguments[0] is not None:  # of None: `import ctypes` itself
-            told("outside", f"the library {arguments[0]}")
-        elif event.startswith("ctypes.dlsym"):
-            told("outside", "a library's functions")
-        elif event == "sqlite3.connect":
-            name = str(arguments[0])
-            if name.startswith("file:") and "mode=ro" in name:
-                told("read", name.removeprefix("file:").partition("?")[0])
-            elif name not in ("", ":memory:"):
-                changes(arguments[0], "writes")
-        elif event in _READS:
-            told("read", arguments[0])
-        elif event in _CHANGES:
-            for place, folder in _CHANGES[event]:
-                changes(at(arguments[place], arguments[folder] if folder > 0 else None), event)
-            if event == "os.symlink":  # by which what it leads to could be written or read unseen
-                changes(join(dirname(at(arguments[1], arguments[2])), written(arguments[0])), event)
-        elif event in _PROCESSES:
-            fault(f"calls {event}")
-        elif event in _PROGRAMS:
-            told("program", f"the program {str(arguments[0])[:200]}")
-        elif event.startswith(_NETWORK):
-            told("outside", "the network")
-
-        elif event in _AROUND and not looking and (event != "object.__getattr__" or arguments[1] in _LEADING):
-            looking.append(event)
-            if senses.looks_around(event):
-                told("outside", "what runs it")
-            looking.clear()
-
-    looking: list[str] = []  # what it looks at itself to answer that is nothing that the subject asks for
-    senses = _beside("senses.py")
-    machine_code = _beside("machine_code.py")
-    drawn = senses.watch_all(told)
-    machine_code.watch_modules(told, senses.asked)
-    machine_code.watch_sqlite(told)
-    sys.addaudithook(hook)
-    return seen, drawn
-
-
-_AROUND = frozenset(
-    {"sys._getframe", "sys._current_frames", "gc.get_objects", "gc.get_referrers", "gc.get_referents"}
-    | {"object.__getattr__"}
-)
-"""Events by which a subject may find out that it is run by a judge and not by what it is made for."""
-_LEADING = ("tb_frame", "__code__")
-
-_READING = frozenset(
-    {"_ssl", "_dbm", "_gdbm", "_curses", "_posixshmem", "_tkinter", "nis", "ossaudiodev", "readline", "spwd", "syslog"}
-)
-"""Modules of Python's own in C that open files by themselves: a trace of system calls tells which."""
-_STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
-
-
-def _is_extension(file: Any) -> bool:
-    """Whether a module is of machine code, and not Python's own."""
-    return (
-        isinstance(file, str)
-        and file.endswith(tuple(importlib.machinery.EXTENSION_SUFFIXES))
-        and (not file.startswith(_STDLIB) or "-packages" in file)
-    )
-
-
-_HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
+def _apart() -> Any:
+    """This file once more, as a module that nothing leads to which the subject can get hold of: whatever it puts in the
+    place of what it finds here answers nothing. What it does get hold of is of here."""
+    own = _beside("host.py", apart=True)
+    own.Table, own._FromSource = Table, _FromSource
+    return own
 
 
 def accepted(function: Any) -> frozenset[str] | None:
@@ -370,10 +258,38 @@ def _told(error: BaseException) -> str:
         return type(error).__name__
 
 
-def _print_all() -> None:
+def _kept(*places: Mapping[str, Any]) -> Callable[[], bool]:
+    """What tells whether each of these names still is of what it is now."""
+    names = [(place, name, value) for place in places for name, value in place.items()]
+    return lambda: all(place.get(name) is value for place, name, value in names)
+
+
+def _threads() -> Callable[[], bool]:
+    """What tells whether a thread is left that Python would wait for at its end; those that are just ending, and the
+    idle ones of a pool, end within a second."""
+    count, listed = _thread._count, threading.enumerate
+    ending: Any = threading.Thread.__dict__["daemon"]
+    clock, wait = time.monotonic, time.sleep
+
+    def left() -> bool:
+        return count() > len([thread for thread in listed() if ending.__get__(thread)])
+
+    def found() -> bool:
+        pool = sys.modules.get("concurrent.futures.thread")
+        if pool is not None and left():
+            threading.Thread(target=pool._python_exit, daemon=True).start()
+        end = clock() + 1.0
+        while left() and clock() < end:
+            wait(0.01)
+        return left()
+
+    return found
+
+
+def _print_all(is_extension: Callable[[Any], bool]) -> None:
     """What machine code printed and the C library still holds, as at the end of any process."""
     modules = list(sys.modules.items())
-    if any(name == "_ctypes" or _is_extension(getattr(module, "__file__", None)) for name, module in modules):
+    if any(name == "_ctypes" or is_extension(getattr(module, "__file__", None)) for name, module in modules):
         import _ctypes
 
         library: Any = _ctypes
@@ -383,22 +299,28 @@ def _print_all() -> None:
 def main() -> None:
     path, function, root, level = sys.argv[1:5]
     source, sink, mark = int(sys.argv[5]), int(sys.argv[6]), sys.argv[7]
-    eyes = _FromSource.eyes = _beside("sights.py").Eyes(json.loads(sys.argv[8])) if sys.argv[8:] else None
+    eyes = _FromSource.eyes = _beside("sights.py").Eyes(loads(sys.argv[8])) if sys.argv[8:] else None
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
         drive = driving(function)
         _read_sources_only(os.path.realpath(root))
-        dumps, write, leave = json.dumps, os.write, os._exit
+        write, leave = os.write, os._exit
         streams = [sys.stdout.flush, sys.stderr.flush]
 
         def end(fault: str) -> None:
             write(sink, (dumps({"faults": [fault]}) + "\n").encode())
             leave(1)
 
-        seen, drawn = watch(tempfile.gettempdir(), end)
+        watching = _beside("watching.py")
+        seen, drawn = watching.watch(tempfile.gettempdir(), end, _beside)
+
+        others = _threads()
+        whole = _kept(vars(sys.modules["__main__"]), vars(Table), vars(_FromSource))
 
         def say(message: dict[str, Any]) -> None:
+            if not whole():
+                end("patches what runs it")
             for flush in streams:  # what it printed comes before its answer
                 with contextlib.suppress(Exception):
                     flush()
@@ -419,17 +341,19 @@ def main() -> None:
         if eyes is not None:
             held = eyes.loaded(sys.modules.copy().values)
             for line in requests:
-                said = [answer(subject, known, r) | {"sights": eyes.told()} for r in json.loads(line)]
+                said = [answer(subject, known, r) | {"sights": eyes.told()} for r in loads(line)]
                 said[0]["sights"] += held
                 held = []
                 say({"replies": said})
         for line in requests:
-            say({"replies": [answer(subject, known, request) for request in json.loads(line)]})
+            say({"replies": [answer(subject, known, request) for request in loads(line)]})
         drawn()
+        if others():
+            end("left threads running")
         told = seen[:]
         look(f"{mark}-end", os.F_OK)
         with contextlib.suppress(Exception):
-            _print_all()
+            _print_all(watching.is_extension)
         processes = [int(name) for name in os.listdir("/proc") if name.isdigit()] if level == "sealed" else []  # noqa: PTH208
         seen[:] = told  # that was us
         if set(processes) - {1, os.getpid()}:
@@ -439,5 +363,5 @@ def main() -> None:
 
 if __name__ == "__main__":
     sys.setrecursionlimit(2000)
-    main()
+    _apart().main()
     os._exit(0)

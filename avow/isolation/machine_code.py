@@ -47,6 +47,8 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
         for name in names.split():
             if hasattr(module, name):
                 setattr(module, name, outer(getattr(module, name), "outside", what))
+        if module.__name__ == "_signal":
+            module.signal = _frameless(module.signal)
 
     for name in _OF_MODULES.keys() & sys.modules.keys():
         loaded(sys.modules[name])
@@ -65,6 +67,15 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
     _locale.setlocale = outer(_locale.setlocale, "program", "the C library")
     if "locale" in sys.modules:
         setattr(sys.modules["locale"], "_setlocale", _locale.setlocale)  # noqa: B010
+
+
+def _frameless(install: Callable[..., Any]) -> Callable[..., Any]:
+    """As `_signal.signal`, of handlers that get no frame: it leads to what runs the subject."""
+
+    def call(number: int, handler: Any) -> Any:
+        return install(number, (lambda signal, frame: handler(signal, None)) if callable(handler) else handler)
+
+    return functools.wraps(install)(call)
 
 
 def watch_sqlite(told: Told) -> None:

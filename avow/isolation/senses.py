@@ -36,7 +36,7 @@ _NOW = {"localtime": 0, "gmtime": 0, "ctime": 0, "asctime": 0, "strftime": 1}
 
 _HOST = tuple(
     os.path.join(os.path.dirname(__file__), name)  # noqa: PTH118, PTH120
-    for name in ("host.py", "senses.py", "machine_code.py")
+    for name in ("host.py", "watching.py", "senses.py", "machine_code.py")
 )
 _INSTALLED = tuple(place + os.sep for place in sys.path if place.endswith("-packages"))
 _IMPORT = ("<frozen importlib", "<frozen zipimport")
@@ -85,6 +85,8 @@ def looks_around(event: str) -> bool:
     frame: Any = sys._getframe(2)
     while frame is not None and event == "sys._getframe" and frame.f_code.co_filename.startswith(_LOOKING):
         frame = frame.f_back
+    if frame is not None and frame.f_code.co_filename.startswith(_STDLIB + "logging/"):
+        frame = frame.f_back  # `logging.currentframe` hands it on
     if frame is None:
         return False
     file = frame.f_code.co_filename

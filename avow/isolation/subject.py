@@ -17,6 +17,7 @@ from typing import Any
 from avow.base import process
 from avow.base.codec import LATER, Unreadable, from_text
 from avow.base.records import dataclass
+from avow.base.tuning.sizes import SCRATCH_BYTES
 from avow.base.verdict import Isolation
 from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
@@ -118,10 +119,14 @@ class SubjectProcess:
         if self.process is not None:
             os.close(self._to)
             self._to = -1
-            with contextlib.suppress(SubjectFailed, subprocess.TimeoutExpired):
-                self.patience = min(self.patience, 2.0)
-                self._message()  # its last: what it looked at, and whether something is left
-                self.process.wait(2.0)
+            try:
+                if not self._message().end:  # its last: what it looked at, and whether something is left
+                    self.fault = self.fault or "the subject does not end as it is asked"
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self.process.wait(2.0)
+            except SubjectFailed as failure:
+                if not self.silent:
+                    self.fault = self.fault or f"the subject does not end as it is asked: {failure}"
         self._stop()
         return self.fault
 
@@ -212,6 +217,8 @@ class SubjectProcess:
             self.process, self._buffer = None, b""
             self._read_trace()
         if self._scratch is not None:
+            if _more_than(SCRATCH_BYTES, self._scratch.name) and not self.fault:
+                self.fault = f"the subject fills its scratch folder: more than {SCRATCH_BYTES // 1_000_000} MB"
             self._scratch.cleanup()
             self._scratch = None
 
@@ -300,3 +307,15 @@ class SubjectProcess:
                 raise self._end("the subject's answer has no end")
         line, _, self._buffer = self._buffer.partition(b"\n")
         return line
+
+
+def _more_than(limit: int, folder: str) -> bool:
+    """Whether what lies in a folder takes more bytes of the disk."""
+    taken = 0
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            with contextlib.suppress(OSError):
+                taken += os.lstat(os.path.join(place, name)).st_blocks * 512  # noqa: PTH118
+        if taken > limit:
+            return True
+    return False

@@ -141,3 +141,6 @@ PRINTED_LINE = 1 << 16
 
 PRINTED_KEPT = 20_000
 """Bytes of a program's standard error that are kept, the last: a sanitizer's report is its end."""
+
+SCRATCH_BYTES = 200_000_000
+"""Bytes that a subject may leave in its scratch folder: a log has some megabytes, and the disk is everybody's."""

@@ -1,0 +1,174 @@
+"""Watches what a subject does besides answering: what it looks at is told, and what no subject may do ends it.
+
+Loaded by `host` from beside it, as `senses` is. What the subject can get hold of leads here, and not to what answers.
+"""
+
+from __future__ import annotations
+
+import importlib.machinery
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+_READS = frozenset({"os.chdir"})
+_LISTS = frozenset({"os.listdir", "os.scandir"})
+_CHANGES = {
+    **dict.fromkeys(("os.remove", "os.rmdir"), ((0, 1),)),
+    **dict.fromkeys(("os.mkdir", "os.chmod"), ((0, 2),)),
+    **dict.fromkeys(("os.chown", "os.utime"), ((0, 3),)),
+    **dict.fromkeys(("os.rename", "os.link"), ((0, 2), (1, 3))),  # what is linked to can be written by its new name
+    **dict.fromkeys(("os.truncate", "os.setxattr", "os.removexattr"), ((0, -1),)),
+    "os.symlink": ((1, 2),),
+}
+"""Event → where among its arguments the paths are that it changes, each with its folder's descriptor, if any."""
+
+_PROCESSES = frozenset({"os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "signal.pthread_kill", "pty.spawn"})
+_PROGRAMS = frozenset({"subprocess.Popen", "os.posix_spawn", "os.spawn", "os.system"})
+_NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", "imaplib.", "poplib.", "nntplib.")
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+def watch(
+    scratch: str, end: Callable[[str], None], beside: Callable[[str], Any]
+) -> tuple[list[list[str]], Callable[[], None]]:
+    """What it looks at, as [event, path], growing as it runs, and what is to be called at the end. What no subject may
+    do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
+    taken away."""
+    seen: list[list[str]] = []
+    known: set[tuple[str, str]] = set()
+    fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
+    readlink, dirname = os.readlink, os.path.dirname
+
+    def written(place: Any) -> str:
+        place = fspath(place)
+        if isinstance(place, bytes):
+            place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
+        return str.__str__(place)  # of no class of the subject's own
+
+    def path_of(place: Any) -> str | None:
+        if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
+            return None
+        text = written(place)
+        path = norm(text if isabs(text) else join(getcwd(), text))
+        return None if path == scratch or path.startswith(scratch + os.sep) else path
+
+    def opened(descriptor: int) -> str:
+        try:
+            return readlink(f"/proc/self/fd/{descriptor}")
+        except OSError:
+            return f"/a file of descriptor {descriptor}"
+
+    def at(place: Any, folder: Any) -> str:
+        """The path of what a call names, also by descriptors."""
+        if isinstance(place, int):
+            return opened(place)
+        return join(opened(folder), written(place)) if isinstance(folder, int) and folder >= 0 else written(place)
+
+    def told(event: str, place: Any) -> None:
+        path = place if event in ("outside", "program", "variable") else path_of(place)
+        if path is not None and (event, path) not in known:
+            known.add((event, path))
+            seen.append([event, path])
+
+    def fault(what: str) -> None:
+        end(what)
+        raise PermissionError(f"a subject {what}")
+
+    def changes(place: Any, what: str) -> None:
+        path = path_of(place)
+        if path is not None and path != "/dev/null":
+            fault(f"{what} {path}")
+
+    def opens(place: Any, mode: Any, flags: Any) -> None:
+        path = path_of(place)
+        if path is None:
+            return
+        if (isinstance(mode, str) and set(mode) & set("wax+")) or (isinstance(flags, int) and flags & _WRITES):
+            changes(path, "writes")
+        elif path.startswith("/proc/") and path.split("/")[2] not in _HARMLESS:
+            fault(f"looks at another process ({path})")
+        else:
+            told("read", path)
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            opens(*arguments)
+        elif event in _LISTS:
+            told("list", at(arguments[0] if arguments[0] is not None else ".", None))
+        elif event == "import":
+            told("read", arguments[1])
+            if arguments[0] in _READING or is_extension(arguments[1]):
+                told("program", f"the module {arguments[0]}")
+        elif event == "cpython.PyInterpreterState_New":
+            told("outside", "another interpreter")  # which no hook looks into
+        elif event == "sqlite3.load_extension":
+            told("outside", "an extension of SQLite")
+        elif event == "ctypes.dlopen" and arguments[0] is not None:  # of None: `import ctypes` itself
+            told("outside", f"the library {arguments[0]}")
+        elif event.startswith("ctypes.dlsym"):
+            told("outside", "a library's functions")
+        elif event == "sqlite3.connect":
+            name = str(arguments[0])
+            if name.startswith("file:") and "mode=ro" in name:
+                told("read", name.removeprefix("file:").partition("?")[0])
+            elif name not in ("", ":memory:"):
+                changes(arguments[0], "writes")
+        elif event in _READS:
+            told("read", arguments[0])
+        elif event in _CHANGES:
+            for place, folder in _CHANGES[event]:
+                changes(at(arguments[place], arguments[folder] if folder > 0 else None), event)
+            if event == "os.symlink":  # by which what it leads to could be written or read unseen
+                changes(join(dirname(at(arguments[1], arguments[2])), written(arguments[0])), event)
+        elif event in _PROCESSES:
+            fault(f"calls {event}")
+        elif event in _PROGRAMS:
+            told("program", f"the program {str(arguments[0])[:200]}")
+        elif event.startswith(_NETWORK):
+            told("outside", "the network")
+
+        elif event in _TRACES:
+            told("outside", "what runs it")
+        elif event in _AROUND and not looking and (not event.startswith("object.") or arguments[1] in _LEADING):
+            looking.append(event)
+            if senses.looks_around(event):
+                told("outside", "what runs it")
+            looking.clear()
+
+    looking: list[str] = []  # what it looks at itself to answer that is nothing that the subject asks for
+    senses = beside("senses.py")
+    machine_code = beside("machine_code.py")
+    drawn = senses.watch_all(told)
+    machine_code.watch_modules(told, senses.asked)
+    machine_code.watch_sqlite(told)
+    sys.addaudithook(hook)
+    return seen, drawn
+
+
+_AROUND = frozenset(
+    {"sys._getframe", "sys._current_frames", "gc.get_objects", "gc.get_referrers", "gc.get_referents"}
+    | {"object.__getattr__", "object.__setattr__"}
+)
+"""Events by which a subject may find out that it is run by a judge and not by what it is made for."""
+_LEADING = ("tb_frame", "gi_frame", "cr_frame", "ag_frame", "__code__", "__defaults__", "__kwdefaults__")
+_TRACES = frozenset({"sys.settrace", "sys.setprofile", "sys.monitoring.register_callback"})
+"""Events after which it is handed all frames."""
+
+_READING = frozenset(
+    {"_ssl", "_dbm", "_gdbm", "_curses", "_posixshmem", "_tkinter", "nis", "ossaudiodev", "readline", "spwd", "syslog"}
+)
+"""Modules of Python's own in C that open files by themselves: a trace of system calls tells which."""
+_STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
+
+
+def is_extension(file: Any) -> bool:
+    """Whether a module is of machine code, and not Python's own."""
+    return (
+        isinstance(file, str)
+        and file.endswith(tuple(importlib.machinery.EXTENSION_SUFFIXES))
+        and (not file.startswith(_STDLIB) or "-packages" in file)
+    )
+
+
+_HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
