@@ -24,14 +24,14 @@ import os
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from avow.base.codec import Unreadable, canonical, from_json, from_text, to_json
+from avow.base.codec import Unreadable, canonical, from_json, from_text, plain, to_json
 from avow.base.files import identity, read_regular, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
-from avow.evidence.encoding import encode
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, Head, index_path, note
 from avow.evidence.record import CASE, Evidence
@@ -347,6 +347,11 @@ class Ledger:
 def ledger_of(path: Path) -> Ledger:
     """One reader for each file and process: it reads what was added since, not all again."""
     return Ledger(path, remembers=True)
+
+
+def encode(evidence: Evidence) -> dict[str, Any]:
+    """A record as plain JSON data."""
+    return {**to_json(evidence), "seconds": plain(float(evidence.seconds))}  # one spelling, whichever number was given
 
 
 _BEFORE, _BEHIND = b'{"evidence":', b',"hash":"'

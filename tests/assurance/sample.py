@@ -15,8 +15,7 @@ from avow.base.codec import canonical
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Link, Verdict
-from avow.evidence.encoding import encode
-from avow.evidence.ledger import GENESIS, Entry
+from avow.evidence.ledger import GENESIS, Entry, encode
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.language.contract import Clause, ClauseKind, Contract, Node

@@ -19,12 +19,11 @@ import pytest
 from assurance.sample import chain, evidence
 
 from avow.assurance.codec import evidence_schema
-from avow.base.codec import Unreadable
+from avow.base.codec import Unreadable, from_json
 from avow.base.files import sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence import ledger as module
-from avow.evidence.encoding import decode, encode
-from avow.evidence.ledger import GENESIS, Ledger
+from avow.evidence.ledger import GENESIS, Ledger, encode
 from avow.evidence.record import Evidence
 
 
@@ -59,7 +58,7 @@ def test_every_line_meets_the_published_schema(tmp_path: Path) -> None:
     line = json.loads(ledger.path.read_text())
     jsonschema.Draft202012Validator(evidence_schema()).validate(line)
     assert line["evidence"]["bound"] == {"cases": 2000, "p": "1/3", "set": [1, 2], "nan": "nan"}
-    assert encode(decode(line["evidence"])) == line["evidence"]
+    assert encode(from_json(Evidence, line["evidence"])) == line["evidence"]
 
 
 def test_latest_and_current(tmp_path: Path) -> None:
@@ -256,12 +255,12 @@ def test_a_reader_sees_what_another_process_adds(tmp_path: Path) -> None:
 )
 def test_ill_typed_records_are_not_read(change: dict[str, object]) -> None:
     with pytest.raises(Unreadable):
-        decode({**encode(some(1)[0]), **change})
+        from_json(Evidence, {**encode(some(1)[0]), **change})
 
 
 def test_encoding_keeps_a_whole_record() -> None:
     record = replace(some(1)[0], hypotheses=("h",), command=("a", "b c"), inputs={"p": "d"})
-    assert decode(json.loads(json.dumps(encode(record)))) == record
+    assert from_json(Evidence, json.loads(json.dumps(encode(record)))) == record
 
 
 def test_while_it_stands_still_nothing_is_read_and_nothing_written(tmp_path: Path) -> None:
