@@ -224,7 +224,7 @@ def _of_fields(kind: type) -> Read:
         if type(data) is not dict:
             raise Unreadable(f": not a {kind.__name__}")
         values: list[Any] = []
-        there, faults = 0, tuple[str, ...]()
+        there, made, faults = 0, by_place, tuple[str, ...]()
         for key, read, default in in_order:
             if key in data:
                 there += 1
@@ -234,13 +234,14 @@ def _of_fields(kind: type) -> Read:
                     faults = (*faults, *error.within(f".{key}"))
             else:
                 values.append(default)
+                made = made and default is not _MISSING
         if there != len(data) or (there != len(names) and not needed <= data.keys()):
             missing, extra = needed - data.keys(), () if foreign else data.keys() - fields.keys()
             if missing or extra:
                 faults = (f": fields missing: {sorted(missing)}, unknown: {sorted(map(str, extra))}", *faults)
         if faults:
             raise Unreadable(*faults)
-        if by_place and (there == len(names) or not any(value is _MISSING for value in values)):
+        if made:
             return kind(*values)
         return kind(**{fields[key].name: value for key, value in zip(names, values, strict=True) if key in data})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from avow.base.remembered import by_identity
 from avow.language.terms import History, Role, Term, Variable
 
 
@@ -16,6 +17,7 @@ def subterms(term: Term) -> Iterator[Term]:
         stack.extend(reversed(current.children))
 
 
+@by_identity(50_000)
 def histories(term: Term) -> tuple[History, ...]:
     """What in a term speaks of other steps than this one, in reading order; none in a term of one step."""
     return tuple(part for part in subterms(term) if isinstance(part, History))

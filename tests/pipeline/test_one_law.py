@@ -113,7 +113,7 @@ class World:
 
     def keep(self) -> None:
         place = self.root.with_name(f"{self.root.name}-kept{len(self.kept)}")
-        if (self.root / "artifacts").is_dir():
+        if (self.root / "artifacts" / "s").is_dir():  # not where the first run was killed at once
             shutil.copytree(self.root / "artifacts" / "s", place, dirs_exist_ok=True)
             self.kept.append(place)
 

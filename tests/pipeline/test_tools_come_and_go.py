@@ -42,6 +42,7 @@ module {:options "--function-syntax:3"} SensorImpl refines SensorSpec {
 }
 """
 LIFT = Path(__file__).parents[1] / "ajpf" / "fixtures" / "lift"
+OPTIONS = yaml.safe_load((LIFT / "plan.yaml").read_text())["nodes"]["cabin"]["methods"][0]["ajpf"]
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ SAMPLES = {
     "dafny": Sample({"dafny": {"implementation": "s.dfy"}}, {"s.dfy": DAFNY}, ("dafny", "z3", "strace"), {}),
     "fuzz": Sample({"fuzz": {"runs": 100}}, {"n.hpp": ADAPTER}, ("clang++", *GUARDS), {"source": {"cpp": "n.hpp"}}),
     "ajpf": Sample(
-        yaml.safe_load((LIFT / "plan.yaml").read_text())["nodes"]["cabin"]["methods"][0],
+        {"ajpf": {**OPTIONS, "engine": "auto"}},
         {name: (LIFT / name).read_text() for name in ("cabin.gwen", "cabin.yaml")},
         ("spin", "gcc", "strace"),
         {},
