@@ -217,7 +217,8 @@ def _today() -> date:
 
 
 def _key(assessment: Assessment) -> str:
-    """The report depends on the texts, the plan, all evidence, and the day (reviews and accepted risks expire)."""
+    """The report depends on the texts, the plan, all evidence, the day (reviews and accepted risks expire), and what is
+    installed: a format that was left out is made once its tool is there."""
     surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
     keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
     damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
@@ -233,11 +234,9 @@ def _key(assessment: Assessment) -> str:
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
     kernel = kernel_run(entries, root, surveyed.system, assessment.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
-    return sha256(
-        json.dumps(
-            [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
-        )
-    )
+    tools = [[tool.name, tool.version, tool.install] for tool in _tools()]
+    told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
+    return sha256(json.dumps([*told, tools]))
 
 
 def _seconds_in_words() -> str:
