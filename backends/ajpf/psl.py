@@ -7,7 +7,7 @@ AJPF's grammar has traps: ``||`` binds tighter than ``&``,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -103,6 +103,19 @@ def parts(formula: Formula) -> tuple[Formula, ...]:
             return items
         case Implies(left=left, right=right) | Until(left=left, right=right) | Release(left=left, right=right):
             return (left, right)
+
+
+def changed(formula: Formula, change: Callable[[Formula], Formula]) -> Formula:
+    """The formula, with each of its parts changed."""
+    match formula:
+        case Atom() | Truth():
+            return formula
+        case And(items=items) | Or(items=items):
+            return type(formula)(tuple(map(change, items)))
+        case Not(body=body) | Always(body=body) | Eventually(body=body):
+            return type(formula)(change(body))
+        case Implies(left=left, right=right) | Until(left=left, right=right) | Release(left=left, right=right):
+            return type(formula)(change(left), change(right))
 
 
 def atoms(formula: Formula) -> Iterator[Atom]:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import assert_never
+from dataclasses import dataclass, replace
 
 from .psl import (
     AGENT_NAME,
@@ -25,9 +24,9 @@ from .psl import (
     Not,
     Or,
     Release,
-    Truth,
     Until,
     atoms,
+    changed,
 )
 from .syntax import Struct, Term, Var
 from .tuning import PROPERTY_LENGTH, PROPERTY_NESTING
@@ -209,31 +208,11 @@ class _Parser:
 
 def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
     """The formula with its index variables replaced. Raises Malformed where something is left that AJPF cannot read."""
-    match formula:
-        case Atom(modality=modality, agent=agent, term=term):
-            made = _instantiate(term, values)
-            assert isinstance(made, Struct)
-            return Atom(modality, agent, made)
-        case Not(body=body):
-            return Not(instantiate(body, values))
-        case Always(body=body):
-            return Always(instantiate(body, values))
-        case Eventually(body=body):
-            return Eventually(instantiate(body, values))
-        case And(items=items):
-            return And(tuple(instantiate(i, values) for i in items))
-        case Or(items=items):
-            return Or(tuple(instantiate(i, values) for i in items))
-        case Implies(left=left, right=right):
-            return Implies(instantiate(left, values), instantiate(right, values))
-        case Until(left=left, right=right):
-            return Until(instantiate(left, values), instantiate(right, values))
-        case Release(left=left, right=right):
-            return Release(instantiate(left, values), instantiate(right, values))
-        case Truth():
-            return formula
-        case _:
-            assert_never(formula)
+    if isinstance(formula, Atom):
+        made = _instantiate(formula.term, values)
+        assert isinstance(made, Struct)
+        return replace(formula, term=made)
+    return changed(formula, lambda part: instantiate(part, values))
 
 
 def _instantiate(term: Term, values: Mapping[str, int]) -> Term:
