@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from helpers import some
@@ -10,9 +12,14 @@ from oracle.runs import longer
 from oracle.values import Step, keeps
 
 from avow.base.verdict import Verdict
+from avow.calculus import refinement_runs
 from avow.calculus.discharge import Bounds
+from avow.calculus.questions import Answer
 from avow.calculus.refinement import refines
+from avow.calculus.requirements import formula_question
 from avow.formulas.temporal.cells import remembers
+from avow.kernel.certificate import How
+from avow.kernel.check import Needed
 from avow.language.contract import Node
 from avow.language.load import check_text
 from temporal.test_viability import drawn, node_of
@@ -91,6 +98,26 @@ def test_known_answers(concrete: tuple[str, str], abstract: tuple[str, str], ver
     assert ("vacuous" if found.vacuous else found.verdict.value) == verdict
     if verdict == "proved":
         assert found.certificates
+
+
+@pytest.mark.parametrize("other", [Needed(How.TOGETHER, "n", ""), Needed(How.OPEN, "n", "0"), None])
+def test_a_proof_that_rests_on_more_than_the_contracts_say_is_none(
+    other: Needed | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked(*told: Any) -> Callable[..., Answer]:
+        def answer(*given: Any) -> Answer:
+            found = formula_question(*told)(*given)
+            known = found.established
+            assert known is not None
+            more = None if other is None else replace(known, hypotheses=(*known.hypotheses, other))
+            return replace(found, established=more)
+
+        return answer
+
+    monkeypatch.setattr(refinement_runs, "formula_question", asked)
+    found = refines(_node("", SOON.format("2 steps")), _node("", SOON.format("3 steps")))
+    assert [demand.verdict for demand in found.demands] == [Verdict.UNKNOWN]
+    assert not found.certificates
 
 
 def test_a_demand_over_runs_is_told_with_its_node_and_what_it_needs() -> None:
