@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import TypeVar
+from collections.abc import Hashable, Iterable
+from typing import Any, TypeVar
 
 T = TypeVar("T", bound=Hashable)
 
 
-def flattened(
-    items: Iterable[T], within: Callable[[T], Sequence[T] | None], unit: T, zero: T, *, once: bool = False
-) -> list[T] | None:
-    """The parts of a junction: for one that is a junction of the same kind (`within` gives its parts) its own, however
-    deep, and without the `unit`, which changes nothing. None where the `zero` is among them, which decides it.
-    `once`: each part once."""
+def joined(items: Iterable[T], kind: Any, unit: T, zero: T, *, once: bool = False) -> T:
+    """A junction of the items: of one that is itself of the `kind`, its own `items`, however deep; without the `unit`,
+    which changes nothing; the `zero` where it is among them, which decides it. `once`: each item once."""
     found: list[T] = []
     stack = list(items)
     stack.reverse()
     while stack:
         item = stack.pop()
-        inner = within(item)
-        if inner is not None:
-            stack.extend(reversed(inner))
+        if isinstance(item, kind):
+            stack.extend(reversed(item.items))
         elif item == zero:
-            return None
+            return zero
         elif item != unit:
             found.append(item)
-    return list(dict.fromkeys(found)) if once else found
+    if once:
+        found = list(dict.fromkeys(found))
+    if not found:
+        return unit
+    made: T = found[0] if len(found) == 1 else kind(tuple(found))
+    return made

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import assert_never
 
 from avow.base.remembered import by_identity
-from avow.formulas.flattening import flattened
+from avow.formulas.flattening import joined
 from avow.formulas.traversal import Steps, run
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPPOSITE
@@ -74,12 +74,12 @@ from avow.language.terms import (
 
 def conjunction(terms: Iterable[Term]) -> Term:
     """``and`` of all of them, flattened; TRUE of none."""
-    return _join(tuple(terms), And)
+    return joined(terms, And, TRUE, FALSE)
 
 
 def disjunction(terms: Iterable[Term]) -> Term:
     """``or`` of all of them, flattened; FALSE of none."""
-    return _join(tuple(terms), Or)
+    return joined(terms, Or, FALSE, TRUE)
 
 
 def negation(term: Term) -> Term:
@@ -99,14 +99,6 @@ def opposite(term: Term) -> Term:
 def equation(one: Term, other: Term) -> Term:
     """That two terms have one value: ``<=>`` of formulas."""
     return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
-
-
-def _join(terms: tuple[Term, ...], kind: type[And] | type[Or]) -> Term:
-    unit, zero = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
-    items = flattened(terms, lambda term: term.items if isinstance(term, kind) else None, unit, zero)
-    if not items:
-        return zero if items is None else unit
-    return items[0] if len(items) == 1 else kind(tuple(items))
 
 
 # -- variables ---------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
-from avow.formulas.flattening import flattened
+from avow.formulas.flattening import joined
 
 from .syntax import Struct, Term, Var
 
@@ -142,12 +142,10 @@ def disjunction(items: list[Formula] | tuple[Formula, ...]) -> Formula:
 def _junction(
     items: list[Formula] | tuple[Formula, ...], kind: type[And] | type[Or], unit: Truth, zero: Truth
 ) -> Formula:
-    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, unit, zero, once=True)
-    if flat is None or not {negation(piece) for piece in flat}.isdisjoint(flat):
+    made = joined(items, kind, unit, zero, once=True)
+    if isinstance(made, kind) and not {negation(piece) for piece in made.items}.isdisjoint(made.items):
         return zero
-    if not flat:
-        return unit
-    return kind(tuple(flat)) if len(flat) > 1 else flat[0]
+    return made
 
 
 def negation(formula: Formula) -> Formula:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from avow.formulas.flattening import flattened
+from avow.formulas.flattening import joined
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
@@ -74,18 +74,11 @@ def disjuncts(term: Term) -> tuple[Term, ...]:
 
 
 def conjunction(items: list[Term]) -> Term:
-    return _junction(items, And, TRUE, FALSE)
+    return joined(items, And, TRUE, FALSE, once=True)
 
 
 def disjunction(items: list[Term]) -> Term:
-    return _junction(items, Or, FALSE, TRUE)
-
-
-def _junction(items: list[Term], kind: type[And] | type[Or], unit: Term, zero: Term) -> Term:
-    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, unit, zero, once=True)
-    if not flat:
-        return zero if flat is None else unit
-    return kind(tuple(flat)) if len(flat) > 1 else flat[0]
+    return joined(items, Or, FALSE, TRUE, once=True)
 
 
 def _shaped(term: Term) -> Term:

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.base.decimals import decimal
-from avow.formulas.flattening import flattened
+from avow.formulas.flattening import joined
 from avow.language.operators import OPPOSITE
 
 KEYWORDS = frozenset(
@@ -84,20 +84,11 @@ def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
 
 
 def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    return _join(items, Every, FALSE)
+    return joined(items, Every, TRUE, FALSE, once=True)
 
 
 def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    return _join(items, Some, TRUE)
-
-
-def _join(
-    items: list[Condition] | tuple[Condition, ...], kind: type[Every] | type[Some], absorbing: Condition
-) -> Condition:
-    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, kind(()), absorbing, once=True)
-    if flat is None:
-        return absorbing
-    return flat[0] if len(flat) == 1 else kind(tuple(flat))
+    return joined(items, Some, FALSE, TRUE, once=True)
 
 
 def opposite(condition: Condition) -> Condition:
