@@ -26,7 +26,7 @@ VERDICTS = {
 
 
 def avow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "avow.cli", *arguments]
+    command = [sys.executable, "-m", "avow", *arguments]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
 
 

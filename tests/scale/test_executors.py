@@ -240,7 +240,7 @@ class Machines:
 
     def worker(self, *around: str) -> subprocess.Popen[bytes]:
         """`around`: a command that runs it."""
-        command = [*around, sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
+        command = [*around, sys.executable, "-m", "avow", "worker", "--on", self.url, "--slots", "1"]
         marked = {**os.environ, "AVOW_TEST_CLUSTER": self.url}
         self.processes.append(
             subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=marked)

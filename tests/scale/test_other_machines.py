@@ -212,7 +212,7 @@ def test_a_run_that_ends_leaves_no_tool_on_a_worker(
     def hanging() -> bool:
         return any(b"sleep" in command(pid) for pid in machines.left())
 
-    words = [sys.executable, "-m", "avow.cli", "verify", "--on", machines.url]
+    words = [sys.executable, "-m", "avow", "verify", "--on", machines.url]
     run = subprocess.Popen(words, cwd=place.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         until(hanging)

@@ -1,5 +1,0 @@
-"""``python -m avow.cli``."""
-
-from avow.cli import main
-
-main()
