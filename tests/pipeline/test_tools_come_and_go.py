@@ -173,3 +173,17 @@ def test_the_law_when_a_tool_comes_or_goes(tmp_path: Path, programs: Path, case:
     again = world.verify()
     assert again == first
     assert again == world.verify("--fresh")
+
+
+@pytest.mark.slow
+def test_a_run_with_nothing_to_do_starts_neither_tracer_nor_sandbox(tmp_path: Path, programs: Path) -> None:
+    world, log = World(tmp_path, programs, SAMPLES["hypothesis"]), tmp_path / "log"
+    for name in GUARDS:
+        world.hide(name)
+        (programs / name).write_text(f'#!/bin/sh\necho {name} >>{log}\nexec /usr/bin/{name} "$@"\n')
+        (programs / name).chmod(0o755)
+    first = world.verify()
+    started = log.read_text()
+    assert "strace" in started
+    assert world.verify() == first
+    assert log.read_text() == started
