@@ -179,7 +179,7 @@ def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:
     import threading
     import time
 
-    from avow.base.files import write
+    from avow.base.files import write_out
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -191,7 +191,7 @@ def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:
 
     reader = threading.Thread(target=read)
     reader.start()
-    assert write(pipe, "text")
+    write_out(pipe, "text")
     reader.join(timeout=20)
     assert got == [b"text"]
     assert pipe.is_fifo()
