@@ -49,7 +49,7 @@ def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
 
 
 def _wrong_places(root: Piece) -> Iterator[tuple[str | int, ...]]:
-    for error in _errors(root, plan_schema()):
+    for error in _validator()(plan_schema()).iter_errors(root.data):
         path = tuple(error.absolute_path)
         if "propertyNames" in error.absolute_schema_path:
             yield (*path, str(error.instance))
@@ -99,16 +99,8 @@ def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | 
 
 
 def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
-    found = [d for error in _errors(piece, schema) for d in _explain(error, piece, whole)]
+    found = [d for error in _validator()(schema).iter_errors(piece.data) for d in _explain(error, piece, whole)]
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
-
-
-def _errors(piece: Piece, schema: Mapping[str, Any]) -> Iterable[Any]:
-    from jsonschema import Draft202012Validator, validators  # slow to import
-
-    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(schema)  # type: ignore[no-untyped-call]
-    found: Iterable[Any] = validator.iter_errors(piece.data)
-    return found
 
 
 def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
@@ -133,6 +125,14 @@ def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else step)
     return text or whole
+
+
+@cache
+def _validator() -> Any:
+    """The class of validators: to make one costs more than to check a plan."""
+    from jsonschema import Draft202012Validator, validators  # slow to import
+
+    return validators.extend(Draft202012Validator, {"pattern": _pattern})  # type: ignore[no-untyped-call]
 
 
 def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterator[Any]:
