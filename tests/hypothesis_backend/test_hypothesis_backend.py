@@ -244,7 +244,9 @@ def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, suppo
 @pytest.mark.parametrize(
     ("text", "verdict"),
     [
-        ("def f(x):\n    return id(object()) // 16 % 997 / 1000\n", Verdict.UNKNOWN),
+        pytest.param(
+            "def f(x):\n    return id(object()) // 16 % 997 / 1000\n", Verdict.UNKNOWN, marks=pytest.mark.slow
+        ),
         pytest.param(
             "import _random\nr = _random.Random()\ndef f(x):\n    return r.random()\n",
             Verdict.UNKNOWN,

@@ -255,7 +255,7 @@ def _limits(variable: Variable) -> list[Term]:
 _RANGES = {sort: domain(sort) for sort in (INTEGER, NATURAL, _PAIR)}
 
 
-@pytest.mark.parametrize("seed", some(range(3000), 20, slow=100))
+@pytest.mark.parametrize("seed", some(range(3000), 10, slow=110))
 def test_generated_formulas_keep_their_meaning(seed: int) -> None:
     drawn = _Drawn(seed)
     whole = drawn.quantified(_INPUTS, 2)

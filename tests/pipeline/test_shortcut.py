@@ -70,6 +70,9 @@ def test_an_edit_of_the_same_length_under_an_old_time_is_seen(settled: Workspace
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
+TIMES = [name for name in dir(os.stat_result) if name.startswith("st_") and name.endswith("_ns")]
+
+
 class Restoring:
     """Stands for a file system on which the time of change can be set back: `os.stat` as it was of each file."""
 
@@ -79,7 +82,7 @@ class Restoring:
 
         def restored(info: os.stat_result) -> os.stat_result:
             first = self.known.setdefault((info.st_dev, info.st_ino), info)
-            named = {name: getattr(info, name) for name in dir(info) if name.startswith("st_") and name.endswith("_ns")}
+            named = {name: getattr(info, name) for name in TIMES}
             named |= {name: getattr(first, name) for name in ("st_mtime_ns", "st_ctime_ns")}
             if times == "whole seconds":
                 named |= {name: value // 10**9 * 10**9 for name, value in named.items()}
@@ -90,7 +93,7 @@ class Restoring:
 
 
 @pytest.mark.parametrize("times", ["set back", "whole seconds"])
-@pytest.mark.parametrize("what", ["contract", "ledger", "report", "observed", "tool", "package"])
+@pytest.mark.parametrize("what", ["contract", "ledger", "report", "observed", "tool", "package", "code"])
 def test_where_times_of_change_can_be_set_back_the_bytes_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, times: str
 ) -> None:
@@ -110,7 +113,10 @@ def test_where_times_of_change_can_be_set_back_the_bytes_count(
         "observed": tmp_path / "elsewhere" / "gain.txt",
         "tool": tmp_path / "bin" / "prover",
         "package": package / "__init__.py",
+        "code": tmp_path / "code" / "module.py",
     }
+    assert Path(files.__file__).parents[1] in shortcut_module._CODE
+    monkeypatch.setattr(shortcut_module, "_CODE", (tmp_path / "code",))  # all of Avow's would be read four times a case
     for path in places.values():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("text")
