@@ -39,7 +39,7 @@ ROWS = {folder: _rows(folder) for folder in ("verdicts", "random", "societies")}
 PROGRAMS = [(folder, name) for folder, rows in ROWS.items() for name in dict.fromkeys(row["program"] for row in rows)]
 
 
-@pytest.mark.parametrize(("folder", "name"), some(PROGRAMS, 40, slow=len(PROGRAMS) - 40))
+@pytest.mark.parametrize(("folder", "name"), some(PROGRAMS, 20, slow=len(PROGRAMS) - 20))
 def test_our_verdicts_are_ajpfs(folder, name):
     program = read_system(GOLDEN / folder / f"{name}.gwen")
     draws = read_environment(GOLDEN / folder / f"{name}.yaml")

@@ -68,15 +68,15 @@ def written(name: str, root: Path) -> Path:
 Keys = dict[tuple[str, str], str]
 
 
-def keys(folder: Path, name: str) -> Keys:
-    """Of the backend's works, or of the engine's."""
+def keys(folder: Path, *names: str) -> Keys:
+    """Of the backends' works, or of the engines'."""
     work_module.engine_identity.cache_clear()
     tools.libraries.cache_clear()
     found = survey(folder)
     assert isinstance(found, Survey), found
-    known = {(w.name, claim): key for w in found.catalogue.works if w.engine == name for claim, key in w.keys.items()}
-    assert known
-    return known
+    works = [work for work in found.catalogue.works if work.engine in names]
+    assert {work.engine for work in works if work.keys} == {*names}
+    return {(work.name, claim): key for work in works for claim, key in work.keys.items()}
 
 
 # -- what is an input by what it is --------------------------------------------------------------------------------
@@ -177,9 +177,9 @@ def test_what_is_no_input_asks_nothing_again(
     tmp_path: Path, name: str, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = written(name, tmp_path)
-    before = {engine: keys(folder, engine) for engine in (name, SANITY)}
+    before = keys(folder, name, SANITY)
     NO_INPUTS[what](folder, monkeypatch)
-    assert {engine: keys(folder, engine) for engine in (name, SANITY)} == before
+    assert keys(folder, name, SANITY) == before
 
 
 # -- what is an input because it was read ----------------------------------------------------------------------------
