@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, TypeVar, overload
 
 from avow.base.grammars import lark_of
 from avow.base.tuning.bounds import CHAIN
@@ -179,6 +179,23 @@ def _chain_depth(operands: Sequence[Any]) -> int:
 
 
 _Binders = tuple[syntax.Binder, ...]
+_Made = TypeVar("_Made")
+_Callback = Callable[["_Build", list[Any]], _Made]
+
+
+def _word(kind: Callable[[int, int, int, str], _Made]) -> _Callback[_Made]:
+    """What one word says by its text."""
+    return lambda _, c: kind(c[0].start, c[0].end, 1, c[0].text)
+
+
+def _listed(kind: Callable[[int, int, int, tuple[Any, ...]], _Made]) -> _Callback[_Made]:
+    """What stands between brackets, with commas."""
+    return lambda _, c: kind(c[0].start, c[-1].end, _deepest(c[1:-1:2]) if c[1:-1] else 1, tuple(c[1:-1:2]))
+
+
+def _joined(sign: syntax.Sign, depth: Callable[[Sequence[Any]], int]) -> _Callback[syntax.Connective]:
+    """Formulas with a sign between them."""
+    return lambda _, c: syntax.Connective(c[0].start, c[-1].end, depth(c[::2]), sign, tuple(c[::2]))
 
 
 class _Build:
@@ -237,20 +254,8 @@ class _Build:
     def product_type(self, c: list[Any]) -> syntax.ProductType:
         return syntax.ProductType(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
 
-    def named_type(self, c: list[Any]) -> syntax.NamedType:
-        return syntax.NamedType(c[0].start, c[0].end, 1, c[0].text)
-
-    def builtin_type(self, c: list[Any]) -> syntax.BuiltinType:
-        return syntax.BuiltinType(c[0].start, c[0].end, 1, c[0].text)
-
     def unspecified_type(self, c: list[Any]) -> syntax.UnspecifiedType:
         return syntax.UnspecifiedType(c[0].start, c[1].end, 1)
-
-    def set_type(self, c: list[Any]) -> syntax.SetType:
-        return syntax.SetType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
-
-    def tuple_type(self, c: list[Any]) -> syntax.TupleType:
-        return syntax.TupleType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
     def sequence_type(self, c: list[Any]) -> syntax.SequenceType:
         return syntax.SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
@@ -267,21 +272,8 @@ class _Build:
 
     # --- formulas and terms ------------------------------------------------------------------------------------------
 
-    def iff(self, c: list[Any]) -> syntax.Connective:
-        items = tuple(c[::2])
-        return syntax.Connective(c[0].start, c[-1].end, _chain_depth(items), syntax.Sign.IFF, items)
-
-    def implies(self, c: list[Any]) -> syntax.Connective:
-        items = tuple(c[::2])
-        return syntax.Connective(c[0].start, c[-1].end, _chain_depth(items), syntax.Sign.IMPLIES, items)
-
-    def disjunction(self, c: list[Any]) -> syntax.Connective:
-        items = tuple(c[::2])
-        return syntax.Connective(c[0].start, c[-1].end, _deepest(items), syntax.Sign.OR, items)
-
-    def conjunction(self, c: list[Any]) -> syntax.Connective:
-        items = tuple(c[::2])
-        return syntax.Connective(c[0].start, c[-1].end, _deepest(items), syntax.Sign.AND, items)
+    iff, implies = _joined(syntax.Sign.IFF, _chain_depth), _joined(syntax.Sign.IMPLIES, _chain_depth)
+    disjunction, conjunction = _joined(syntax.Sign.OR, _deepest), _joined(syntax.Sign.AND, _deepest)
 
     def negation(self, c: list[Any]) -> syntax.Negation:
         return syntax.Negation(c[0].start, c[1].end, c[1].depth + 1, c[1])
@@ -300,17 +292,8 @@ class _Build:
         arguments = tuple(c[2:-1:2])
         return syntax.Application(c[0].start, c[-1].end, _deepest((c[0], *arguments)), c[0], arguments)
 
-    def name(self, c: list[Any]) -> syntax.Name:
-        return syntax.Name(c[0].start, c[0].end, 1, c[0].text)
-
-    def builtin(self, c: list[Any]) -> syntax.BuiltinName:
-        return syntax.BuiltinName(c[0].start, c[0].end, 1, c[0].text)
-
-    def number(self, c: list[Any]) -> syntax.Number:
-        return syntax.Number(c[0].start, c[0].end, 1, c[0].text)
-
-    def string(self, c: list[Any]) -> syntax.Text:
-        return syntax.Text(c[0].start, c[0].end, 1, c[0].text)
+    name, builtin, number = _word(syntax.Name), _word(syntax.BuiltinName), _word(syntax.Number)
+    string, named_type, builtin_type = _word(syntax.Text), _word(syntax.NamedType), _word(syntax.BuiltinType)
 
     def truth(self, c: list[Any]) -> syntax.Truth:
         return syntax.Truth(c[0].start, c[0].end, 1, c[0].text == "TRUE")
@@ -329,16 +312,8 @@ class _Build:
         inner = c[1].body if type(c[1]) is syntax.Parentheses else c[1]
         return syntax.Parentheses(c[0].start, c[2].end, c[1].depth + 1, inner)
 
-    def tuple(self, c: list[Any]) -> syntax.TupleDisplay:
-        return syntax.TupleDisplay(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
-
-    def set(self, c: list[Any]) -> syntax.SetDisplay:
-        items = tuple(c[1:-1:2])
-        return syntax.SetDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
-
-    def sequence(self, c: list[Any]) -> syntax.SequenceDisplay:
-        items = tuple(c[1:-1:2])
-        return syntax.SequenceDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
+    tuple, set, sequence = _listed(syntax.TupleDisplay), _listed(syntax.SetDisplay), _listed(syntax.SequenceDisplay)
+    tuple_type, set_type = _listed(syntax.TupleType), _listed(syntax.SetType)
 
     def range(self, c: list[Any]) -> syntax.RangeDisplay:
         return syntax.RangeDisplay(c[0].start, c[4].end, max(c[1].depth, c[3].depth) + 1, c[1], c[3])
