@@ -313,10 +313,10 @@ def main() -> None:
             leave(1)
 
         watching = _beside("watching.py")
-        seen, drawn = watching.watch(tempfile.gettempdir(), end, _beside)
+        seen, drawn, names = watching.watch(tempfile.gettempdir(), end, _beside)
 
         others = _threads()
-        whole = _kept(vars(sys.modules["__main__"]), vars(Table), vars(_FromSource))
+        whole = _kept(vars(sys.modules["__main__"]), vars(Table), vars(_FromSource), *names)
 
         def say(message: dict[str, Any]) -> None:
             if not whole():

@@ -6,7 +6,6 @@ Loaded by `host` from beside it, as `senses` is.
 from __future__ import annotations
 
 import _locale
-import functools
 import importlib.machinery
 import sqlite3
 import sys
@@ -16,6 +15,12 @@ from typing import Any
 
 Told = Callable[[str, Any], None]
 """Takes an event and a path, or ``outside`` and what it is."""
+
+
+def instead(call: Callable[..., Any], inner: Any) -> Callable[..., Any]:
+    """That of `senses` is given in its place."""
+    raise NotImplementedError
+
 
 _OF_MODULES = {
     "_lsprof": ("the clock", ""),
@@ -38,7 +43,7 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
                 told(event, what)
             return inner(*arguments, **named)
 
-        return functools.wraps(inner)(call)
+        return instead(call, inner)
 
     def loaded(module: Any) -> None:
         what, names = _OF_MODULES.get(module.__name__, ("", ""))
@@ -75,7 +80,7 @@ def _frameless(install: Callable[..., Any]) -> Callable[..., Any]:
     def call(number: int, handler: Any) -> Any:
         return install(number, (lambda signal, frame: handler(signal, None)) if callable(handler) else handler)
 
-    return functools.wraps(install)(call)
+    return instead(call, install)
 
 
 def watch_sqlite(told: Told) -> None:
@@ -99,7 +104,7 @@ def watch_sqlite(told: Told) -> None:
             super().__init__(*arguments, **named)
             self.set_authorizer(allowed)
 
-    sqlite3.connect = sqlite3.dbapi2.connect = functools.wraps(connect)(connected)
+    sqlite3.connect = sqlite3.dbapi2.connect = instead(connected, connect)
     sqlite3.Connection = sqlite3.dbapi2.Connection = Watched  # type: ignore[misc]
 
 

@@ -28,6 +28,14 @@ from typing import Any
 Told = Callable[[str, Any], None]
 """Takes an event and a path, or ``outside`` and what it is."""
 
+
+def instead(call: Callable[..., Any], inner: Any) -> Callable[..., Any]:
+    """`call`, which stands in the place of `inner` and does not lead to it."""
+    found: Callable[..., Any] = functools.update_wrapper(call, inner)
+    del call.__dict__["__wrapped__"]
+    return found
+
+
 # -- clock and chance ----------------------------------------------------------------------------------------------
 
 _CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time")
@@ -107,7 +115,7 @@ def _watch_chance(told: Told) -> Callable[[], None]:
                 told("outside", what)
             return inner(*arguments, **named)
 
-        return functools.wraps(inner)(call)
+        return instead(call, inner)
 
     clock, chance = "the clock", "random numbers"
     for name in _CLOCKS:
@@ -226,7 +234,7 @@ def _watch_system(told: Told) -> None:
                 told("outside", what)
             return inner(*arguments, **named)
 
-        return functools.wraps(inner)(call)
+        return instead(call, inner)
 
     for module, what, names in _SYSTEM:
         for name in names.split():
@@ -401,7 +409,7 @@ def _watch_state(told: Told) -> None:
             told("kind", path)
             return _State(inner(*arguments, **named), told, path)
 
-        return functools.wraps(inner)(call)
+        return instead(call, inner)
 
     def outer(inner: Callable[..., Any], event: str, what: str | None = None) -> Callable[..., Any]:
         def call(*arguments: Any, **named: Any) -> Any:
@@ -409,7 +417,7 @@ def _watch_state(told: Told) -> None:
                 told(event, what or place(arguments[0] if arguments else named.get("path")))
             return inner(*arguments, **named)
 
-        return functools.wraps(inner)(call)
+        return instead(call, inner)
 
     def listed(path: Any = ".") -> Any:
         if isinstance(path, int):
@@ -472,7 +480,7 @@ def _watch_place(told: Told) -> None:
             return here
 
         for module in (os, posix):
-            setattr(module, name, functools.wraps(inner)(where))
+            setattr(module, name, instead(where, inner))
 
 
 def watch_all(told: Told) -> Callable[[], None]:

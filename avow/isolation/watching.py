@@ -31,8 +31,9 @@ _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 def watch(
     scratch: str, end: Callable[[str], None], beside: Callable[[str], Any]
-) -> tuple[list[list[str]], Callable[[], None]]:
-    """What it looks at, as [event, path], growing as it runs, and what is to be called at the end. What no subject may
+) -> tuple[list[list[str]], Callable[[], None], tuple[dict[str, Any], ...]]:
+    """What it looks at, as [event, path], growing as it runs; what is to be called at the end; and the names by which
+    this watches, which the subject can get hold of and must leave as they are. What no subject may
     do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
     taken away."""
     seen: list[list[str]] = []
@@ -128,6 +129,8 @@ def watch(
         elif event.startswith(_NETWORK):
             told("outside", "the network")
 
+        elif event == "fcntl.ioctl":
+            told("outside", "the state of a device")
         elif event in _TRACES:
             told("outside", "what runs it")
         elif event in _AROUND and not looking and (not event.startswith("object.") or arguments[1] in _LEADING):
@@ -139,11 +142,12 @@ def watch(
     looking: list[str] = []  # what it looks at itself to answer that is nothing that the subject asks for
     senses = beside("senses.py")
     machine_code = beside("machine_code.py")
+    machine_code.instead = senses.instead
     drawn = senses.watch_all(told)
     machine_code.watch_modules(told, senses.asked)
     machine_code.watch_sqlite(told)
     sys.addaudithook(hook)
-    return seen, drawn
+    return seen, drawn, (globals(), vars(senses), vars(machine_code))
 
 
 _AROUND = frozenset(

@@ -64,6 +64,7 @@ PATCHES = {
     "def step(wish):\n    return L()\n",
     "what is traced": "import sys\ndef trace(frame, event, a):\n    if frame.f_code.co_name == 'coded':\n"
     "        frame.f_locals['value'] = 0\n    return trace\nsys.settrace(trace)" + STEP,
+    "what watches": "import os\nos.stat.__globals__['asked'] = lambda *a, **k: False" + STEP,
     "the stream of answers": "import io, os\nos.write = lambda d, b: len(b)\nio.TextIOWrapper = None" + STEP,
 }
 FRAMES = {
@@ -103,7 +104,12 @@ def test_what_is_patched_answers_nothing(tmp_path: Path, name: str, monkeypatch:
     whole = all(isinstance(reply, SubjectFailed) or reply.get("q") != ["0", "1"] for reply in replies)
     outside = any(seen.kind is Seen.OUTSIDE for seen in subject.observed())
     assert whole or outside or subject.fault, replies
-    if "host.coded" in PATCHES[name] or "'coded'] =" in PATCHES[name] or "host.answer" in PATCHES[name]:
+    if (
+        name == "what watches"
+        or "host.coded" in PATCHES[name]
+        or "'coded'] =" in PATCHES[name]
+        or "host.answer" in PATCHES[name]
+    ):
         assert subject.fault == "the subject patches what runs it"
 
 
@@ -115,6 +121,23 @@ def test_who_looks_at_frames_is_told(tmp_path: Path, name: str, monkeypatch: pyt
     told = any(seen.kind is Seen.OUTSIDE and seen.path == "what runs it" for seen in subject.observed())
     assert (told or subject.fault) if name != "a signal's" else not right
     assert told or subject.fault or not right
+
+
+WAYS_AROUND = {
+    "the clock's own function": "time.time.__wrapped__()",
+    "what a stream holds": "fcntl.ioctl(1, 0x541B, b'0000')",
+}
+
+
+@pytest.mark.parametrize("name", WAYS_AROUND)
+def test_a_way_around_what_watches_is_closed_or_told(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SANDBOX, "off")
+    text = f"import fcntl, time\ndef step(wish):\n    {WAYS_AROUND[name]}\n    return wish\n"
+    replies, subject = asked(tmp_path, text, times=1)
+    told = any(seen.kind is Seen.OUTSIDE for seen in subject.observed())
+    assert told or isinstance(replies[0], SubjectFailed)
 
 
 HONEST = {
