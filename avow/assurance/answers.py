@@ -32,6 +32,11 @@ class Tone(StrEnum):
         """Greater is better; grey is no place in this order."""
         return {Tone.GREEN: 2, Tone.AMBER: 1, Tone.RED: 0, Tone.GREY: 0}[self]
 
+    @property
+    def mark(self) -> str:
+        """Stands beside the word."""
+        return {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}[self]
+
 
 class How(StrEnum):
     """How a requirement comes to hold."""

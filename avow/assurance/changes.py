@@ -33,7 +33,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         content="",
         verdict=case.answers.verdict,
         requirements=tuple((r.id, _meaning(r), r.how.value, r.formal) for r in case.requirements),
-        guarantees=tuple(_guarantee(view) for view in case.obligations if view.obligation.kind is Kind.GUARANTEE),
+        guarantees=tuple(map(_guarantee, case.guarantees)),
         suppositions=tuple((s.key, s.words, s.until) for s in case.suppositions),
         weakenings=tuple((w.key, w.count) for w in case.weakenings if w.key not in _PASSING),
     )

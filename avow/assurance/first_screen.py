@@ -32,6 +32,7 @@ from avow.assurance.relied import (
     linked,
     looked_at,
     seen,
+    stands,
     weakness,
     word,
 )
@@ -227,11 +228,8 @@ def basis_of(node: NodeView, case: Case) -> NodeBasis:
 
 
 def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone]:
-    if view.id not in relied:
-        wrong = view.status in (Status.REFUTED, Status.CONTRADICTORY)
-        return "refuted" if wrong else "open", Tone.RED
-    if not view.standing.supports:
-        return "open", Tone.RED
+    if view.id not in relied or not view.standing.supports:
+        return stands(view), Tone.RED
     found = relied[view.id]
     return word(found.status), Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
 

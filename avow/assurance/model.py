@@ -25,7 +25,7 @@ from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Confirmation, Statement
@@ -361,6 +361,15 @@ class Gate:
     idle: bool = False
     """The policy asks nothing here: that it does not fail says nothing."""
 
+    @property
+    def state(self) -> str:
+        return "not asked" if self.idle else "passes" if self.passed else "fails"
+
+    @property
+    def mark(self) -> str:
+        """Stands beside the state."""
+        return "–" if self.idle else "✔" if self.passed else "✘"
+
 
 class Grade(StrEnum):
     """Whether what is proved of composition and requirements has to be believed."""
@@ -440,6 +449,10 @@ class Case:
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""
         return _by_id(self.obligations)[name]
+
+    @property
+    def guarantees(self) -> tuple[ObligationView, ...]:
+        return tuple(view for view in self.obligations if view.obligation.kind is Kind.GUARANTEE)
 
     @property
     def listed(self) -> tuple[RequirementView, ...]:

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 
 from avow.assurance.answers import How
 from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
-from avow.assurance.relied import word
+from avow.assurance.relied import stands
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
-from avow.evidence.status import Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +63,13 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
 
 def node_modules(case: Case) -> tuple[NodeModule, ...]:
     guarantees: dict[str, list[ObligationView]] = {}
-    for view in case.obligations:
-        if view.obligation.kind is Kind.GUARANTEE:
-            guarantees.setdefault(view.obligation.node, []).append(view)
+    for view in case.guarantees:
+        guarantees.setdefault(view.obligation.node, []).append(view)
     return tuple(NodeModule(node, tuple(guarantees.get(node.name, ()))) for node in case.nodes)
 
 
 def _standings(views: Sequence[ObligationView]) -> str:
-    number = Counter(word(view.standing) if view.standing.supports else _wrong(view) for view in views)
-    return ", ".join(f"{many} {said}" for said, many in number.items())
-
-
-def _wrong(view: ObligationView) -> str:
-    return "refuted" if view.status in (Status.REFUTED, Status.CONTRADICTORY) else "open"
+    return ", ".join(f"{many} {said}" for said, many in Counter(map(stands, views)).items())
 
 
 def _because(case: Case, r: RequirementView) -> str:

@@ -88,6 +88,13 @@ def word(status: Status) -> str:
     return WORDS.get(status, "open")
 
 
+def stands(view: ObligationView) -> str:
+    """How a claim stands, in the words of a page."""
+    if view.standing.supports:
+        return word(view.standing)
+    return "refuted" if view.status in (Status.REFUTED, Status.CONTRADICTORY) else "open"
+
+
 _APART: Mapping[str, str] = {
     Isolation.SEALED: "run sealed",
     Isolation.PROCESSES: "run in a process of its own",

@@ -80,8 +80,8 @@ def trace(case: Case) -> tuple[Row, ...]:
         rows += [
             Row(requirement.id, remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names
         ]
-    for view in case.obligations:
-        if view.obligation.kind is Kind.GUARANTEE and view.id not in reached:
+    for view in case.guarantees:
+        if view.id not in reached:
             rows += _rows(view, "", "", "orphan: serves no requirement")
     rows += [
         Row(derivation=d.derivation.name, status=d.status.value, remark="orphan: serves no requirement")

@@ -210,9 +210,9 @@ def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
         "message": {"text": text},
     }
     if diagnostic.span is not None:
-        result["locations"] = [{"physicalLocation": _location(diagnostic.span)}]
+        result["locations"] = [{"physicalLocation": sarif_place(diagnostic.span)}]
     related = [
-        {"id": i, "physicalLocation": _location(place), "message": {"text": note}}
+        {"id": i, "physicalLocation": sarif_place(place), "message": {"text": note}}
         for i, (note, place) in enumerate(diagnostic.notes, 1)
         if place is not None
     ]
@@ -221,7 +221,8 @@ def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
     return result
 
 
-def _location(span: Span) -> dict[str, Any]:
+def sarif_place(span: Span) -> dict[str, Any]:
+    """A `physicalLocation`."""
     path = PurePath(span.file)
     uri = quote(os.fsencode(path.as_posix()))
     if path.is_absolute():

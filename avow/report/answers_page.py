@@ -14,15 +14,14 @@ from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
-from avow.assurance.relied import kept_apart, word
+from avow.assurance.relied import EXHAUSTIVE, kept_apart, stands, word
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
 from avow.evidence.record import Evidence
-from avow.evidence.status import Status, weigh
+from avow.evidence.status import weigh
 from avow.report import wording
 from avow.report.page import asset, environment
 
-TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     ("proved", "for all inputs, by a sound method"),
@@ -51,7 +50,6 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             case=case,
             style=Markup(asset("answers.css")),
             script=Markup(asset("answers.js")),
-            TONE_MARKS=TONE_MARKS,
             brief=wording.gate_line,
             by_how=[(how, [r.id for r in case.requirements if r.how is how]) for how, _ in case.answers.by_how],
             content=baseline_of(case).content,
@@ -119,12 +117,10 @@ def _node(case: Case, module: NodeModule) -> dict[str, Any]:
 
 def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
     said = case.said(view.id)
-    good = view.standing.supports
-    wrong = view.status in (Status.REFUTED, Status.CONTRADICTORY)
-    sure = view.standing in (Status.PROVED, Status.CHECKED)
+    good, sure = view.standing.supports, view.standing in EXHAUSTIVE
     return {
         "view": view,
-        "word": word(view.standing) if good else "refuted" if wrong else "open",
+        "word": stands(view),
         "tone": Tone.GREEN if sure else Tone.AMBER if good else Tone.RED,
         "where": wording.where(view),
         "reason": said.reason if said else "",
@@ -187,7 +183,6 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
             earlier=earlier,
             line=line,
             tone=tone,
-            TONE_MARKS=TONE_MARKS,
             style=Markup(asset("answers.css")),
             quote=quote,
         )

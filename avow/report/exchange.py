@@ -13,6 +13,7 @@ from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
 from avow.base.files import sha256
+from avow.base.rendering import sarif_place
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report.layout import json_text
@@ -179,14 +180,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
     }
     location: dict[str, Any] = {"logicalLocations": [{"fullyQualifiedName": o.id, "kind": "declaration"}]}
     if o.span:
-        region = {
-            "startLine": max(1, o.span.line),
-            "startColumn": max(1, o.span.column),
-            "endLine": max(1, o.span.end_line),
-            "endColumn": max(1, o.span.end_column),
-        }
-        uri = quote(o.span.file, safe="/._-~")
-        location["physicalLocation"] = {"artifactLocation": {"uri": uri}, "region": region}
+        location["physicalLocation"] = sarif_place(o.span)
     result["locations"] = [location]
     if view.handled:
         finding = next(f for f in case.findings if view.id in f.obligations and f.how == view.handled and not f.expired)

@@ -41,8 +41,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
             yield f"node {node.name}", lines
     for gate in case.gates:
         if name in (gate.id, gate.title):
-            state = "not asked" if gate.idle else "passes" if gate.passed else "fails"
-            lines = [f"{state}: {gate.reason}", *(f"next: {s.text}" for s in gate.suggestions[:3])]
+            lines = [f"{gate.state}: {gate.reason}", *(f"next: {s.text}" for s in gate.suggestions[:3])]
             yield f"gate {gate.id}: {gate.title}", lines
     for w in case.weakenings:
         if name in (w.key, w.words):

@@ -9,7 +9,6 @@ from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.base.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
-from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.report.short import escaped, markdown_head
@@ -33,7 +32,7 @@ def render_markdown(case: Case) -> str:
             (
                 (
                     escaped(g.title),
-                    "not asked" if g.idle else "passes" if g.passed else "**fails**",
+                    f"**{g.state}**" if g.state == "fails" else g.state,
                     escaped(gate_line(g.reason)),
                 )
                 for g in case.gates
@@ -57,7 +56,7 @@ def render_markdown(case: Case) -> str:
         escaped(open_line(case)),
         *_remarks(case),
         "## Guarantees",
-        _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in _guarantees(case))),
+        _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in case.guarantees)),
         "## Hypotheses and environment",
         "\n".join(f"- {escaped(h.text)} ({escaped(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses)
         or "None.",
@@ -109,10 +108,6 @@ def _origin(case: Case) -> str:
     run = f"run `{_code(case.run.id)}`, ledger `{case.ledger_head}`"
     proofs = f"{case.grade.word} ({escaped(case.grade_reason)})"
     return f"Proofs: {proofs}. System `{_code(case.system)}`, policy {escaped(case.policy.name)}, {case.today}, {run}."
-
-
-def _guarantees(case: Case) -> list[ObligationView]:
-    return [view for view in case.obligations if view.obligation.kind is Kind.GUARANTEE]
 
 
 def _row(view: ObligationView) -> tuple[str, ...]:

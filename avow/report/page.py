@@ -13,6 +13,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from avow.assurance.answers import Tone
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView, OpenItem
 from avow.assurance.naming import short
@@ -59,6 +60,7 @@ def environment() -> Environment:
         "MARKS": wording.MARKS,
         "MEANINGS": wording.MEANINGS,
         "Status": Status,
+        "Tone": Tone,
         "said": said,
         "anchor": wording.anchor,
         "ticks": _ticks,
@@ -199,7 +201,7 @@ def _ticks(text: str) -> Markup:
 
 def render_traceability(case: Case, rows: Sequence[Row]) -> str:
     """The traceability matrix as a page: coverage and orphans first, then each requirement with what it rests on."""
-    guarantees = {view.id for view in case.obligations if view.obligation.kind is Kind.GUARANTEE}
+    guarantees = {view.id for view in case.guarantees}
     serving = {row.obligation for row in rows if row.requirement and row.obligation in guarantees}
     reached = {row.requirement for row in rows if row.requirement and row.evidence}
     return (
@@ -298,7 +300,7 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Statu
 
 def _used_methods(case: Case) -> list[str]:
     """Method ids that answer for guarantees, or should, in the plan's order."""
-    planned = [name for view in case.obligations if view.obligation.kind is Kind.GUARANTEE for name, _ in view.planned]
+    planned = [name for view in case.guarantees for name, _ in view.planned]
     in_plan = [name for node in case.nodes for name, _ in node.methods if name in planned]
     return list(dict.fromkeys((*in_plan, *planned)))
 
@@ -307,9 +309,8 @@ def _matrix(case: Case) -> _Matrix:
     """Node by node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
     methods = _used_methods(case)
     rows: dict[str, list[tuple[ObligationView, list[Status | None]]]] = {}
-    for view in case.obligations:
-        if view.obligation.kind is Kind.GUARANTEE:
-            rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
+    for view in case.guarantees:
+        rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
     levels = {node.name: node.criticality for node in case.nodes}
     return [(node, levels.get(node, ""), found) for node, found in rows.items()]
 

@@ -19,16 +19,13 @@ from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import example
-from avow.report.answers_page import TONE_MARKS, full_reason, others, worded
+from avow.report.answers_page import full_reason, others, worded
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
 
-_GATE = {
-    "passes": {"word": "passes", "tone": "good"},
-    "fails": {"word": "fails", "tone": "bad"},
-    "not asked": {"word": "not asked", "tone": "plain"},
-}
+_GATES = {"passes": "good", "fails": "bad", "not asked": "plain"}
+"""Colours."""
 
 
 class NoTypst(Exception):  # noqa: N818 - it says what is missing
@@ -72,7 +69,7 @@ def _data(case: Case) -> dict[str, Any]:
             {
                 "title": g.title,
                 "reason": g.reason,
-                "status": _GATE["not asked" if g.idle else "passes" if g.passed else "fails"],
+                "status": {"word": g.state, "tone": _GATES[g.state]},
             }
             for g in case.gates
         ],
@@ -141,7 +138,7 @@ def _first(case: Case) -> dict[str, Any]:
     many = len(case.listed) < len(case.requirements)
     return {
         "kicker": f"{case.today} · {a.signed}",
-        "verdict": f"{TONE_MARKS[a.tone]} {a.verdict}",
+        "verdict": f"{a.tone.mark} {a.verdict}",
         "tone": a.tone.value,
         "counts": a.beside,
         "by_how": [
@@ -153,7 +150,7 @@ def _first(case: Case) -> dict[str, Any]:
             [
                 r.id,
                 r.words,
-                {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
+                {"word": f"{r.tone.mark} {r.how}", "tone": r.tone.value},
                 f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
                 str(len(r.supposes)),
             ]
@@ -212,7 +209,7 @@ def _module(module: RequirementModule) -> dict[str, Any]:
         "id": r.id,
         "text": r.words,
         "formula": in_lines(r.formal),
-        "status": {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
+        "status": {"word": f"{r.tone.mark} {r.how}", "tone": r.tone.value},
         "because": module.because,
         "strategy": module.strategy,
         "lines": lines,

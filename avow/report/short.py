@@ -6,12 +6,11 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from avow.assurance.answers import ABOUT, Tone
+from avow.assurance.answers import ABOUT
 from avow.assurance.model import Case, RequirementView
 from avow.report.wording import clean
 
 LINES, WIDTH, WORDS = 24, 80, 150
-_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 
 
@@ -19,11 +18,11 @@ def terminal_lines(case: Case) -> list[str]:
     """At most 24 lines of 80 columns, in the order of the first page; the last says the one thing to do next."""
     a = case.answers
     verdict = f": {a.verdict}"
-    title = _cut(f"{_MARKS[a.tone]} {case.title}", WIDTH - len(verdict))
+    title = _cut(f"{a.tone.mark} {case.title}", WIDTH - len(verdict))
     lines = [title + verdict]
     lines += _cut_lines(a.beside, 2)
     lines += ["1 Claimed"]
-    lines += [_cut(f"  {_MARKS[r.tone]} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in case.listed]
+    lines += [_cut(f"  {r.tone.mark} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in case.listed]
     if len(case.listed) < len(case.requirements):
         lines += [f"  the worst of {len(case.requirements)}"]
     shown = a.based_on[:4]
@@ -52,15 +51,13 @@ def comment(case: Case) -> str:
     was = f"{case.baseline.verdict} → " if case.baseline else ""
     lines = [
         f"<!-- avow {escaped(case.system)} -->",
-        f"**{_MARKS[a.tone]} {escaped(case.title)}: {escaped(was + a.verdict)}**",
+        f"**{a.tone.mark} {escaped(case.title)}: {escaped(was + a.verdict)}**",
         escaped(a.beside),
         escaped(a.changed_against) or "No report has been signed yet.",
         "\n".join(f"- {mark} {escaped(_few(words))}" for mark, words in a.changed if mark),
         f"Weakest evidence: {escaped(_few(_weakest_words(case)))}",
         "<details><summary>Requirements and suppositions</summary>",
-        "\n".join(
-            f"- {_MARKS[r.tone]} **{escaped(r.id)}** {r.how}: {escaped(_one(r))}" for r in case.requirements[:40]
-        ),
+        "\n".join(f"- {r.tone.mark} **{escaped(r.id)}** {r.how}: {escaped(_one(r))}" for r in case.requirements[:40]),
         "\n".join(f"- {s.number} {escaped(s.words)}" for s in case.suppositions[:40]),
         "</details>",
     ]
@@ -70,11 +67,11 @@ def comment(case: Case) -> str:
 def markdown_head(case: Case) -> Iterator[str]:
     """The five answers as paragraphs of Markdown."""
     a = case.answers
-    yield f"**{_MARKS[a.tone]} {escaped(a.verdict)}**"
+    yield f"**{a.tone.mark} {escaped(a.verdict)}**"
     yield escaped(f"{a.beside} · {a.signed}")
     yield "## 1 What is claimed?"
     rows = [
-        f"| **{escaped(r.id)}** {escaped(_one(r))} | {_MARKS[r.tone]} {r.how} "
+        f"| **{escaped(r.id)}** {escaped(_one(r))} | {r.tone.mark} {r.how} "
         f"| {escaped(_weakest(r))} | {len(r.supposes)} |"
         for r in case.requirements
     ]
