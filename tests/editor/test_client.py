@@ -384,6 +384,7 @@ def test_sanity_is_asked_in_the_background(editor: Editor) -> None:
     assert "low" not in hints(editor, uri, broken)
 
 
+@pytest.mark.slow
 def test_sanity_of_two_documents_that_change_one_after_the_other(editor: Editor) -> None:
     one, two = (CONTRACT.replace("Limit = 120", f"Limit = {limit}") for limit in (121, 122))
     first, second = editor.open("untitled:first", one), editor.open("untitled:second", two)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from avow.backends.fuzz import BACKEND, building
-from avow.backends.fuzz.runner import _ended
+from avow.backends.fuzz.runner import Question, Show, _ended
 from avow.base.tools import Tool
 from avow.base.verdict import Verdict
 from avow.isolation import judge
@@ -70,7 +70,8 @@ def test_every_file_that_is_included_is_named(tmp_path: Path) -> None:
 
 def test_what_is_longer_than_a_pipe_holds_comes_through(tmp_path: Path) -> None:
     channel = judge.Channel()
+    question = Question(Show("", ()), str(tmp_path), 60, ())
     script = f"import os\nleft = b'x' * 1_000_000\nwhile left: left = left[os.write({channel.theirs}, left):]"
     with tempfile.TemporaryFile() as given:
-        code, left, said, _ = _ended([sys.executable, "-c", script], tmp_path, 60, channel, {}, given.fileno())
+        code, left, said, _ = _ended([sys.executable, "-c", script], tmp_path, question, channel, {}, given.fileno())
     assert (code, left, len(said)) == (0, False, 1_000_000)

@@ -80,6 +80,7 @@ def test_a_difference_refutes_the_link_alone(model: str, tmp_path: Path) -> None
     assert {o.verdict for o in found.values()} == {Verdict.PROVED}
 
 
+@pytest.mark.slow
 def test_rounding_is_no_difference(tmp_path: Path) -> None:
     tenth = MODEL.replace("1.5", "0.3")
     written(tmp_path / "rounded", tenth, vmax=0.3)
@@ -94,6 +95,7 @@ def test_a_model_that_cannot_be_run_says_nothing(tmp_path: Path) -> None:
     assert found["agrees-with-model"].verdict is Verdict.UNKNOWN
 
 
+@pytest.mark.slow
 def test_there_is_no_claim_without_a_model(tmp_path: Path) -> None:
     written(tmp_path / "s", methods=("python",))
     assert not any("agrees-with-model" in o.obligation for o in asked(tmp_path / "s").outcomes)
@@ -171,6 +173,7 @@ def test_a_recording_is_in_the_key_and_in_the_slice(tmp_path: Path) -> None:
     assert all(after.keys[name] != key for name, key in before.keys.items())
 
 
+@pytest.mark.slow
 def test_a_recording_that_cannot_be_read_is_no_agreement(tmp_path: Path) -> None:
     with_recording(tmp_path / "s", [0.1, 0.5])
     (tmp_path / "s" / "run.jsonl").write_text("{", encoding="utf-8")

@@ -164,6 +164,7 @@ def test_a_filter_passes_on_what_breaks_nothing(
     assert again.unmonitored() == ["n.low"]
 
 
+@pytest.mark.slow
 def test_one_who_listens_and_does_not_read_holds_nobody_up(master: Master) -> None:
     with Ros1(master.uri, ()) as node, Ros1(master.uri, ()) as other:
         spoken = node.speak("/s", *FLOAT64)
@@ -178,6 +179,7 @@ def test_one_who_listens_and_does_not_read_holds_nobody_up(master: Master) -> No
         wait_for(lambda: spoken.listeners == 1)
 
 
+@pytest.mark.slow
 def test_publishers_of_a_filtered_topic_have_one_type(master: Master) -> None:
     with Ros1(master.uri, ("s",), filtered={"s"}) as graph, Ros1(master.uri, ()) as one, Ros1(master.uri, ()) as other:
         one.speak("/s_mon", *FLOAT64)
