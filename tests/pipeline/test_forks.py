@@ -169,7 +169,7 @@ def test_an_interrupt_ends_all_works(odd: Path, way: str) -> None:
     thread.start()
     started = pids(odd)
     process.kill_all()
-    thread.join(30)
+    thread.join(120)
     assert found[0].verdict is Verdict.ERROR
     until(lambda: not any(map(alive, started)))
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED, "what was killed is started again for the next run"
@@ -186,7 +186,7 @@ def test_works_at_once_do_not_hold_each_other(odd: Path, monkeypatch: pytest.Mon
         assert settle(odd, "answers")[0].verdict is Verdict.TESTED
     assert all(map(alive, started))
     process.kill_all()
-    thread.join(30)
+    thread.join(120)
 
 
 @pytest.mark.slow
@@ -227,7 +227,7 @@ def test_nothing_outlives_a_process_that_is_killed_on_the_way(odd: Path, way: st
     started = pids(odd)
     (above,) = [pid for pid in process._descendants(os.getpid()) if started[0] in process._children(pid)]
     os.kill(started[0] if whose == "the work's process" else above, signal.SIGKILL)
-    thread.join(30)
+    thread.join(120)
     assert found[0].verdict is Verdict.ERROR
     until(lambda: not any(map(alive, started)))
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED

@@ -119,6 +119,19 @@ def test_what_only_an_assumption_speaks_of_may_be_said_for_the_first_time_at_a_b
         assert tally(running, "small").order == (not found)
 
 
+def test_what_only_an_assumption_speaks_of_excuses_nobody_where_it_cannot_be_read(make_system: Make) -> None:
+    """As of a recorded run; where a value that can be read may have been there instead, it counts, too."""
+    system, breach = make_system(TWO + "}", VALUES), {"topic": "s", "time": 2.0, "value": 11}
+    odd, b = {"topic": "a", "time": 0.2, "value": "x"}, {"topic": "b", "time": 0.2, "value": 5}
+    for more, known in (({}, True), ({"value": 5}, True), ({"value": 6}, False)):
+        said = [odd, b, breach, {"topic": "a", "time": 2.1, **more}, {"topic": "b", "time": 4.0, "value": 5}]
+        for events in (said, live(said)) if known else (live(said),):
+            running = session(system)
+            found = [(v.fault, v.index) for v in judge(running, events) if v.clause == "small"]
+            assert found == ([(Fault.GUARANTEE, 3)] if known else [])
+            assert tally(running, "small").order == (not known)
+
+
 def test_memory_of_several_topics_is_undecided_and_that_of_one_is_told(make_system: Make) -> None:
     more = "  guarantee follows ( previous(in.a, 0) >= 5 -> out.s >= 5 )\n"
     more += "  guarantee grows ( out.s >= previous(out.s, 0) )\n}"
