@@ -17,6 +17,7 @@ import enum
 import importlib.machinery
 import importlib.util
 import inspect
+import itertools
 import json
 import os
 import posix
@@ -208,6 +209,15 @@ def _read_sources_only(root: str) -> None:
     sys.path_importer_cache.clear()
 
 
+def _found_before() -> list[list[str]]:
+    """What is imported already, and the folders in which it was looked for before Python's own."""
+    files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+    ours = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep  # noqa: PTH100, PTH120
+    first = itertools.takewhile(lambda folder: folder != os.path.dirname(os.__file__), sys.path)  # noqa: PTH120
+    read = [["read", file] for file in files if isinstance(file, str) and not file.startswith(ours)]
+    return [*read, *(["list", folder] for folder in first)]
+
+
 def _beside(file: str, *, apart: bool = False) -> Any:
     """A module near this one, which is no package's here; `apart`, with builtin functions of its own."""
     place = os.path.join(os.path.dirname(__file__), file)  # noqa: PTH118, PTH120
@@ -314,6 +324,7 @@ def main() -> None:
 
         watching = _beside("watching.py")
         seen, drawn, names = watching.watch(tempfile.gettempdir(), end, _beside)
+        seen += _found_before()
 
         others = _threads()
         whole = _kept(vars(sys.modules["__main__"]), vars(Table), vars(_FromSource), *names)

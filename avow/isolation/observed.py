@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import site
 import stat
 import sys
 import sysconfig
@@ -46,6 +47,8 @@ class Seen(StrEnum):
     """Which folder it runs in; the digest is of its absolute path."""
     VARIABLE = "variable"
     """One of the environment that is not always the same (`variables`); the digest is of its value."""
+    MODULES = "modules"
+    """Where modules are looked for from the start; the digest is of PYTHONPATH and of what adds to it (`_modules`)."""
     TRACER = "tracer"
     """Who traces system calls here; the digest is of the programs, or of why nothing does."""
     SANDBOX = "sandbox"
@@ -68,6 +71,8 @@ def look(kind: Seen, path: str) -> str:
         return sha256(variables().get(os.path.basename(path), ""))  # noqa: PTH119
     if kind is Seen.PLACE:
         return sha256(os.path.realpath(path))
+    if kind is Seen.MODULES:
+        return _modules()
     if kind is Seen.TRACER:
         from avow.isolation.tracing import remedy, traces  # not in a run with nothing to do: it runs strace
 
@@ -98,6 +103,17 @@ def look(kind: Seen, path: str) -> str:
         return _link(path) if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
 
 
+def _modules() -> str:
+    """The folders that a subject's Python starts with, and the files there that add others or run at its start."""
+    found = [absolute_only()]
+    for folder in dict.fromkeys(site.getsitepackages()):
+        names = _names(folder) if os.path.isdir(folder) else []  # noqa: PTH112
+        places = [os.path.join(folder, n) for n in names if n.endswith(".pth") or n.startswith(_AT_START)]  # noqa: PTH118
+        found += [folder, *(part for place in places for part in (place, _content(place)))]
+    return sha256(json.dumps(found))
+
+
+_AT_START = ("sitecustomize", "usercustomize")
 _GUARDS = {Seen.TRACER: ("strace", "setpriv"), Seen.SANDBOX: ("bwrap",)}
 
 
@@ -234,7 +250,9 @@ def _kind(event: str, path: str) -> Seen | None:
     except (OSError, ValueError):
         return Seen.MISSING
     if stat.S_ISDIR(mode):
-        return Seen.LISTING if event in ("read", "list") else Seen.STATE if event == "state" else Seen.KIND
+        return Seen.LISTING if event in ("read", "list", "import") else Seen.STATE if event == "state" else Seen.KIND
+    if event == "import":
+        return None  # what it imports is read; a folder may be a package without `__init__`
     if event == "state":
         return Seen.STATE
     if event in ("kind", "link"):
@@ -276,6 +294,11 @@ def tracer() -> Observed:
 def sandbox() -> Observed:
     """What is kept otherwise is asked again."""
     return Observed(Seen.SANDBOX, "bwrap", look(Seen.SANDBOX, "bwrap"))
+
+
+def modules() -> Observed:
+    """What is imported is what is found first."""
+    return Observed(Seen.MODULES, "module path", look(Seen.MODULES, "module path"))
 
 
 def interpreter() -> Observed:

@@ -404,6 +404,7 @@ def _watch_state(told: Told) -> None:
     def state(inner: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **named: Any) -> Any:
             if not mine(named):
+                told("import", arguments[0])
                 return inner(*arguments, **named)
             path = place(arguments[0] if arguments else named.get("path", named.get("fd")))
             told("kind", path)

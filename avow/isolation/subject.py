@@ -21,7 +21,7 @@ from avow.base.tuning.sizes import SCRATCH_BYTES
 from avow.base.verdict import Isolation
 from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
-from avow.isolation.observed import Observed, interpreter, recorded, sandbox, tracer, untold, variables
+from avow.isolation.observed import Observed, interpreter, modules, recorded, sandbox, tracer, untold, variables
 from avow.isolation.printed import Printed
 from avow.isolation.tracing import Trace, traces
 
@@ -108,6 +108,7 @@ class SubjectProcess:
         untraced = map(untold, dict.fromkeys(programs)) if self._untraced else ()
         return (
             interpreter(),
+            modules(),
             *recorded(e for e in self._events if e[0] != "program"),
             *untraced,
             tracer(),

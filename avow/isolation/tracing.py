@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.isolation.symbols import asks
+from avow.isolation.watching import way
 
 _SIGNALS = frozenset({"kill", "tkill", "pidfd_send_signal", "rt_sigqueueinfo"})
 _PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
@@ -349,9 +350,10 @@ def _read(lines: Sequence[tuple[int, bytes]], mark: str, folder: str, scratch: s
             if at is None and text and _text(text)[:1] != os.sep:
                 events[_NOWHERE] = None
                 continue
-            path = os.path.normpath(os.path.join(at or "", _text(text)))  # noqa: PTH118
+            path, left = way(os.path.join(at or "", _text(text)))  # noqa: PTH118
             if path == scratch or path.startswith(scratch + os.sep):
                 continue
+            events |= {("kind", place): None for place in left if process != host}  # the host's own: the audit hook
             if call in ("chdir", "fchdir"):
                 pass
             elif call in _CHANGES or (call in _OPENS and _WRITES.search(rest)):

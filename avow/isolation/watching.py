@@ -29,6 +29,35 @@ _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
+def way(path: str, readlink: Callable[[str], str] = os.readlink) -> tuple[str, list[str]]:
+    """An absolute path without ``..``, as the system goes it: what a folder lies in is not where a link to it lies.
+    And the folders that are left by ``..``: what they are decides where that leads."""
+    if "/../" not in f"{path}/":
+        return os.path.normpath(path), []
+    place, left, links = "/", list[str](), 0
+    parts = path.split("/")[::-1]
+    while parts:
+        part = parts.pop()
+        if part != "..":
+            place = os.path.join(place, part) if part not in ("", ".") else place  # noqa: PTH118
+            continue
+        left.append(place)
+        above = os.path.dirname(place)  # noqa: PTH120
+        try:
+            target = readlink(place) if links < _MOST_LINKS else ""
+        except (OSError, ValueError):
+            target = ""
+        if target:
+            links += 1
+            parts += ["..", *target.split("/")[::-1]]
+        place = "/" if target.startswith("/") else above
+    return place, left
+
+
+_MOST_LINKS = 40
+"""The system follows no more."""
+
+
 def watch(
     scratch: str, end: Callable[[str], None], beside: Callable[[str], Any]
 ) -> tuple[list[list[str]], Callable[[], None], tuple[dict[str, Any], ...]]:
@@ -38,7 +67,7 @@ def watch(
     taken away."""
     seen: list[list[str]] = []
     known: set[tuple[str, str]] = set()
-    fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
+    fspath, isabs, join, getcwd = os.fspath, os.path.isabs, os.path.join, os.getcwd
     readlink, dirname = os.readlink, os.path.dirname
 
     def written(place: Any) -> str:
@@ -47,12 +76,23 @@ def watch(
             place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
         return str.__str__(place)  # of no class of the subject's own
 
+    def own(path: str) -> bool:
+        return path == scratch or path.startswith(scratch + os.sep)
+
     def path_of(place: Any) -> str | None:
         if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
             return None
         text = written(place)
-        path = norm(text if isabs(text) else join(getcwd(), text))
-        return None if path == scratch or path.startswith(scratch + os.sep) else path
+        path, left = way(text if isabs(text) else join(getcwd(), text))
+        for folder in left:
+            if not own(folder):
+                add("kind", folder)
+        return None if own(path) else path
+
+    def add(event: str, path: str) -> None:
+        if (event, path) not in known:
+            known.add((event, path))
+            seen.append([event, path])
 
     def opened(descriptor: int) -> str:
         try:
@@ -68,9 +108,8 @@ def watch(
 
     def told(event: str, place: Any) -> None:
         path = place if event in ("outside", "program", "variable") else path_of(place)
-        if path is not None and (event, path) not in known:
-            known.add((event, path))
-            seen.append([event, path])
+        if path is not None:
+            add(event, path)
 
     def fault(what: str) -> None:
         end(what)
@@ -126,6 +165,7 @@ def watch(
             fault(f"calls {event}")
         elif event in _PROGRAMS:
             told("program", f"the program {str(arguments[0])[:200]}")
+            told("variable", "PATH")  # it is looked for there, and what it starts
         elif event.startswith(_NETWORK):
             told("outside", "the network")
 

@@ -33,6 +33,7 @@ NOT_TUNED = {
     ("backends/rosmonitoring/wires.py", "LARGEST_SINGLE"),  # IEEE 754
     ("avow/base/rendering.py", "_TAB"),  # columns of a drawing
     ("avow/formulas/ltl.py", "_START"),  # a node that is none
+    ("avow/isolation/watching.py", "_MOST_LINKS"),  # as Linux
     ("avow/isolation/symbols.py", "_SECTIONS"),  # a place in a format
     ("avow/language/format.py", "WIDTH"),  # the canonical layout
     ("avow/language/format.py", "_STEP"),

@@ -49,6 +49,7 @@ import ctypes, glob, json, os, pathlib
 from pkg import part
 from pkg.deep import leaf
 import space.inner
+from space import bare
 here = pathlib.Path(__file__).parent
 limits = json.loads((here.parent / "config" / "limits.json").read_text())
 try:
@@ -82,6 +83,7 @@ FILES = {
     "models/pkg/deep/__init__.py": "from ..twin import ON as _\n",
     "models/pkg/deep/leaf.py": "ON = True\n",
     "models/space/inner.py": "ON = True\n",
+    "models/space/bare/data.txt": "",
     "models/plugins/a.py": "",
     "models/many/a.txt": "",
     "models/size.bin": "xx",
@@ -108,6 +110,7 @@ CHANGES = {
     "a folder put on the path": ("models/vendor/vendored.py", "ON = False\n"),
     "a module that comes first": ("models/json.py", "def loads(text): return {'top': 0}\n"),
     "a package in place of a namespace": ("models/space/__init__.py", "ON = False\n"),
+    "a package where only a folder was": ("models/space/bare/__init__.py", "ON = False\n"),
     "a file outside": ("../../outside.txt", "other"),
     "the subject": ("models/limiter.py", "def step(wish): return 0\n"),
 }

@@ -70,6 +70,7 @@ def test_what_a_worker_saw_is_held_against_this_machine(tmp_path: Path, monkeypa
         Seen.KIND: file,
         Seen.PLACE: tmp_path,
         Seen.VARIABLE: Path("PATH"),
+        Seen.MODULES: Path("module path"),
         Seen.TRACER: Path("strace"),
         Seen.SANDBOX: Path("bwrap"),
     }

@@ -1,0 +1,71 @@
+"""Where something is found is an input, too: the same file is not what is found once something else comes before it."""
+
+from __future__ import annotations
+
+import site
+from pathlib import Path
+
+import pytest
+
+from avow.isolation.level import SANDBOX
+from avow.isolation.observed import Seen, look, modules
+from avow.isolation.subject import SubjectProcess
+
+SEARCHED = {
+    "a module of PYTHONPATH's": ("import other", "PYTHONPATH", "b"),
+    "a package of PYTHONPATH's without __init__": ("import folder.part", "PYTHONPATH", "b"),
+    "a module that PYTHONPATH has not yet": ("try:\n    import later\nexcept ImportError:\n    pass", "a/later.py", ""),
+    "a module in the place of the library's": ("import json", "a/json.py", ""),
+    "a file's way through a link": ("open('d/../value').read()", "d", "two/sub"),
+    "a file's way through a link to a link": ("open('twice/../value').read()", "d", "two/sub"),
+    "a file's way back from a folder": ("open('own/../value').read()", "own", "two/sub"),
+    "a program on the PATH": ("import subprocess\nsubprocess.run(['tool'])", "PATH", "b"),
+    "a program on the PATH, by a shell": ("import os\nos.system('tool')", "PATH", "b"),
+}
+
+
+@pytest.mark.parametrize("name", SEARCHED)
+def test_where_something_is_found_is_an_input(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    asks, what, new = SEARCHED[name]
+    for folder in ("a", "b"):
+        (tmp_path / folder / "folder").mkdir(parents=True)
+        (tmp_path / folder / "other.py").touch()
+        (tmp_path / folder / "folder" / "part.py").touch()
+        (tmp_path / folder / "tool").write_text("#!/bin/sh\n")
+        (tmp_path / folder / "tool").chmod(0o755)
+    models = tmp_path / "models"
+    for place in ("one/sub", "two/sub", "own"):
+        (models / place).mkdir(parents=True)
+    for place in ("one", "two", "."):
+        (models / place / "value").write_text(place)
+    (models / "d").symlink_to("one/sub")
+    (models / "twice").symlink_to(models / "d")
+    (models / "m.py").write_text(f"{asks}\ndef step(): return 1\n")
+    monkeypatch.setenv(SANDBOX, "off")  # a sealed one would not see these folders, which lie under /tmp
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "a"))
+    monkeypatch.setenv("PATH", f"{tmp_path / 'a'}:/usr/bin:/bin")
+    subject = SubjectProcess(models / "m.py", "step", 10.0)
+    assert subject.ask({}) == {"q": ["1", "1"], "w": True}
+    assert not subject.close()
+    seen = [o for o in subject.observed() if o.kind is not Seen.OUTSIDE]
+    assert all(look(o.kind, o.path) == o.digest for o in seen)
+    if what.isupper():
+        monkeypatch.setenv(what, f"{tmp_path / new}:/usr/bin:/bin")
+    elif new:
+        place = models / what
+        place.unlink() if place.is_symlink() else place.rmdir()
+        place.symlink_to(new)
+    else:
+        (tmp_path / what).touch()
+    assert any(look(o.kind, o.path) != o.digest for o in seen)
+
+
+@pytest.mark.parametrize("name", ["more.pth", "known.pth", "sitecustomize.py", "usercustomize.py"])
+def test_what_adds_to_python_s_path_is_an_input(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "known.pth").write_text("/a\n")
+    monkeypatch.setattr(site, "getsitepackages", lambda: [str(tmp_path)])
+    before = modules()
+    (tmp_path / "package.py").touch()
+    assert modules() == before
+    (tmp_path / name).write_text("/b\n")
+    assert modules() != before
