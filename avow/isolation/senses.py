@@ -29,10 +29,16 @@ Told = Callable[[str, Any], None]
 """Takes an event and a path, or ``outside`` and what it is."""
 
 
+def closed(call: Callable[..., Any]) -> Any:
+    """`call`, which does not show what it holds, as a function does in its `__closure__`. (Of a cache that keeps
+    nothing, Python shows neither the function nor what it knows.)"""
+    return functools._lru_cache_wrapper(call, 0, False, tuple)  # type: ignore[call-arg]
+
+
 def instead(call: Callable[..., Any], inner: Any) -> Callable[..., Any]:
     """`call`, which stands in the place of `inner` and does not lead to it."""
-    found: Callable[..., Any] = functools.update_wrapper(call, inner)
-    del call.__dict__["__wrapped__"]
+    found: Callable[..., Any] = functools.update_wrapper(closed(call), inner)
+    del found.__dict__["__wrapped__"]
     return found
 
 

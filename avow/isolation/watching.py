@@ -168,7 +168,6 @@ def watch(
             told("variable", "PATH")  # it is looked for there, and what it starts
         elif event.startswith(_NETWORK):
             told("outside", "the network")
-
         elif event == "fcntl.ioctl":
             told("outside", "the state of a device")
         elif event in _TRACES:
@@ -183,9 +182,10 @@ def watch(
     senses = beside("senses.py")
     machine_code = beside("machine_code.py")
     machine_code.instead = senses.instead
-    drawn = senses.watch_all(told)
-    machine_code.watch_modules(told, senses.asked)
-    machine_code.watch_sqlite(told)
+    tell = senses.closed(told)  # who gets hold of it is not to get hold of what it noted
+    drawn = senses.watch_all(tell)
+    machine_code.watch_modules(tell, senses.asked)
+    machine_code.watch_sqlite(tell)
     sys.addaudithook(hook)
     return seen, drawn, (globals(), vars(senses), vars(machine_code))
 

@@ -123,8 +123,13 @@ def test_who_looks_at_frames_is_told(tmp_path: Path, name: str, monkeypatch: pyt
     assert told or subject.fault or not right
 
 
+CELLS = "[cell.cell_contents for cell in {}.__closure__]"
 WAYS_AROUND = {
     "the clock's own function": "time.time.__wrapped__()",
+    "what the clock's function holds": f"[found for found in {CELLS.format('time.time')} "
+    "if type(found).__name__.startswith('builtin')][0]()",
+    "what was noted": f"time.time(); [found.clear() for found in {CELLS.format('os.stat(__file__)._told')} "
+    "if type(found) in (list, set)]",
     "what a stream holds": "fcntl.ioctl(1, 0x541B, b'0000')",
 }
 
@@ -134,7 +139,7 @@ def test_a_way_around_what_watches_is_closed_or_told(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(SANDBOX, "off")
-    text = f"import fcntl, time\ndef step(wish):\n    {WAYS_AROUND[name]}\n    return wish\n"
+    text = f"import fcntl, os, time\ndef step(wish):\n    {WAYS_AROUND[name]}\n    return wish\n"
     replies, subject = asked(tmp_path, text, times=1)
     told = any(seen.kind is Seen.OUTSIDE for seen in subject.observed())
     assert told or isinstance(replies[0], SubjectFailed)
