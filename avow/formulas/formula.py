@@ -32,7 +32,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.language.subterms import subterms
 from avow.language.terms import (
     FALSE,
     TRUE,
@@ -156,20 +155,6 @@ def fresh(name: str, taken: Collection[str]) -> str:
     while name in taken:
         name += "'"
     return name
-
-
-def has_nonlinear(term: Term) -> bool:
-    """Whether two non-constant terms are multiplied, or something is divided by a non-constant."""
-    for part in subterms(term):
-        if isinstance(part, Arithmetic) and part.operator in {"*", "/"}:
-            left, right = _constant(part.left), _constant(part.right)
-            if not right and (part.operator == "/" or not left):
-                return True
-    return False
-
-
-def _constant(term: Term) -> bool:
-    return all(isinstance(part, Literal | Arithmetic | Negative | Widen) for part in subterms(term))
 
 
 # -- normal form and digest --------------------------------------------------------------------------------------------

@@ -25,8 +25,8 @@ _CUT = b"\x1a"
 class Printed:
     """The standard streams of one process and of all that it starts; each is read by itself.
 
-    Give it the process as `theirs`, and call `begun` once it has them. Then `wait` wherever it is waited for: what it
-    prints is read meanwhile, so that it never has to wait for us.
+    Start the process with `theirs` as its streams, and call `begun` then. Call `wait` wherever it is waited for: what
+    it prints is read meanwhile, so that it never has to wait for us.
     """
 
     def __init__(self, names: Names, *, keeps: bool = False) -> None:

@@ -11,7 +11,6 @@ from avow.formulas.formula import (
     digest,
     disjunction,
     free_variables,
-    has_nonlinear,
     node_digest,
     normalise,
     sort_digest,
@@ -134,12 +133,6 @@ def test_junctions_of_constants() -> None:
     assert conjunction([b, Not(TRUE)]) == And((b, Not(TRUE)))
     assert disjunction([TRUE, b]) == TRUE
     assert normalise(Or((b, Not(Not(b))))) == b
-
-
-def test_nonlinearity() -> None:
-    assert has_nonlinear(formula("in.r * out.q > 1", NODE))
-    assert has_nonlinear(formula("1 / in.r > 1", NODE))
-    assert not has_nonlinear(formula("2 * in.r + in.r / 4 > 1", NODE))
 
 
 def test_negations_are_pushed_to_the_atoms() -> None:
