@@ -168,7 +168,7 @@ class _Places:
             to = _text(step[1] or step[2])
             at = "" if to[:1] == os.sep else self.of(process)
             if at is not None:
-                self._now[process] = _plain(os.path.join(at, to))  # noqa: PTH118
+                self._now[process], _ = way(os.path.join(at, to))  # noqa: PTH118
 
 
 _STEP = re.compile(rb'(?:chdir\("((?:[^"\\]|\\.)+)"|fchdir\(\d+<((?:[^>\\]|\\.)*)>)\)\s+= 0')
@@ -199,10 +199,10 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
         if at is None and _text(text)[:1] != os.sep:
             events[_NOWHERE] = None
             continue
-        path = _plain(os.path.join(at or "", _text(text)))  # noqa: PTH118
+        path, left = way(os.path.join(at or "", _text(text)))  # noqa: PTH118
         well = b"= -1 " not in rest
         if call in _BOTH:
-            old, new = (_plain(p) for p in _both(call, line, at or ""))
+            old, new = _both(call, line, at or "")
             if well and call not in _LINKS and not own(old):
                 events["read", old] = None  # by its new name it is as little made here
             elif well:
@@ -223,6 +223,7 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
             if not own(name):
                 kind = "link" if call.startswith("readlink") else "state" if call in _LOOKS else "read"
                 events["kind" if kind == "read" and b"O_PATH" in rest and call not in _RUNS else kind, name] = None
+            events |= {("kind", place): None for place in left if not own(place)}
     return (*events, *_interpreters(events))
 
 
@@ -246,14 +247,6 @@ _FAILED = b")"
 """How the line of a call ends that failed: ``= -1 ENOENT (No such file or directory)``."""
 _CONNECTED = (b"= 0", b"(Operation now in progress)")
 _OF_THE_MACHINE = ("/proc/", "/sys/", "/dev/", "/etc/ld.so.cache/", "/etc/ld.so.preload/")
-
-
-def _plain(path: str) -> str:
-    """The path without ``..``, as the system goes it: through links."""
-    if "/../" in f"{path}/":
-        folder, name = os.path.split(path)
-        return os.path.realpath(path) if name == ".." else os.path.join(os.path.realpath(folder), name)  # noqa: PTH118
-    return os.path.normpath(path)
 
 
 def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
@@ -286,9 +279,9 @@ _PATH = re.compile(rb"(?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?" + _STRI
 def _both(call: str, line: bytes, folder: str) -> list[str]:
     """The two paths of a call."""
     found = [(_text(base) if base else folder, _text(text)) for base, text in _PATH.findall(line)[:2]]
-    paths = [os.path.normpath(os.path.join(*pair)) for pair in found]  # noqa: PTH118
+    paths = [way(os.path.join(*pair))[0] for pair in found]  # noqa: PTH118
     if call in _LINKS and len(paths) == 2:
-        paths[0] = os.path.normpath(os.path.join(os.path.dirname(paths[1]), found[0][1]))  # noqa: PTH118, PTH120
+        paths[0], _ = way(os.path.join(os.path.dirname(paths[1]), found[0][1]))  # noqa: PTH118, PTH120
     return paths
 
 

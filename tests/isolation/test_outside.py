@@ -25,6 +25,7 @@ HERE="${0%/*}/.."
 cat "$HERE/settings"
 if [ -e "$HERE/plugin" ]; then echo plugin; fi
 cat "$HERE"/include/*.h
+cat "$HERE/current/../version"
 helper
 echo mine > "$HERE/cache"; cat "$HERE/cache"
 cat input
@@ -40,6 +41,11 @@ def there(tmp_path: Path) -> Path:
     for k in range(6):
         (place / "include" / f"{k}.h").write_text(f"{k}\n")
     (place / "settings").write_text("lenient\n")
+    for version in ("1", "2"):
+        (place / version / "lib").mkdir(parents=True)
+        (place / version / "version").write_text(version)
+    (place / "latest").symlink_to("1")
+    (place / "current").symlink_to("latest/lib")
     for name, text in (("tool", TOOL), ("helper", "#!/bin/sh\necho helped\n")):
         (place / "bin" / name).write_text(text)
         (place / "bin" / name).chmod(0o755)
@@ -61,12 +67,19 @@ def changed(observed: tuple[Observed, ...]) -> list[str]:
     return [o.path for o in observed if look(o.kind, o.path) != o.digest]
 
 
+def linked(place: Path, target: str) -> None:
+    place.unlink()
+    place.symlink_to(target)
+
+
 CHANGES: dict[str, Callable[[Path], object]] = {
     "a file that it read": lambda there: (there / "settings").write_text("strict\n"),
     "a file that it looked for": lambda there: (there / "plugin").write_text(""),
     "one of many files": lambda there: (there / "include" / "3.h").write_text("4\n"),
     "one more in a folder that it lists": lambda there: (there / "include" / "9.h").write_text("9\n"),
     "a program that it starts": lambda there: (there / "bin" / "helper").write_text("#!/bin/sh\necho other\n"),
+    "a link that it goes back from": lambda there: linked(there / "current", "2/lib"),
+    "a link on the way of one that it goes back from": lambda there: linked(there / "latest", "2"),
     "a folder is another's": lambda there: (there / "include").rename(there / "old"),
 }
 
@@ -76,13 +89,13 @@ def test_a_change_of_what_it_looked_at_is_seen(there: Path, tmp_path: Path) -> N
     said, observed = ran(there, tmp_path)
     assert "lenient" in said
     assert "helped" in said
-    before = shutil.copytree(there, tmp_path / "before")
+    before = shutil.copytree(there, tmp_path / "before", symlinks=True)
     for what, change in CHANGES.items():
         assert not changed(observed), what
         change(there)
         assert changed(observed), what
         shutil.rmtree(there)
-        shutil.copytree(before, there)
+        shutil.copytree(before, there, symlinks=True)
 
 
 @needs_strace
