@@ -251,8 +251,6 @@ def _kind(event: str, path: str) -> Seen | None:
         return Seen.MISSING
     if stat.S_ISDIR(mode):
         return Seen.LISTING if event in ("read", "list", "import") else Seen.STATE if event == "state" else Seen.KIND
-    if event == "import":
-        return None  # what it imports is read; a folder may be a package without `__init__`
     if event == "state":
         return Seen.STATE
     if event in ("kind", "link"):
@@ -273,10 +271,12 @@ def _of_python(path: str) -> bool:
     """Of the interpreter that runs us; its version and program stand for all of it."""
     if "/__pycache__" in path:
         return True  # of installed packages only: a subject's own are never read
-    inside = any(path.startswith(folder + os.sep) or path == folder for folder in _PYTHON)
-    return inside and not any(
-        path.startswith(folder + os.sep) for folder in (*_INSTALLED, *(f"{p}/dist-packages" for p in _PYTHON))
-    )
+    installed = (*_INSTALLED, *(f"{folder}/dist-packages" for folder in _PYTHON))
+    return _within(path, _PYTHON) and not _within(path, installed)
+
+
+def _within(path: str, folders: Iterable[str]) -> bool:
+    return any(f"{path}{os.sep}".startswith(f"{folder}{os.sep}") for folder in folders)
 
 
 def untold(what: str) -> Observed:

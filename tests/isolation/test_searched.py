@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import py_compile
 import site
+import sysconfig
 from pathlib import Path
 
 import pytest
 
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Seen, look, modules
+from avow.isolation.observed import Observed, Seen, look, modules, recorded
 from avow.isolation.subject import SubjectProcess
 
 SEARCHED = {
     "a module of PYTHONPATH's": ("import other", "PYTHONPATH", "b"),
+    "a module that is compiled": ("import other", "a/other.py", ""),
     "a package of PYTHONPATH's without __init__": ("import folder.part", "PYTHONPATH", "b"),
     "a module that PYTHONPATH has not yet": ("try:\n    import later\nexcept ImportError:\n    pass", "a/later.py", ""),
     "a module in the place of the library's": ("import json", "a/json.py", ""),
@@ -30,6 +33,7 @@ def test_where_something_is_found_is_an_input(tmp_path: Path, name: str, monkeyp
     for folder in ("a", "b"):
         (tmp_path / folder / "folder").mkdir(parents=True)
         (tmp_path / folder / "other.py").touch()
+        py_compile.compile(str(tmp_path / folder / "other.py"))
         (tmp_path / folder / "folder" / "part.py").touch()
         (tmp_path / folder / "tool").write_text("#!/bin/sh\n")
         (tmp_path / folder / "tool").chmod(0o755)
@@ -56,7 +60,7 @@ def test_where_something_is_found_is_an_input(tmp_path: Path, name: str, monkeyp
         place.unlink() if place.is_symlink() else place.rmdir()
         place.symlink_to(new)
     else:
-        (tmp_path / what).touch()
+        (tmp_path / what).write_text("other = 1\n")
     assert any(look(o.kind, o.path) != o.digest for o in seen)
 
 
@@ -69,3 +73,11 @@ def test_what_adds_to_python_s_path_is_an_input(tmp_path: Path, name: str, monke
     assert modules() == before
     (tmp_path / name).write_text("/b\n")
     assert modules() != before
+
+
+@pytest.mark.parametrize("name", ["purelib", "platlib"])
+def test_what_is_installed_is_an_input(name: str) -> None:
+    folder = sysconfig.get_path(name)
+    (row,) = recorded([("import", folder)])
+    assert row == Observed(Seen.LISTING, folder, look(Seen.LISTING, folder))
+    assert not recorded([("import", sysconfig.get_path("stdlib"))])
