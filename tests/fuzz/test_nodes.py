@@ -14,6 +14,7 @@ from avow.backends.fuzz.drawn import Drawn, command
 from avow.backends.fuzz.reading import load
 from avow.backends.fuzz.tables import drawable
 from avow.base.verdict import Object, Verdict
+from avow.isolation.observed import look
 from avow.isolation.tracing import traces
 from fuzz.cpp_nodes import DEBOUNCER, FIVE, LIMITER, MEDIAN, SCAN, WATCHDOG, Cpp, adapter
 
@@ -105,6 +106,15 @@ def test_a_hostile_subject_is_an_error(name: str, tmp_path: Path) -> None:
     head = "#include <cstdio>\n#include <cstdlib>\n#include <unistd.h>\n"
     found = replace(LIMITER, adapter=head + text).verdicts(tmp_path)
     assert set(found.values()) == {Verdict.ERROR}, found
+
+
+def test_what_cannot_be_built_is_asked_again_once_it_may_be(tmp_path: Path) -> None:
+    report = replace(LIMITER, adapter='#include "later.hpp"\n' + LIMITER.adapter).report(tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.ERROR}
+    assert all(look(o.kind, o.path) == o.digest for o in report.observed)
+    for later in tmp_path.rglob("*.hpp"):
+        later.with_name("later.hpp").touch()
+    assert any(look(o.kind, o.path) != o.digest for o in report.observed)
 
 
 @pytest.mark.nightly

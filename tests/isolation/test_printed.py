@@ -6,10 +6,13 @@ from pathlib import Path
 
 import pytest
 from helpers import some
+from hoare.systems import make_job
+from python_backend.source_nodes import LIMITER, LIMITER_RCL, Example
 
 from avow.backend_kit.programs import cpython
-from avow.backend_kit.protocol import Report
+from avow.backend_kit.protocol import Limits, Report
 from avow.backends.fuzz import runner
+from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.base.codec import canonical, document, to_json
 from avow.base.verdict import Isolation, Outcome, Verdict
 from avow.isolation import judge
@@ -256,6 +259,44 @@ def test_who_does_not_read_is_not_waited_for(tmp_path: Path, monkeypatch: pytest
     with pytest.raises(SubjectFailed, match="within"):
         subject.ask({"x": "y" * 1_000_000})
     subject.close()
+
+
+SAID = pytest.mark.parametrize(("said", "wrong"), [("low speed", False), ("low: tested", True)])
+FAULT = "prints what reads as a result"
+
+
+@SAID
+def test_in_a_campaign_it_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, wrong: bool) -> None:
+    monkeypatch.setenv(SANDBOX, "off")
+    (tmp_path / "fuzz").write_text(f"#!/bin/sh\necho '{said}'\n")
+    (tmp_path / "fuzz").chmod(0o755)
+    asked = runner.Campaign(str(tmp_path), str(tmp_path), ())
+    found = runner.campaign(asked, runner.Question(asked, str(tmp_path), 60, ("s/n/guarantee/low",)))
+    assert (FAULT in found.fault) is wrong
+
+
+@SAID
+def test_of_a_class_that_is_not_translated_it_is_an_error_too(tmp_path: Path, said: str, wrong: bool) -> None:
+    """Else it is unknown, for what keeps the class from being translated."""
+    before = "    def step(self, v: float) -> float:\n"
+    assert before in LIMITER
+    text = LIMITER.replace(before, f"{before}        print('{said.replace('low', 'same')}')\n")
+    found = Example(text, LIMITER_RCL, "Limiter", {"vmax": 1.5}).settled(tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.ERROR if wrong else Verdict.UNKNOWN}
+    assert all((FAULT in o.summary) is wrong for o in found.values())
+
+
+@pytest.mark.slow
+@SAID
+def test_where_only_the_second_process_is_asked_it_is_an_error_too(tmp_path: Path, said: str, wrong: bool) -> None:
+    """What is no number, only that one is given."""
+    rcl = "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee low ( out.y <= 1 ) }"
+    text = f"def f(x):\n    if x != x:\n        print('{said}')\n    return min(x, 1.0)\n"
+    options = {"subject": "s.py:f", "cases": 20, "numbers": "float64"}
+    job = make_job(tmp_path, rcl, "n", options, {"s.py": text}, "hypothesis")
+    (found,) = HYPOTHESIS.discharge(job, job.root, Limits(seconds=60)).outcomes
+    assert found.verdict is (Verdict.ERROR if wrong else Verdict.TESTED), found.summary
+    assert (FAULT in found.summary) is wrong
 
 
 OUTCOME = Outcome("robot/sensor/guarantee/low", Verdict.TESTED, "")

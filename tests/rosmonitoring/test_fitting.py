@@ -221,6 +221,17 @@ def test_too_large_for_the_type() -> None:
             converter(REAL, Scalar(name), {}, NOTHING, frozenset())(Decimal("1e399"))
 
 
+@pytest.mark.parametrize("number", [3.5e38, -3.5e38, 1.7e308])
+def test_too_large_for_a_float32_however_it_is_written(number: float) -> None:
+    from avow.backends.rosmonitoring.numbers import Decimal
+
+    read = converter(REAL, Scalar("float32"), {}, NOTHING, frozenset())
+    for raw in (number, Decimal(repr(number))):
+        with pytest.raises(MappingError):
+            read(raw)
+    assert read(math.nextafter(LARGEST, math.inf)) == Fraction(LARGEST)  # which is the nearest
+
+
 def pack(number: float) -> bytes:
     return struct.pack("<f", number)
 
