@@ -209,13 +209,13 @@ def _read_sources_only(root: str) -> None:
     sys.path_importer_cache.clear()
 
 
-def _found_before() -> list[list[str]]:
+def _found_before() -> list[tuple[str, str]]:
     """What is imported already, and the folders in which it was looked for before Python's own."""
     files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
     ours = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep  # noqa: PTH100, PTH120
     first = itertools.takewhile(lambda folder: folder != os.path.dirname(os.__file__), sys.path)  # noqa: PTH120
-    read = [["read", file] for file in files if isinstance(file, str) and not file.startswith(ours)]
-    return [*read, *(["list", folder] for folder in first)]
+    read = [("read", file) for file in files if isinstance(file, str) and not file.startswith(ours)]
+    return [*read, *(("list", folder) for folder in first)]
 
 
 def _beside(file: str, *, apart: bool = False) -> Any:
@@ -324,19 +324,18 @@ def main() -> None:
 
         watching = _beside("watching.py")
         seen, drawn, names = watching.watch(tempfile.gettempdir(), end, _beside)
-        seen += _found_before()
+        before = tuple(_found_before())
 
         others = _threads()
         whole = _kept(vars(sys.modules["__main__"]), vars(Table), vars(_FromSource), *names)
 
-        def say(message: dict[str, Any]) -> None:
+        def say(message: dict[str, Any], earlier: tuple[Any, ...] = ()) -> None:
             if not whole():
                 end("patches what runs it")
             for flush in streams:  # what it printed comes before its answer
                 with contextlib.suppress(Exception):
                     flush()
-            told, seen[:] = seen[:], []
-            answers.write(dumps({**message, "seen": told}) + "\n")
+            answers.write(dumps({**message, "seen": (*earlier, *seen())}) + "\n")
             answers.flush()
 
         look(f"{mark}-begin", os.F_OK)
@@ -346,7 +345,7 @@ def main() -> None:
             ready: dict[str, Any] = {"ready": True}
         except BaseException as error:
             ready = {"error": _told(error)}
-        say(ready)
+        say(ready, before)
         if "error" in ready:
             return
         if eyes is not None:
@@ -361,15 +360,15 @@ def main() -> None:
         drawn()
         if others():
             end("left threads running")
-        told = seen[:]
+        told = tuple(seen())
         look(f"{mark}-end", os.F_OK)
         with contextlib.suppress(Exception):
             _print_all(watching.is_extension)
         processes = [int(name) for name in os.listdir("/proc") if name.isdigit()] if level == "sealed" else []  # noqa: PTH208
-        seen[:] = told  # that was us
+        seen()  # that was us
         if set(processes) - {1, os.getpid()}:
             end("left processes behind")
-        say({"end": True})
+        say({"end": True}, told)
 
 
 if __name__ == "__main__":

@@ -60,12 +60,12 @@ _MOST_LINKS = 40
 
 def watch(
     scratch: str, end: Callable[[str], None], beside: Callable[[str], Any]
-) -> tuple[list[list[str]], Callable[[], None], tuple[dict[str, Any], ...]]:
-    """What it looks at, as [event, path], growing as it runs; what is to be called at the end; and the names by which
-    this watches, which the subject can get hold of and must leave as they are. What no subject may
-    do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
-    taken away."""
-    seen: list[list[str]] = []
+) -> tuple[Callable[[], list[tuple[str, str]]], Callable[[], None], tuple[dict[str, Any], ...]]:
+    """What gives what it looked at since the last time, as (event, path); what is to be called at the end; and the
+    names by which this watches, which the subject can get hold of and must leave as they are. What no subject may do
+    ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be taken
+    away."""
+    seen: list[tuple[str, str]] = []
     known: set[tuple[str, str]] = set()
     fspath, isabs, join, getcwd = os.fspath, os.path.isabs, os.path.join, os.getcwd
     readlink, dirname = os.readlink, os.path.dirname
@@ -92,7 +92,7 @@ def watch(
     def add(event: str, path: str) -> None:
         if (event, path) not in known:
             known.add((event, path))
-            seen.append([event, path])
+            seen.append((event, path))
 
     def opened(descriptor: int) -> str:
         try:
@@ -110,6 +110,10 @@ def watch(
         path = place if event in ("outside", "program", "variable") else path_of(place)
         if path is not None:
             add(event, path)
+
+    def taken() -> list[tuple[str, str]]:
+        found, seen[:] = seen[:], []
+        return found
 
     def fault(what: str) -> None:
         end(what)
@@ -187,7 +191,7 @@ def watch(
     machine_code.watch_modules(tell, senses.asked)
     machine_code.watch_sqlite(tell)
     sys.addaudithook(hook)
-    return seen, drawn, (globals(), vars(senses), vars(machine_code))
+    return senses.closed(taken), drawn, (globals(), vars(senses), vars(machine_code))
 
 
 _AROUND = frozenset(

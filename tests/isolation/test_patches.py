@@ -64,7 +64,7 @@ PATCHES = {
     "def step(wish):\n    return L()\n",
     "what is traced": "import sys\ndef trace(frame, event, a):\n    if frame.f_code.co_name == 'coded':\n"
     "        frame.f_locals['value'] = 0\n    return trace\nsys.settrace(trace)" + STEP,
-    "what watches": "import os\nos.stat.__globals__['asked'] = lambda *a, **k: False" + STEP,
+    "what watches": "import os\ntype(os.stat('/'))._looked.__globals__['asked'] = 0" + STEP,
     "the stream of answers": "import io, os\nos.write = lambda d, b: len(b)\nio.TextIOWrapper = None" + STEP,
 }
 FRAMES = {
@@ -79,10 +79,14 @@ FRAMES = {
     "        FOUND(error.__traceback__.tb_frame)\n    return wish\n",
 }
 FOUND = f"""
+import sys
 def FOUND(frame):
     while frame is not None:
-        if 'coded' in frame.f_globals:
+        if 'coded' in frame.f_globals and frame.f_globals is not vars(sys.modules['__main__']):
             frame.f_globals['coded'] = lambda *a: {RIGHT}
+        for noted in () if sys.getprofile() else frame.f_locals.values():
+            if type(noted) in (list, set) and noted and type(next(iter(noted))) in (list, tuple):
+                noted.clear()
         frame = frame.f_back
 """
 
