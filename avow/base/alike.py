@@ -12,17 +12,18 @@ LOOK = str.maketrans(
 )
 """Latin letters → those of another alphabet that look the same."""
 
-_SEEN_AS = {
+SEEN_AS = {
     **{other: chr(letter) for letter, other in LOOK.items()},
     **dict(zip(map(ord, "αινορυχ\u03f2ΑΒΕΖΗΙΚΜΝΟΡΤΥΧ"), "aivopuxcABEZHIKMNOPTYX", strict=True)),
     **dict(
         zip(map(ord, "\u0501\u0261\u04bb\u0458\u051b\u051d\u0131\u2212\u2010\u2011\u2013"), "dghjqwi----", strict=True)
     ),
 }
+"""Letters and signs → those of ASCII that look the same."""
 
 
 def alike(text: str) -> str:
     """The same for all texts that look the same, or differ in case only."""
-    plain = unicodedata.normalize("NFKC", text.translate(_SEEN_AS))
+    plain = unicodedata.normalize("NFKC", text.translate(SEEN_AS))
     seen = "".join(c for c in plain if unicodedata.category(c) not in ("Cc", "Cf"))
     return " ".join(seen.casefold().split())

@@ -10,6 +10,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 
+from avow.base.alike import SEEN_AS
 from avow.base.records import dataclass
 from avow.base.tuning.shown import PRINTED_SHOWN
 from avow.base.verdict import Isolation, Verdict
@@ -30,6 +31,7 @@ class Names:
         parted = [name.lower().split("/") for name in names]
         ids = [parts for parts in parted if len(parts) > 1]
         claims = {*map("/".join, ids), *("/".join(parts[1:]) for parts in ids), *(parts[-1] for parts in ids)}
+        claims |= {f"{parts[-3]}.{parts[-1]}" for parts in ids if len(parts) > 2}
         nodes = {parts[-3] for parts in ids if len(parts) > 2}
         others = {name for (name, *more) in parted if not more}
         return cls(frozenset(n for n in claims if not n.isdigit()), frozenset({*nodes, *others}))
@@ -39,12 +41,34 @@ def forged(text: bytes, names: Names) -> str:
     """The first of these lines that reads as a result, escaped and cut as it may be shown; empty: none does."""
     plain = text.translate(_ENDS, _NOTHING)
     if not plain.isascii():
-        plain = unicodedata.normalize("NFKC", plain.decode("utf-8", "replace")).encode("ascii", "ignore")
+        plain = _written(plain.decode("utf-8", "replace")).encode("latin-1")
     for shape in _shapes(plain):
-        found = _forged(shape.decode("ascii"), names)
+        found = _forged(shape.decode("latin-1"), names)
         if found:
-            return _shown(ascii(found.strip())[1:-1])
+            return _shown(ascii(found.strip().replace(_FOREIGN, "?"))[1:-1])
     return ""
+
+
+def _written(text: str) -> str:
+    """The text in letters of ASCII, as a reader sees them. A letter of another alphabet stays one, which no word here
+    has, so that "датчик: error" is not the word alone; a sign parts words; what is not seen is left out."""
+    text = unicodedata.normalize("NFKD", text).translate(SEEN_AS)
+    return text.translate({ord(each): _seen(each) for each in set(text) if not each.isascii()})
+
+
+def _seen(character: str) -> str:
+    if character.isalnum():
+        return "" if character in _FILLERS else _FOREIGN
+    if character in _LINES:
+        return "\n"
+    return "" if character == "\ufffd" or unicodedata.category(character)[0] in "CM" else " "
+
+
+_FOREIGN = "\xaa"
+"""What stands for each other letter: a letter and one byte, and never left of a text in its normal form."""
+_FILLERS = "\u115f\u1160\u3164\uffa0"
+"""Letters by their kind, which show nothing."""
+_LINES = "\x85\u2028\u2029"
 
 
 def _shown(line: str) -> str:
@@ -138,10 +162,15 @@ def _gives(left: str, word: str, right: str, names: Names) -> bool:
     begins = _WORDLESS.fullmatch(left) is not None
     if begins:
         return alone or (len(right) < _FAR and _given(right, word, names))
-    if not alone and right[:1] not in _CLOSING:
+    if not alone and right[:1] not in _CLOSING and not _more(left, word, right):
         return "verdict" in left[-_NEAR:] and _label(left)[1] in _KEYS
     kind, name = _label(left)
     return _named(kind, name, word, names) or (word not in _ORDINARY and name in names.others | _LOOSE_KEYS)
+
+
+def _more(left: str, word: str, right: str) -> bool:
+    """Whether the line goes on after a verdict that a sign gives: ``low: tested (200 cases)``."""
+    return word not in _ORDINARY and left.rstrip().endswith(_GIVERS) and right.lstrip().startswith(_ADDING)
 
 
 def _label(left: str) -> tuple[str, str]:
@@ -169,6 +198,8 @@ _FAR, _NEAR, _WIDE = 300, 40, 1000
 """Characters beside a word in which its name is looked for; a key of one; the rest of a message. Beyond them nothing is
 near, and a line that is made to be looked at for long is not."""
 _CLOSING = ("'", '"', "]", ")", "}")
+_GIVERS = (":", "=", ">", "..", "|")
+_ADDING = ("(", "[", ",", ";", "|")
 _NUMBERED = re.compile(r"g\d+")
 _WORDLESS = re.compile(r"\W*")
 _LABEL = re.compile(r"[\W_]*(?:(?:si|saw)\W+)?([\w./-]*\w)(?:[\s\"']+(\w+)\b)?")

@@ -75,7 +75,8 @@ def asked(*, importing: bool = True) -> bool:
     while frame is not None:
         file = frame.f_code.co_filename
         inner = file.removeprefix(_STDLIB)
-        if file.startswith(_IMPORT) or (inner != file and inner.startswith(_OWN_USE)):
+        handed_on = inner == "asyncio/base_events.py" and frame.f_code.co_name == "time"
+        if file.startswith(_IMPORT) or (inner != file and inner.startswith(_OWN_USE) and not handed_on):
             return False
         if (
             file not in _HOST
@@ -250,13 +251,14 @@ def _watch_system(told: Told) -> None:
                     if hasattr(place, name):
                         setattr(place, name, wrapped)
 
-    def created(record: Any) -> Any:
+    def time_of(name: str, record: Any) -> Any:
         if asked():
             told("outside", "the clock")
-        return record.__dict__["created"]
+        return record.__dict__[name]
 
-    kept = property(created, lambda record, value: record.__dict__.update(created=value))
-    setattr(logging.LogRecord, "created", kept)  # noqa: B010 - an attribute of the type's instances
+    for name in ("created", "msecs", "relativeCreated"):
+        kept = functools.partial(lambda name, record, value: record.__dict__.update({name: value}), name)
+        setattr(logging.LogRecord, name, property(functools.partial(time_of, name), kept))
 
 
 # -- the state of files ----------------------------------------------------------------------------------------------

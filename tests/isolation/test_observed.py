@@ -279,6 +279,11 @@ UNRECORDABLE = {
     "SQLite's clock": "import sqlite3\n"
     "sqlite3.connect(':memory:').execute(\"select strftime('%s','now')\")\ntop = 10\n",
     "the clock of a log": "import logging\nlogging.LogRecord('a', 1, 'b', 1, 'm', (), None).created\ntop = 10\n",
+    "the clock of a log since it began": (
+        "import logging\nlogging.LogRecord('a', 1, 'b', 1, 'm', (), None).relativeCreated\ntop = 10\n"
+    ),
+    "the clock of a log, its part of a second": "import logging\nlogging.makeLogRecord({}).msecs\ntop = 10\n",
+    "the clock of a loop": "import asyncio\nasyncio.base_events.BaseEventLoop().time()\ntop = 10\n",
     "the time of a file of its own": "import os, tempfile\np = tempfile.mkstemp()[1]\nos.stat(p).st_mtime\ntop = 10\n",
     "the time of an open file": "import os\nf = open(__file__)\nos.fstat(f.fileno())[8]\ntop = 10\n",
     "the time of an entry": "import os\n[e.stat().st_mtime_ns for e in os.scandir('.')]\ntop = 10\n",
