@@ -10,7 +10,7 @@ from helpers import some
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin_tool
+from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin, spin_tool
 from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.backends.ajpf.asking import ask
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
@@ -26,6 +26,7 @@ from avow.backends.ajpf.society import system
 from avow.base import programs
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
+from avow.isolation.tracing import traces
 
 RESULTS = "====================================================== results\n"
 HOLDS = RESULTS + "no errors detected\n"
@@ -212,6 +213,22 @@ def test_spin_missing_is_no_second_opinion(lift, tmp_path, monkeypatch):
     assert "Spin" not in report.tool
     report = BACKEND.discharge(lift({"engine": "spin"}), tmp_path, Limits(seconds=60))
     assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
+
+
+@pytest.mark.needs_spin
+@pytest.mark.skipif(not traces(), reason="strace is not here")
+def test_what_was_read_for_a_second_opinion_that_did_not_come_is_an_input(lift, tmp_path, monkeypatch):
+    """It may come once that is another."""
+    (tmp_path / "settings").write_text("1")
+
+    def opinions(checker, properties, folder, seconds, outside):
+        outside.run(["cat", str(tmp_path / "settings")], cwd=folder, seconds=60, megabytes=1_000)
+        raise spin.NoOpinion("it does not compile")
+
+    monkeypatch.setattr(spin, "opinions", opinions)
+    report = BACKEND.discharge(lift({"engine": "auto"}), tmp_path, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
+    assert str(tmp_path / "settings") in {o.path for o in report.observed}
 
 
 @pytest.mark.needs_ajpf
