@@ -269,7 +269,7 @@ _INSTALLED = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib"
 
 def _of_python(path: str) -> bool:
     """Of the interpreter that runs us; its version and program stand for all of it."""
-    if "/__pycache__" in path:
+    if path.endswith("/__pycache__") or ("/__pycache__/" in path and path.endswith(".pyc")):
         return True  # of installed packages only: a subject's own are never read
     installed = (*_INSTALLED, *(f"{folder}/dist-packages" for folder in _PYTHON))
     return _within(path, _PYTHON) and not _within(path, installed)

@@ -193,13 +193,13 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
         call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
         if call == "connect" and b"AF_UNIX" not in line and rest.rstrip().endswith(_CONNECTED):
             events["outside", "the network"] = None
-        if call in ("chdir", "fchdir") or text is None or (not text and call != "execveat"):
+        if text is None or (not text and call != "execveat"):
             continue
         at = _text(base) if base is not None else places.of(process)
         if at is None and _text(text)[:1] != os.sep:
             events[_NOWHERE] = None
             continue
-        path, left = way(os.path.join(at or "", _text(text)))  # noqa: PTH118
+        path, left = way(os.path.join(at or "", _text(text)), whole=_goes_into(call, rest))  # noqa: PTH118
         well = b"= -1 " not in rest
         if call in _BOTH:
             old, new = _both(call, line, at or "")
@@ -273,6 +273,11 @@ _STRING = rb'"((?:[^"\\]|\\.)*)"(?:\.\.\.)?'
 _CALL = re.compile(rb"(\w+)\((?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?(?:" + _STRING + rb")?(.*)", re.DOTALL)
 
 
+def _goes_into(call: str, rest: bytes) -> bool:
+    """Whether it may be a folder from which others are named."""
+    return call == "chdir" or b"O_DIRECTORY" in rest or b"O_PATH" in rest
+
+
 _PATH = re.compile(rb"(?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?" + _STRING)
 
 
@@ -343,7 +348,7 @@ def _read(lines: Sequence[tuple[int, bytes]], mark: str, folder: str, scratch: s
             if at is None and text and _text(text)[:1] != os.sep:
                 events[_NOWHERE] = None
                 continue
-            path, left = way(os.path.join(at or "", _text(text)))  # noqa: PTH118
+            path, left = way(os.path.join(at or "", _text(text)), whole=_goes_into(call, rest))  # noqa: PTH118
             if path == scratch or path.startswith(scratch + os.sep):
                 continue
             events |= {("kind", place): None for place in left if process != host}  # the host's own: the audit hook

@@ -29,29 +29,31 @@ _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
-def way(path: str, readlink: Callable[[str], str] = os.readlink) -> tuple[str, list[str]]:
+def way(path: str, *, whole: bool = False, readlink: Callable[[str], str] = os.readlink) -> tuple[str, list[str]]:
     """An absolute path without ``..``, as the system goes it: what a folder lies in is not where a link to it lies.
-    And the folders that are left by ``..``: what they are decides where that leads."""
-    if "/../" not in f"{path}/":
+    And what decides where that leads: the links on the way, and the folders that are left by ``..``. `whole`: the
+    folder is gone into, and what is asked for from there does not say how one came there."""
+    if not whole and "/../" not in f"{path}/":
         return os.path.normpath(path), []
-    place, left, links = "/", list[str](), 0
-    parts = path.split("/")[::-1]
+    place, noted, links = "/", list[str](), 0
+    parts = [*path.split("/"), *(["."] if whole else [])][::-1]
     while parts:
         part = parts.pop()
-        if part != "..":
-            place = os.path.join(place, part) if part not in ("", ".") else place  # noqa: PTH118
-            continue
-        left.append(place)
-        above = os.path.dirname(place)  # noqa: PTH120
-        try:
-            target = readlink(place) if links < _MOST_LINKS else ""
-        except (OSError, ValueError):
-            target = ""
-        if target:
-            links += 1
-            parts += ["..", *target.split("/")[::-1]]
-        place = "/" if target.startswith("/") else above
-    return place, left
+        if part == "..":
+            noted.append(place)
+            place = os.path.dirname(place)  # noqa: PTH120
+        elif part not in ("", "."):
+            above, place = place, os.path.join(place, part)  # noqa: PTH118
+            try:
+                target = readlink(place) if parts and links < _MOST_LINKS else ""
+            except (OSError, ValueError):
+                continue
+            if target:
+                noted.append(place)
+                links += 1
+                parts += target.split("/")[::-1]
+                place = "/" if target.startswith("/") else above
+    return place, noted
 
 
 _MOST_LINKS = 40
@@ -79,11 +81,11 @@ def watch(
     def own(path: str) -> bool:
         return path == scratch or path.startswith(scratch + os.sep)
 
-    def path_of(place: Any) -> str | None:
+    def path_of(place: Any, *, whole: bool = False) -> str | None:
         if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
             return None
         text = written(place)
-        path, left = way(text if isabs(text) else join(getcwd(), text))
+        path, left = way(text if isabs(text) else join(getcwd(), text), whole=whole)
         for folder in left:
             if not own(folder):
                 add("kind", folder)
@@ -128,6 +130,8 @@ def watch(
         path = path_of(place)
         if path is None:
             return
+        if mode is None:
+            path_of(path, whole=True)  # `os.open`: perhaps a folder, by which others are named
         if (isinstance(mode, str) and set(mode) & set("wax+")) or (isinstance(flags, int) and flags & _WRITES):
             changes(path, "writes")
         elif path.startswith("/proc/") and path.split("/")[2] not in _HARMLESS:
@@ -159,6 +163,7 @@ def watch(
             elif name not in ("", ":memory:"):
                 changes(arguments[0], "writes")
         elif event in _READS:
+            path_of(arguments[0], whole=True)
             told("read", arguments[0])
         elif event in _CHANGES:
             for place, folder in _CHANGES[event]:

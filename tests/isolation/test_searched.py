@@ -22,6 +22,14 @@ SEARCHED = {
     "a file's way through a link": ("open('d/../value').read()", "d", "two/sub"),
     "a file's way through a link to a link": ("open('twice/../value').read()", "d", "two/sub"),
     "a file's way back from a folder": ("open('own/../value').read()", "own", "two/sub"),
+    "a folder that it goes into by a link": ("import os\nos.chdir('d')\nopen('value').read()", "d", "two/sub"),
+    "a folder that it opens by a link": (
+        "import os\nopen(os.open('value', 0, dir_fd=os.open('d', 0))).read()",
+        "d",
+        "two/sub",
+    ),
+    "a folder that a program goes into": ("import os\nassert not os.system('cd d && cat value')", "d", "two/sub"),
+    "a file beside compiled ones": ("open('__pycache__/value').read()", "models/__pycache__/value", ""),
     "a program on the PATH": ("import subprocess\nsubprocess.run(['tool'])", "PATH", "b"),
     "a program on the PATH, by a shell": ("import os\nos.system('tool')", "PATH", "b"),
 }
@@ -42,7 +50,11 @@ def test_where_something_is_found_is_an_input(tmp_path: Path, name: str, monkeyp
         (models / place).mkdir(parents=True)
     for place in ("one", "two", "."):
         (models / place / "value").write_text(place)
+        (models / place / "sub").mkdir(exist_ok=True)
+        (models / place / "sub" / "value").write_text(place)
     (models / "d").symlink_to("one/sub")
+    (models / "__pycache__").mkdir()
+    (models / "__pycache__" / "value").touch()
     (models / "twice").symlink_to(models / "d")
     (models / "m.py").write_text(f"{asks}\ndef step(): return 1\n")
     monkeypatch.setenv(SANDBOX, "off")  # a sealed one would not see these folders, which lie under /tmp
