@@ -223,8 +223,9 @@ def test_a_subject_that_looks_at_nothing_was_seen_to_look_at_nothing(
     tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(SANDBOX, level)
-    python, subject, *guards = settle(tmp_path, f"def step(**inputs):\n    {WRONG}").observed
+    python, modules, subject, *guards = settle(tmp_path, f"def step(**inputs):\n    {WRONG}").observed
     assert Path(python.path).name.startswith("python")
+    assert modules.kind is Seen.MODULES
     assert subject.path == str(tmp_path / "s.py")
     assert [o.kind for o in guards] == [Seen.TRACER, Seen.SANDBOX]
 
