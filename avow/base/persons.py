@@ -45,12 +45,15 @@ _TITLES = frozenset(
         "nat",
     ]
 )
+_NOBODY = frozenset(["tbd", "tba", "todo", "unknown", "nobody", "noone", "none", "anonymous", "someone", "somebody"])
+"""What stands in the place of a name that somebody has yet to give."""
 _ONE_SCRIPT = frozenset(("CJK", "HIRAGANA", "KATAKANA", "KATAKANA-HIRAGANA"))
 _BESIDE = re.compile(r"\([^)]*\)|<[^>]*>|@\S+")
 
 
 def unreadable(name: str) -> str | None:
-    """Why a name may look like another's: an invisible or control character, or letters of several scripts."""
+    """Why a name may look like another's, or is nobody's: an invisible or control character, letters of several
+    scripts, no letters, a word in the place of a name."""
     if unseen := invisible(name, allowed=""):
         return f"it holds the invisible character {unseen}"
     for char in name:
@@ -66,6 +69,8 @@ def unreadable(name: str) -> str | None:
         return f"'{strange[0]}' is no letter of a name"
     if digit := re.search(r"\d(?=[^\W\d_])", _without_address(name)):
         return f"the digit {digit[0]} stands before a letter"
+    if "".join(letters) in _NOBODY:
+        return "it names nobody"
     return None if letters else "it has no letters"
 
 

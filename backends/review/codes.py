@@ -93,7 +93,7 @@ CODES = register(
     declare(
         "REV124",
         "name that looks like another",
-        "A reviewer's name holds an invisible character, mixes scripts, or has no letters.",
+        "A reviewer's name holds an invisible character, mixes scripts, has no letters, or is TBD.",
         "Write it in the letters of one script.",
     ),
 )

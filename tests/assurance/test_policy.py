@@ -434,7 +434,20 @@ def test_one_person_under_several_spellings_is_one_reviewer() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["Ada L\u200bovelace", "\u0410da", "Ada\u202e", "\u1d00da", "Ada \u3164", "123", "Ada L0velace", "?"]
+    "name",
+    [
+        "Ada L\u200bovelace",
+        "\u0410da",
+        "Ada\u202e",
+        "\u1d00da",
+        "Ada \u3164",
+        "123",
+        "Ada L0velace",
+        "?",
+        "TBD",
+        "n.o. One",
+        "unknown",
+    ],
 )
 def test_names_that_look_like_anothers_are_told(name: str) -> None:
     from avow.base.persons import unreadable
