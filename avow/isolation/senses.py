@@ -94,24 +94,6 @@ def _from(depth: int, part: str) -> bool:
     return sys._getframe(depth).f_code.co_filename.startswith(_STDLIB + part)
 
 
-def looks_around(event: str) -> bool:
-    """Whether it is the subject itself that asks for the frames of its callers, for another's code or for all objects:
-    directly, or by `inspect` and `traceback`. A library that looks for its caller (log lines) is not it."""
-    frame: Any = sys._getframe(2)
-    while frame is not None and event == "sys._getframe" and frame.f_code.co_filename.startswith(_LOOKING):
-        frame = frame.f_back
-    if frame is not None and frame.f_code.co_filename.startswith(_STDLIB + "logging/"):
-        frame = frame.f_back  # `logging.currentframe` hands it on
-    if frame is None:
-        return False
-    file = frame.f_code.co_filename
-    return not (file.startswith((_AVOW, _STDLIB, "<frozen ", *_INSTALLED)) or "-packages" in file)
-
-
-_AVOW = os.path.dirname(os.path.dirname(__file__)) + os.sep  # noqa: PTH120
-_LOOKING = (_STDLIB + "inspect.py", _STDLIB + "traceback.py")
-
-
 def _watch_chance(told: Told) -> Callable[[], None]:
     """Tells when the subject reads a clock or draws what nobody seeded, as far as Python does it; returns what is to be
     asked once more at the end."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.machinery
 import os
 import sys
+import types
 from collections.abc import Callable
 from typing import Any
 
@@ -180,10 +181,12 @@ def watch(
         elif event == "fcntl.ioctl":
             told("outside", "the state of a device")
         elif event in _TRACES:
-            told("outside", "what runs it")
+            fault("traces what runs it")
+        elif event in _RUNS and _forges(arguments[_RUNS[event]]):
+            fault("runs code under the name of a file of the library")
         elif event in _AROUND and not looking and (not event.startswith("object.") or arguments[1] in _LEADING):
             looking.append(event)
-            if senses.looks_around(event):
+            if _looks_around(event):
                 told("outside", "what runs it")
             looking.clear()
 
@@ -206,13 +209,55 @@ _AROUND = frozenset(
 """Events by which a subject may find out that it is run by a judge and not by what it is made for."""
 _LEADING = ("tb_frame", "gi_frame", "cr_frame", "ag_frame", "__code__", "__defaults__", "__kwdefaults__")
 _TRACES = frozenset({"sys.settrace", "sys.setprofile", "sys.monitoring.register_callback"})
-"""Events after which it is handed all frames."""
+"""Events after which it is handed all frames, and with them the list of what was seen."""
+_RUNS = {"exec": 0, "function.__new__": 0, "object.__setattr__": 2}
+"""Event by which code becomes what runs (an attribute: `__code__`) → where among its arguments the code is."""
 
 _READING = frozenset(
     {"_ssl", "_dbm", "_gdbm", "_curses", "_posixshmem", "_tkinter", "nis", "ossaudiodev", "readline", "spwd", "syslog"}
 )
 """Modules of Python's own in C that open files by themselves: a trace of system calls tells which."""
 _STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
+
+_IMPORT = ("<frozen importlib", "<frozen zipimport")
+_INSTALLED = tuple(place + os.sep for place in sys.path if place.endswith("-packages"))
+
+
+def _looks_around(event: str) -> bool:
+    """Whether it is the subject itself that asks for the frames of its callers, for another's code or for all objects:
+    directly, or by `inspect` and `traceback`. A library that looks for its caller (log lines) is not it."""
+    frame: Any = sys._getframe(2)
+    while frame is not None and event == "sys._getframe" and frame.f_code.co_filename.startswith(_LOOKING):
+        frame = frame.f_back
+    if frame is not None and frame.f_code.co_filename.startswith(_STDLIB + "logging/"):
+        frame = frame.f_back  # `logging.currentframe` hands it on
+    if frame is None:
+        return False
+    return not _is_library(frame.f_code.co_filename)
+
+
+def _is_library(file: str) -> bool:
+    """Whether code of that file is not the subject's own."""
+    return file.startswith((_AVOW, _STDLIB, "<frozen ", *_INSTALLED)) or "-packages" in file
+
+
+def _forges(code: Any) -> bool:
+    """Whether code is run under the name of a library's file by who is not importing: by that name is told who asks.
+    What is imported under a false name is not seen."""
+    if sys._getframe(2).f_code.co_filename.startswith((*_IMPORT, _STDLIB + "types.py")):  # `types.coroutine`
+        return False
+    parts = [code]
+    while parts:
+        part = parts.pop()
+        if isinstance(part, types.CodeType):
+            if type(part.co_filename) is not str or _is_library(part.co_filename):  # another kind answers as it likes
+                return True
+            parts += part.co_consts
+    return False
+
+
+_AVOW = os.path.dirname(os.path.dirname(__file__)) + os.sep  # noqa: PTH120
+_LOOKING = (_STDLIB + "inspect.py", _STDLIB + "traceback.py")
 
 
 def is_extension(file: Any) -> bool:

@@ -168,7 +168,7 @@ REFUSED = [
         "import threading; t = threading.Thread(target=self.said.publish, args=('x',)); t.start(); t.join()",
         "by a thread",
     ),
-    ("import threading; threading.Timer(60, print).start()", "a thread of its own"),
+    ("import threading; threading.Timer(60, print).start()", "left threads running"),
     ("rospy.Timer(rospy.Duration(1e-9), lambda event: None)", "more than"),
 ]
 

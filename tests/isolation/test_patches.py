@@ -74,6 +74,15 @@ FRAMES = {
     "    signal.raise_signal(10)\n    return wish\n",
     "the log's": "import logging\ndef step(wish):\n    FOUND(logging.currentframe())\n    return wish\n",
     "a profile's": "import sys\nsys.setprofile(lambda frame, event, a: FOUND(frame))" + STEP,
+    "one of the library's name": "import os\nHERE = {'FOUND': FOUND}\nexec(compile('import sys\\ndef f():\\n"
+    "    FOUND(sys._getframe())', os.__file__, 'exec'), HERE)\ndef step(wish):\n    HERE['f']()\n    return wish\n",
+    "one of the library's name, in bytes": "import os\nHERE = {'FOUND': FOUND}\nexec(compile(b'import sys\\ndef f():\\n"
+    "    FOUND(sys._getframe())', os.__file__, 'exec'), HERE)\ndef step(wish):\n    HERE['f']()\n    return wish\n",
+    "one that gets the library's name": "import os, sys\ndef f():\n    FOUND(sys._getframe())\n"
+    "f.__code__ = f.__code__.replace(co_filename=os.__file__)\ndef step(wish):\n    f()\n    return wish\n",
+    "one of a name of its own kind": "class N(str):\n    startswith = removeprefix = lambda *a: True\n"
+    "HERE = {'FOUND': FOUND}\nexec(compile('import sys\\ndef f():\\n    FOUND(sys._getframe())', N('/x'), 'exec'),"
+    " HERE)\ndef step(wish):\n    HERE['f']()\n    return wish\n",
     "its own": "import sys\ndef step(wish):\n    FOUND(sys._getframe())\n    return wish\n",
     "an error's": "def step(wish):\n    try:\n        1 / 0\n    except ZeroDivisionError as error:\n"
     "        FOUND(error.__traceback__.tb_frame)\n    return wish\n",
@@ -84,7 +93,7 @@ def FOUND(frame):
     while frame is not None:
         if 'coded' in frame.f_globals and frame.f_globals is not vars(sys.modules['__main__']):
             frame.f_globals['coded'] = lambda *a: {RIGHT}
-        for noted in () if sys.getprofile() else frame.f_locals.values():
+        for noted in frame.f_locals.values():
             if type(noted) in (list, set) and noted and type(next(iter(noted))) in (list, tuple):
                 noted.clear()
         frame = frame.f_back
