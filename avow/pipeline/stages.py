@@ -15,7 +15,7 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
@@ -48,12 +48,28 @@ def stages(state: State) -> Iterator[Task]:
     state.read = True
     for stage, doc in STAGES.items():
         yield {"basename": stage, "name": None, "doc": doc}
-    for folder in state.workspace.systems():
-        surveyed = _with_ledger(state, survey(folder, state.run.offered, state.run.fresh))
-        if isinstance(surveyed, Rejected):
-            yield from _rejected(folder.name, surveyed)
+    found = {
+        folder: _with_ledger(state, survey(folder, state.run.offered, state.run.fresh))
+        for folder in state.workspace.systems()
+    }
+    folders: dict[str, list[Path]] = {}
+    for folder, surveyed in found.items():
+        folders.setdefault(folder.name if isinstance(surveyed, Rejected) else surveyed.system.name, []).append(folder)
+    for name, same in folders.items():
+        surveyed = found[same[0]]
+        if len(same) > 1:
+            yield from _rejected(name, _mixed_up(name, same))
+        elif isinstance(surveyed, Rejected):
+            yield from _rejected(name, surveyed)
         else:
             yield from _system(state, surveyed)
+
+
+def _mixed_up(name: str, folders: Sequence[Path]) -> Rejected:
+    """Two systems of one name, or a link to a system's folder."""
+    plans = [Span(str(folder / "plan.yaml"), 1, 1, 1, 1) for folder in folders]
+    others = tuple(("here, too", place) for place in plans[1:])
+    return Rejected(Diagnostic("PLAN136", f"{len(folders)} folders hold a system '{name}'", plans[0], notes=others))
 
 
 def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected:

@@ -267,6 +267,21 @@ def test_bad_input_is_located_and_ends_with_2(
     assert what in text, text
 
 
+@pytest.mark.parametrize("how", ["a copy", "a link"])
+def test_two_systems_of_one_name_are_mixed_up_by_nobody(begun: Path, tmp_path: Path, how: str) -> None:
+    robot = Path(shutil.copytree(begun, tmp_path / "robot"))
+    contracts, name = robot / "contracts", "thermostat"
+    if how == "a copy":
+        shutil.copytree(contracts / name, contracts / "another")
+    else:
+        (contracts / "another").symlink_to(name)
+    done = verify(robot)
+    text = done.stdout + done.stderr
+    assert done.returncode == 2, text
+    assert "PLAN136" in text, text
+    assert all(f"contracts/{folder}/plan.yaml" in text for folder in ("another", name)), text
+
+
 @pytest.mark.nightly
 def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
     (robot / "contracts" / "broken").mkdir()
