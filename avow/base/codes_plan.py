@@ -154,12 +154,6 @@ PLAN_CODES: dict[str, Code] = {
             remedy="Compare or export nodes without such clauses.",
         ),
         Code(
-            "PLAN136",
-            "systems of one name",
-            "Two folders under contracts/ hold systems of one name; their evidence and reports would be mixed up.",
-            remedy="Give each its own `system:` in plan.yaml; a link to another system's folder is to be removed.",
-        ),
-        Code(
             "PLAN126",
             "ports do not fit",
             "A node cannot stand in for another that has other inputs or outputs.",

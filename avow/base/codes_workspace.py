@@ -229,6 +229,12 @@ WORKSPACE_CODES = register(
         "Go to the workspace, or make one with `avow init DIR`.",
     ),
     declare("CLI002", "no such system", "The workspace has no system of that name.", "Use a name from the hint."),
+    declare(
+        "CLI020",
+        "systems of one name",
+        "Two folders under contracts/ hold systems of one name; their evidence and reports would be mixed up.",
+        "Give each its own `system:` in plan.yaml; a link to another system's folder is to be removed.",
+    ),
     declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
     declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
     declare(

@@ -69,7 +69,7 @@ def _mixed_up(name: str, folders: Sequence[Path]) -> Rejected:
     """Two systems of one name, or a link to a system's folder."""
     plans = [Span(str(folder / "plan.yaml"), 1, 1, 1, 1) for folder in folders]
     others = tuple(("here, too", place) for place in plans[1:])
-    return Rejected(Diagnostic("PLAN136", f"{len(folders)} folders hold a system '{name}'", plans[0], notes=others))
+    return Rejected(Diagnostic("CLI020", f"{len(folders)} folders hold a system '{name}'", plans[0], notes=others))
 
 
 def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected:

@@ -278,7 +278,7 @@ def test_two_systems_of_one_name_are_mixed_up_by_nobody(begun: Path, tmp_path: P
     done = verify(robot)
     text = done.stdout + done.stderr
     assert done.returncode == 2, text
-    assert "PLAN136" in text, text
+    assert "CLI020" in text, text
     assert all(f"contracts/{folder}/plan.yaml" in text for folder in ("another", name)), text
 
 

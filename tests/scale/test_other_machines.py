@@ -99,7 +99,7 @@ def test_what_holds_here_too_stays_on_record_and_goes_stale_here(place: Workspac
     run = Run("a", False, elsewhere=asking.elsewhere(Seeing(rows)))
     work, report = first_of(place, run)
     assert report.observed == rows
-    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}
+    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}, [o.summary for o in report.outcomes]
     discharge(place, work, run)
     assert not open_obligations(place, work, Run("b", False))
     header.write_text("2")
@@ -121,7 +121,7 @@ def test_what_is_otherwise_on_a_worker_never_counts_unseen(
     seeing = Seeing([same, other])
     _, report = first_of(place, Run("a", False, elsewhere=asking.elsewhere(seeing)))
     assert not report.observed, "it was done here, where nothing was looked at"
-    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}
+    assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}, [o.summary for o in report.outcomes]
     said = capsys.readouterr().err
     assert f"{header} (on wk 1)" in said
     assert "done again here" in said
