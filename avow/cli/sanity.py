@@ -43,8 +43,9 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     """
     from avow.base.verdict import Verdict
     from avow.calculus import providers
-    from avow.calculus.interpretation import interpretation, ranges
+    from avow.calculus.scenario import ranges
     from avow.calculus.variables import frame
+    from avow.formulas.interpretation import interpretation
     from avow.sanity.analysis import Bounds, analyse
     from avow.sanity.document import SanityDocument, told
 

@@ -27,7 +27,6 @@ from avow.base.tuning.running import FORK_MESSAGE
 from avow.pipeline import worker
 
 PRELOADED = (
-    "avow.calculus.interpretation",
     "avow.calculus.obligations",
     "avow.language.load",
     "avow.sanity.claims",

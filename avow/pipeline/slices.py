@@ -15,10 +15,11 @@ from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
-from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.providers import ProviderClaim, provider_claims
+from avow.calculus.scenario import ranges
 from avow.calculus.variables import Frame
 from avow.formulas.finite import Ranges
+from avow.formulas.interpretation import interpretation
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable

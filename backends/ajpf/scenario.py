@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from avow.backend_kit.protocol import Job
-from avow.calculus.interpretation import interpretation, rows_of
 from avow.evaluation.evaluate import NotEvaluable, evaluate, free_names
+from avow.formulas.interpretation import interpretation, rows_of
 from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort

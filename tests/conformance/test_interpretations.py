@@ -14,9 +14,9 @@ from avow.backends.ajpf.scenario import Decider
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.backends.rosmonitoring.options import usable
 from avow.backends.rosmonitoring.rules import Constant
-from avow.calculus.interpretation import interpretation
 from avow.calculus.scenario import world
 from avow.calculus.variables import frame
+from avow.formulas.interpretation import interpretation
 from avow.formulas.values import FunctionValue
 from avow.pipeline.work import method_job
 from avow.system.load import load_system

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from avow.base.verdict import Verdict
-from avow.calculus.interpretation import interpretation, ranges
+from avow.calculus.scenario import ranges
 from avow.calculus.variables import frame
 from avow.formulas.finite import Ranges
+from avow.formulas.interpretation import interpretation
 from avow.language.sorts import NATURAL
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified

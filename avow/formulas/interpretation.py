@@ -1,12 +1,10 @@
-"""The plan's finite scenario as values: which inputs it fixes, and to what; which few values others may have."""
+"""The plan's finite scenario as values: which inputs its tables fix, and to what."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
 
-from avow.calculus.variables import Frame
-from avow.formulas.finite import Ranges
 from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.contract import Node, Port
 from avow.language.sorts import BoolSort, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
@@ -42,30 +40,6 @@ def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -
     except (KeyError, ValueError, ZeroDivisionError):
         return None
     return list(zip(*cells, strict=True))
-
-
-def ranges(whole: Frame, node: Node) -> Ranges:
-    """The few values that the scenario gives to sorts, and to this node's inputs that are not functions. Values that
-    cannot be read give no range (the plan's checks report them)."""
-    from avow.calculus.scenario import CannotRun, world
-
-    scenario = whole.system.plan.scenario
-    if scenario is None or not scenario.domains:
-        return Ranges()
-    try:
-        found = world(whole)
-    except CannotRun:
-        return Ranges()
-    inputs: dict[Variable, tuple[Value, ...]] = {}
-    for port in node.inputs:
-        texts = found.domain(("in", node.name), port)
-        if texts is None or isinstance(port.sort, FunctionSort):
-            continue
-        try:
-            inputs[port.variable] = tuple(found.parse(text, port.sort) for text in texts)
-        except CannotRun:
-            continue
-    return Ranges(found.domains, inputs)
 
 
 def _value(text: str, sort: Sort) -> Value:
