@@ -6,11 +6,11 @@ meaning, and goes stale like a proof. `avow review stamp` fills the digests in.
 
 from __future__ import annotations
 
-import datetime
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular
 from avow.base.persons import unreadable
@@ -25,7 +25,6 @@ CONCLUSIONS = ("accepted", "conditional", "rejected")
 ANSWERS = ("yes", "no", "n/a")
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
 _KEYS = ("format", "system", "node", "reviewer", "role", "date", "valid_until", "read", "clauses", "checklist",
          "conclusion", "conditions", "remarks")  # fmt: skip
 
@@ -117,7 +116,8 @@ class _RecordReader:
         if reviewer and (why := unreadable(reviewer)):
             hint = "write the name in the letters of one script"
             self.add("REV124", f"nobody can tell this reviewer's name: {why}", top["reviewer"].span, hint)
-        date, valid_until = self.date("date", top), self.date("valid_until", top, optional=True)
+        date = self.date("date", top)
+        valid_until = self.date("valid_until", top, past=False) if "valid_until" in top else None
         if date and valid_until and valid_until < date:
             self.add("REV112", "the review expires before its own date", top["valid_until"].span)
         read = tuple(self.reading(p) for p in self.items("read", top, "what was read"))
@@ -246,18 +246,12 @@ class _RecordReader:
             return ""
         return text
 
-    def date(self, key: str, top: dict[str, Piece], optional: bool = False) -> str | None:
-        if optional and key not in top:
-            return None
+    def date(self, key: str, top: dict[str, Piece], *, past: bool = True) -> str | None:
         text = self.text(key, top)
         if not text:
             return None
-        try:
-            if not _DATE.fullmatch(text):
-                raise ValueError
-            datetime.date.fromisoformat(text)
-        except ValueError:
-            self.add("REV112", f"'{key}' must be a date such as 2026-11-21, not '{text}'", top[key].span)
+        if wrong := wrong_day(text, past=past):
+            self.add("REV112", f"'{key}': {wrong}", top[key].span)
             return None
         return text
 

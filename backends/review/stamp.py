@@ -77,6 +77,9 @@ def stamp_record(
         )
     date = piece.entries.get("date")
     if changed and renewed is not None and date is not None:
+        if renewed < date.text:
+            message = f"the review of {date.text} cannot have been renewed on {renewed}"
+            raise Rejected(Diagnostic("REV112", message, date.span))
         editor.replace(date.span, renewed)
         said.append(f"date: {renewed}")
     if not said:

@@ -71,6 +71,15 @@ def test_a_changed_contract_must_be_read_again(folder: Path, capsys: pytest.Capt
     (folder / "s.rcl").write_text(CONTRACT.replace("120", "121"))
     assert main([str(folder), "n", "--method", "review"]) == 2
     assert "high has changed" in capsys.readouterr().err
+    before = (folder / "review.yaml").read_text()
+    for day, why in (
+        ("2026-11-19", "cannot have been renewed"),
+        ("2999-01-01", "still to come"),
+        ("21.11.", "no date"),
+    ):
+        assert main([str(folder), "n", "--method", "review", "--renewed", day]) == 2
+        assert why in capsys.readouterr().err
+        assert (folder / "review.yaml").read_text() == before
     assert main([str(folder), "n", "--method", "review", "--renewed", "2026-11-21"]) == 0
     assert read_record(folder / "review.yaml").date == "2026-11-21"
 

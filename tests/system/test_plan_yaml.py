@@ -276,6 +276,8 @@ SAYS = "environment:\n  in.a: {{assume: 'TRUE', because: b, {0}}}\n"
         ("until: tomorrow", "PLAN105", "right form"),
         ("date: 2026-02-30", "PLAN105", "calendar"),
         ("date: 2999-01-01", "PLAN105", "still to come"),
+        ("date: 1026-11-21", "PLAN105", "long before any contract"),
+        ("until: 1026-11-21", "PLAN105", "long before any contract"),
         ("who: ''", "PLAN105", "empty"),
     ],
 )
