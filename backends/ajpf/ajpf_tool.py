@@ -67,9 +67,9 @@ class Answer:
     framework: str = ""
     """What MCAPL calls its own version."""
     kept: bool = False
-    """It was given in an earlier run, to the same files (`kept`)."""
+    """It was given in an earlier run, to the same files (`asking.recall`)."""
     observed: tuple[Observed, ...] = ()
-    """What Java looked at besides."""
+    """What Java and its compiler looked at besides."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,55 +1,84 @@
-"""AJPF asked for all properties of an agent: in a folder of our own, several at a time, each with its own limit."""
+"""AJPF asked for all properties of an agent: in a folder of our own, several at a time, each with its own limit.
+
+One property takes seconds to hours, and the same files have the same answer: what was decided is kept, with all that
+was printed, under a digest of everything that was given: program, environment, property, MCAPL's own files, Java. The
+note is bound to this user (`notes`): an edited one is none.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
 
+from avow.base.files import sha256
+from avow.base.notes import cache_folder, read_note, write_note
+from avow.isolation.observed import look
 from avow.isolation.outside import Outside
 
-from . import kept, psl
+from . import psl
 from .ajpf_tool import Answer, Installation, Said, check, prepare
 from .checker import Property
-from .files import ail_file, psl_file
-from .java import CLASS, environment_class
+from .files import psl_file, system_files
+from .java import CLASS
 from .options import Setup
-from .printer import program_text
+
+_FORM = 4
+"""Of what is asked and how answers are read: another number, and nothing that was kept counts."""
+_DECIDED = (Said.HOLDS, Said.VIOLATED)
 
 
-def files(setup: Setup, properties: Sequence[Property]) -> Mapping[str, str]:
-    """What AJPF needs of one agent, under names that it can read whatever the plan's are called."""
-    made = {
-        "agent.gwen": program_text(setup.programs),
-        "agent.psl": psl_file(properties),
-        "agent.ail": ail_file(setup, "agent.gwen"),
-    }
-    if not setup.environment_class:
-        made[f"{CLASS}.java"] = environment_class(setup.environment, agents=len(setup.programs))
-    return made
+def key(files: Mapping[str, str], formula: str, mark: str) -> str:
+    """Of one question to one installation (`Installation.mark`)."""
+    asked = {name: text for name, text in files.items() if not name.endswith(".psl")}
+    return sha256(json.dumps([_FORM, asked, formula, mark], sort_keys=True))
+
+
+def recall(key: str) -> Answer | None:
+    """What was kept, where all that was looked at is as it was."""
+    kept = read_note(Answer, _path(key))
+    if kept is None or kept.said not in _DECIDED or any(look(o.kind, o.path) != o.digest for o in kept.observed):
+        return None
+    return replace(kept, kept=True)
+
+
+def keep(key: str, answer: Answer) -> None:
+    """What decided nothing, or cannot be written, will be asked again."""
+    if answer.said in _DECIDED and not answer.kept:
+        with suppress(OSError):
+            write_note(_path(key), answer)
+
+
+def _path(key: str) -> Path:
+    return cache_folder() / "ajpf" / f"{key}.json"
 
 
 def ask(
     installation: Installation, setup: Setup, properties: Sequence[Property], seconds: float, megabytes: int
 ) -> dict[str, Answer]:
-    """An answer for each property, by its key. What was answered before is not asked again (`kept`). What is left of
-    `seconds` is shared out among those still to come, so that one that takes for ever costs the others nothing."""
-    given = files(setup, properties)
-    mark = installation.mark()
-    # Of a class that the plan gives, only the name is known.
-    keys = {p.key: kept.key(given, psl.show(p.formula), mark) for p in properties if not setup.environment_class}
-    answers = {p: answer for p, key in keys.items() if (answer := kept.recall(key)) is not None}
+    """An answer for each property, by its key. What was answered before is not asked again. What is left of `seconds`
+    is shared out among those still to come, so that one that takes for ever costs the others nothing."""
+    given = {**system_files(setup, "agent"), "agent.psl": psl_file(properties)}
+    keys: dict[str, str] = {}
+    if setup.environment_class:  # of a class that the plan gives, only the name is known
+        del given[f"{CLASS}.java"]
+    else:
+        mark = installation.mark()
+        keys = {p.key: key(given, psl.show(p.formula), mark) for p in properties}
+    answers = {name: answer for name, of in keys.items() if (answer := recall(of)) is not None}
     asked = [p for p in properties if p.key not in answers]
-    for key, answer in _asked(installation, given, asked, seconds, megabytes).items():
-        answers[key] = answer
-        if key in keys:
-            kept.keep(keys[key], answer)
+    for name, answer in _asked(installation, given, asked, seconds, megabytes).items():
+        answers[name] = answer
+        if name in keys:
+            keep(keys[name], answer)
     return answers
 
 
@@ -70,7 +99,7 @@ def _asked(
         outside = Outside((installation.tool,))
         wrong = prepare(installation, folder, given, outside)
         if wrong is not None:
-            return {p.key: Answer(Said.ERROR, wrong) for p in properties}
+            return {p.key: Answer(Said.ERROR, wrong, observed=outside.observed()) for p in properties}
 
         def one(p: Property) -> Answer:
             nonlocal waiting

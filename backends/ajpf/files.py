@@ -16,22 +16,25 @@ from .java import CLASS, environment_class
 from .options import Setup
 from .printer import program_text
 
-BUILDER = "gwendolen.GwendolenMASBuilder"
+_BUILDER = "gwendolen.GwendolenMASBuilder"
 
 
 def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, str]:
     """Relative path → text."""
     name = setup.agent
-    files = {
-        f"{name}.psl": psl_file(made.properties),
+    runs = {f"jpf/{p.key}.jpf": jpf_file(f"{name}.ail", f"{name}.psl", p.key) for p in made.properties}
+    properties = {f"{name}.psl": psl_file(made.properties)}
+    return {**system_files(setup, name), **properties, "claims.json": _claims(job, setup, made), **runs}
+
+
+def system_files(setup: Setup, name: str, *, scripted: bool = False) -> dict[str, str]:
+    """The agents and what is around them. The environment's Java class is the plan's, or the one that is beside."""
+    environment = setup.environment_class or CLASS
+    return {
         f"{name}.gwen": program_text(setup.programs),
-        f"{name}.ail": ail_file(setup, f"{name}.gwen"),
-        f"{CLASS}.java": environment_class(setup.environment, agents=len(setup.programs)),
-        "claims.json": _claims(job, setup, made),
+        f"{name}.ail": f"env = {environment}\nmas.file = {name}.gwen\nmas.builder = {_BUILDER}\n",
+        f"{CLASS}.java": environment_class(setup.environment, agents=len(setup.programs), scripted=scripted),
     }
-    for p in made.properties:
-        files[f"jpf/{p.key}.jpf"] = jpf_file(f"{name}.ail", f"{name}.psl", p.key)
-    return files
 
 
 def psl_file(properties: Iterable[Property]) -> str:
@@ -42,11 +45,6 @@ def psl_file(properties: Iterable[Property]) -> str:
             lines.append(f"# {p.key}: {_plain(p.about)}")
         lines.append(f"{p.key}: {psl.show(p.formula)}")
     return "\n".join(lines) + "\n"
-
-
-def ail_file(setup: Setup, program: str) -> str:
-    """The environment's Java class is the plan's, or the one that is exported beside it."""
-    return f"env = {setup.environment_class or CLASS}\nmas.file = {program}\nmas.builder = {BUILDER}\n"
 
 
 def _plain(text: str) -> str:

@@ -8,23 +8,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from avow.base.process import ToolMissing
 from avow.formulas.lasso import Lasso
-from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside
 
-from . import kept
-from .ajpf_tool import BRIEF, Installation, prepare
+from .ajpf_tool import BRIEF, Answer, Installation, Said, prepare
+from .asking import keep, key, recall
 from .explore import Graph, System
-from .files import BUILDER
+from .files import system_files
 from .interpreter import PRINT
-from .java import CLASS, MARK, SCRIPT, Script, environment_class
+from .java import CLASS, MARK, SCRIPT, Script
 from .options import Setup
-from .printer import program_text
 from .syntax import DeedKind, plain
 from .tuning import REPLAY_SECONDS
 
@@ -93,45 +91,41 @@ def _told(system: System, state: Any, why: str) -> Moment:
 
 
 def replay(
-    installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path
-) -> tuple[str | None, str, tuple[Observed, ...]]:
-    """How AIL's run differs from ours, None where it does not; AIL's output; and what AIL looked at besides.
+    installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path, outside: Outside
+) -> Answer:
+    """Whether AIL does our run (holds) or another (violated, with the difference); an error where it cannot be run.
 
-    In `folder` the environment's class is compiled once for all runs of the setup. What AIL told of a run that agreed
-    is kept (`kept`). Raises Unable."""
+    In `folder` the environment's class is compiled once for all runs of the setup, and `outside` knows what was looked
+    at for all of them. What AIL told of a run that agreed is kept (`asking`)."""
     moments, script = expected(graph, lasso)
-    source = environment_class(setup.environment, agents=len(setup.programs), scripted=True)
-    ail = f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = {BUILDER}\n"
-    files = {"agent.gwen": program_text(setup.programs), "agent.ail": ail, f"{CLASS}.java": source}
-    key = kept.key({**files, SCRIPT: script.text()}, "replay", installation.mark())
-    told = kept.told(key)
-    if told is not None:
-        return _difference(moments, told[0]), *told
-    outside = Outside((installation.tool,))
-    output = _run(installation, files, script, folder, outside)
-    difference, observed = _difference(moments, output), outside.observed()
-    if difference is None:  # anything else may come of the machine, and is tried again
-        kept.keep_told(key, output, observed)
-    return difference, output, observed
+    files = system_files(setup, "agent", scripted=True)
+    asked = key({**files, SCRIPT: script.text()}, "replay", installation.mark())
+    told = recall(asked) or _run(installation, files, script, folder, outside)
+    if told.said is Said.ERROR:
+        return told
+    if (difference := _difference(moments, told.log)) is not None:
+        return replace(told, said=Said.VIOLATED, reason=difference)
+    keep(asked, told)  # anything else may come of the machine, and is tried again
+    return told
 
 
-def _run(installation: Installation, files: Mapping[str, str], script: Script, folder: Path, outside: Outside) -> str:
-    if not (folder / f"{CLASS}.class").is_file():
-        wrong = prepare(installation, folder, files, outside)
-        if wrong is not None:
-            raise Unable(wrong)
-    (folder / SCRIPT).write_text(script.text(), encoding="utf-8")
-    command = [installation.java, *BRIEF, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
+def _run(
+    installation: Installation, files: Mapping[str, str], script: Script, folder: Path, outside: Outside
+) -> Answer:
+    wrong, output = None, ""
     try:
-        env = {"AJPF_HOME": str(installation.home)}
-        done = outside.run(command, cwd=folder, seconds=REPLAY_SECONDS, env=env)
+        if not (folder / f"{CLASS}.class").is_file():
+            wrong = prepare(installation, folder, files, outside)
+        if wrong is None:
+            (folder / SCRIPT).write_text(script.text(), encoding="utf-8")
+            command = [installation.java, *BRIEF, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
+            env = {"AJPF_HOME": str(installation.home)}
+            done = outside.run(command, cwd=folder, seconds=REPLAY_SECONDS, env=env)
+            output = f"{done.stdout}\n{done.stderr}"
     except ToolMissing as error:
-        raise Unable(str(error)) from None
-    return f"{done.stdout}\n{done.stderr}"
-
-
-class Unable(Exception):  # noqa: N818 - it names a state, not a fault
-    """AIL could not be run; the text says why."""
+        wrong = str(error)
+    said = Said.HOLDS if wrong is None else Said.ERROR
+    return Answer(said, wrong or "", log=output, observed=outside.observed())
 
 
 def _difference(moments: Sequence[Moment], output: str) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,13 @@ from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.files import read_text
 from avow.base.verdict import Counterexample, Verdict
-from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
 from avow.isolation.observed import Observed, Seen, tracer
 from avow.isolation.outside import Outside
 from avow.isolation.tracing import remedy, traces
 
 from . import ajpf_tool, spin, spin_tool
-from .ajpf_tool import Installation, Said
+from .ajpf_tool import Answer, Said
 from .asking import ask
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
@@ -30,7 +29,7 @@ from .instances import Instantiation, instances
 from .lazy import open_part
 from .options import Setup, read
 from .partial import Reduction, reduction, unfolded
-from .replay import Unable, replay
+from .replay import replay
 from .settle import Frame, Settled, outcome
 from .society import system
 from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SPIN_SECONDS, SPIN_SHARE
@@ -196,49 +195,49 @@ class _Run:
 
     def explain(self) -> None:
         """A run for the first refuted property of each guarantee, and of each further property."""
-        with tempfile.TemporaryDirectory(prefix="avow-ail-") as ail:
-            self.explained(Path(ail))
-
-    def explained(self, ail: Path) -> None:
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
-        for group in groups:
-            refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
-            if refuted is None:
-                continue
-            checker = self.checkers[refuted.key]
-            lasso = checker.lasso(refuted)
-            if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
-                self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
-                continue
-            graph = checker.graph
-            if refuted.key in self.reductions:
-                graph, lasso = unfolded(self.reductions[refuted.key], graph, lasso)
-            found = explain(graph, lasso, refuted, self.wording)
-            self.counterexamples[refuted.key] = found
-            self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
-            if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
-                self.replay(self.ajpf, graph, lasso, refuted, ail)
+        outside = Outside((self.ajpf.tool,) if self.ajpf is not None else ())
+        with tempfile.TemporaryDirectory(prefix="avow-ail-") as ail:
+            for group in groups:
+                refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
+                if refuted is not None:
+                    self.explained(refuted, Path(ail), outside)
 
-    def replay(self, installation: Installation, graph: Graph, lasso: Lasso, refuted: Property, folder: Path) -> None:
+    def explained(self, refuted: Property, ail: Path, outside: Outside) -> None:
+        checker = self.checkers[refuted.key]
+        lasso = checker.lasso(refuted)
+        if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
+            self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
+            return
+        graph = checker.graph
+        if refuted.key in self.reductions:
+            graph, lasso = unfolded(self.reductions[refuted.key], graph, lasso)
+        found = explain(graph, lasso, refuted, self.wording)
+        self.counterexamples[refuted.key] = found
+        self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
+        if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
+            name = f"AIL ({self.ajpf.version})"
+            if traces():
+                answer = replay(self.ajpf, self.setup, graph, lasso, ail, outside)
+                self.replayed(name, refuted, answer)
+            else:
+                self.bound["replay"] = f"not replayed by {name}: {self.untraced()}"
+
+    def replayed(self, name: str, refuted: Property, answer: Answer) -> None:
         """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
         this program, and there is no verdict on anything."""
-        name = f"AIL ({installation.version})"
-        if not traces():
-            self.bound["replay"] = f"not replayed by {name}: {self.untraced()}"
-            return
         result = self.results[refuted.key]
-        try:
-            difference, log, observed = replay(installation, self.setup, graph, lasso, folder)
-        except Unable as error:
-            self.bound["replay"] = f"not replayed by {name}: {error}"
+        if answer.said is Said.ERROR:
+            self.unanswered(answer.observed)
+            self.bound["replay"] = f"not replayed by {name}: {answer.reason}"
             return
-        self.logs[f"{refuted.key}.replay.txt"] = log
-        self.observed.update(dict.fromkeys(observed))
-        if difference is None:
+        self.logs[f"{refuted.key}.replay.txt"] = answer.log
+        self.observed.update(dict.fromkeys(answer.observed))
+        if answer.said is Said.HOLDS:
             opinions = {**result.opinions, name: "does the same run"}
             self.results[refuted.key] = replace(result, opinions=opinions)
             return
-        reason = f"contradictory: {name} does not do the run that refutes {refuted.key}: {difference}"
+        reason = f"contradictory: {name} does not do the run that refutes {refuted.key}: {answer.reason}"
         self.results = {key: replace(r, verdict=Verdict.ERROR, reason=reason) for key, r in self.results.items()}
         self.counterexamples = {}
 
@@ -259,9 +258,7 @@ class _Run:
                     seconds = max(0.0, deadline - time.monotonic())
                     answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds, outside)
             except spin.NoOpinion as error:
-                # not what cannot be recorded: no answer of ours rests on it
-                looked = (o for o in outside.observed() if o.kind is not Seen.OUTSIDE)
-                self.observed.update(dict.fromkeys(looked))
+                self.unanswered(outside.observed())
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":
                     verdict = Verdict.NOT_RUN if spin_tool.version() is None else Verdict.UNKNOWN
@@ -274,6 +271,11 @@ class _Run:
             self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
         self.engine += f" and {name}"
         self.bound["spin"] = "asked of the program, by a translation of its own"
+
+    def unanswered(self, observed: Iterable[Observed]) -> None:
+        """What was looked at for a second opinion that did not come: it may come once that is another. What cannot be
+        recorded is left out, as no answer of ours rests on it."""
+        self.observed.update(dict.fromkeys(o for o in observed if o.kind is not Seen.OUTSIDE))
 
     def untraced(self) -> str:
         """Why another tool is not asked beside our own engine: its answer would be an undeclared input, and ours is

@@ -10,9 +10,9 @@ from helpers import some
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin, spin_tool
+from avow.backends.ajpf import BACKEND, ajpf_tool, files, replay, spin, spin_tool
 from avow.backends.ajpf.ajpf_tool import Said, judge
-from avow.backends.ajpf.asking import ask
+from avow.backends.ajpf.asking import ask, keep, recall
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
@@ -158,8 +158,8 @@ def test_answers_are_kept_and_asked_again_when_anything_changes(lift, tmp_path, 
 def test_what_ajpf_did_not_decide_is_not_kept(lift, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     for answer in ("crash", "search constraint"):
-        kept.keep("k", replace(judge(completed(answer))))
-        assert kept.recall("k") is None
+        keep("k", replace(judge(completed(answer))))
+        assert recall("k") is None
 
 
 def test_a_substitute_is_never_called_ajpf(lift, tmp_path, monkeypatch):
@@ -231,6 +231,47 @@ def test_what_was_read_for_a_second_opinion_that_did_not_come_is_an_input(lift, 
     assert str(tmp_path / "settings") in {o.path for o in report.observed}
 
 
+@pytest.mark.skipif(not traces(), reason="strace is not here")
+@pytest.mark.parametrize("engine", ["auto", "ajpf"])
+def test_what_was_read_for_an_environment_that_does_not_compile_is_an_input(lift, tmp_path, monkeypatch, engine):
+    """Once that is another, it may: of a replay, and of AJPF's own answers."""
+    monkeypatch.setattr(spin_tool, "version", lambda: None)
+    _installed(tmp_path, monkeypatch, HOLDS)
+    settings = tmp_path / "settings"
+    settings.write_text("1")
+    (tmp_path / "javac").write_text('#!/bin/sh\ncat "${0%/*}/settings"\nexit 1\n')
+    (tmp_path / "javac").chmod(0o755)
+    report = BACKEND.discharge(lift({"engine": engine, "semantics": "mcapl"}), tmp_path, Limits(seconds=60))
+    assert "does not compile" in " ".join([*(o.summary for o in report.outcomes), str(report.outcomes[0].bound)])
+    assert str(settings) in {o.path for o in report.observed}
+
+
+@pytest.mark.skipif(not traces(), reason="strace is not here")
+def test_what_a_replay_told_is_kept_and_what_it_read_is_an_input(lift, tmp_path, monkeypatch):
+    """With a stand-in for AIL, which tells nothing: a run is kept where it agrees with ours, and only there."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(spin_tool, "version", lambda: None)
+    _installed(tmp_path, monkeypatch, "nothing")
+    (tmp_path / "javac").write_text("#!/bin/sh\ntrue\n")
+    (tmp_path / "javac").chmod(0o755)
+
+    def answers():
+        report = BACKEND.discharge(lift({"engine": "auto", "semantics": "mcapl"}), tmp_path, Limits(seconds=60))
+        assert str(tmp_path / "answer") in {o.path for o in report.observed}
+        (found,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
+        return found, (tmp_path / "asked").read_text().count("agent.ail")
+
+    first, asked = answers()
+    assert first.verdict is Verdict.ERROR
+    assert "our run has 'start, believing " in first.summary
+    monkeypatch.setattr(replay, "_difference", lambda moments, output: None)
+    for _ in range(2):
+        found, again = answers()
+        assert found.verdict is Verdict.REFUTED
+        assert "does the same run" in str(found.details["properties"])
+        assert again == asked + 1, "AIL was asked once more, as it had told another run, and then no more"
+
+
 @pytest.mark.needs_ajpf
 @pytest.mark.parametrize("seed", range(3))
 def test_ajpf_agrees_on_small_agents(tmp_path, seed):
@@ -281,7 +322,7 @@ def test_a_run_that_ail_does_not_do_is_no_refutation(lift, tmp_path, monkeypatch
     """A seeded fault: our interpreter takes initial beliefs for granted that AIL does not have."""
     monkeypatch.setattr(spin_tool, "version", lambda: None)
     monkeypatch.setattr(
-        replay, "program_text", lambda agents: program_text([replace(agent, beliefs=()) for agent in agents])
+        files, "program_text", lambda agents: program_text([replace(agent, beliefs=()) for agent in agents])
     )
     report = BACKEND.discharge(lift({"engine": "auto", "semantics": "mcapl"}), tmp_path, Limits(seconds=120))
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from avow.backends.ajpf.kept import _Kept, _Told
+from avow.backends.ajpf.ajpf_tool import Answer
 from avow.backends.fuzz import runner
 from avow.backends.hypothesis import exchange
 from avow.base.codec import Foreign, Unreadable, canonical, from_json, from_text, to_json
@@ -42,7 +42,7 @@ KINDS: list[Any] = [
     runner.Answered,
     runner.Shown,
 ]
-KINDS += [_Kept, _Told, _Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
+KINDS += [Answer, _Wanted, Line, _Word, Certificate, Checked, _Settled, Stamp, Rendering, _Overview, Listing]
 KINDS += [_Known, _Digest, _Report, _Export, _Envelope]
 
 

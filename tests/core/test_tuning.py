@@ -42,7 +42,7 @@ NOT_TUNED = {
     ("avow/solving/z3_sorts.py", "_MAX_CHARACTER"),
     ("avow/system/graph_svg.py", "_MARGIN"),
     ("avow/system/graph_svg.py", "_LANE"),
-    ("backends/ajpf/kept.py", "_FORM"),  # of a file
+    ("backends/ajpf/asking.py", "_FORM"),  # of a file
     ("backends/ajpf/mind.py", "NONE"),
     ("backends/review/record.py", "FORMAT"),  # of a file
     ("backends/rosmonitoring/mcap_file.py", "_LAST"),  # the last time that the format has
