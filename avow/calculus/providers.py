@@ -25,8 +25,8 @@ from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.subterms import ports_of
 from avow.language.terms import TRUE, Term
-from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
 from avow.sanity.claims import Claim, Property
+from avow.sanity.results import Bounds, SanityResult, as_outcome, listing
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size

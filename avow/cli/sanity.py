@@ -24,7 +24,7 @@ from avow.solving.limits import from_seconds
 if TYPE_CHECKING:
     from avow.base.verdict import Counterexample
     from avow.language.contract import Node
-    from avow.sanity.analysis import SanityResult
+    from avow.sanity.results import SanityResult
 
 
 @click.command()
@@ -46,8 +46,9 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     from avow.calculus.scenario import ranges
     from avow.calculus.variables import frame
     from avow.formulas.interpretation import interpretation
-    from avow.sanity.analysis import Bounds, analyse
+    from avow.sanity.analysis import analyse
     from avow.sanity.document import SanityDocument, told
+    from avow.sanity.results import Bounds
 
     system = system_of(path)
     has_nodes(system.contract, nodes)

@@ -13,9 +13,10 @@ from avow.pipeline.slices import SanitySlice
 def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits: Limits) -> Report:
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
-    from avow.sanity.analysis import Bounds, outcomes
+    from avow.sanity.analysis import outcomes
+    from avow.sanity.results import Bounds
+    from avow.solving.checking import z3_version
     from avow.solving.limits import effort_told, from_seconds
-    from avow.solving.questions import z3_version
 
     bounds = Bounds(seed=limits.seed)
     if limits.asked:

@@ -51,7 +51,7 @@ from avow.pipeline.work import (
     sanity_claims,
     tool_identities,
 )
-from avow.solving.questions import z3_version
+from avow.solving.checking import z3_version
 from avow.system.plan import System
 
 

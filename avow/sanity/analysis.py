@@ -23,27 +23,15 @@ from avow.formulas.values import Value
 from avow.language.contract import ClauseKind, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
-from avow.sanity.claims import Claim, Property, claims, node_key, triggers
+from avow.sanity.claims import Claim, Property, claims, triggers
 from avow.sanity.examples import meets
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
 
 if TYPE_CHECKING:
     from avow.sanity.over_runs import OverRuns
-    from avow.sanity.realizability import Realizability
+    from avow.sanity.witness_search import Realizability
 
-__all__ = [
-    "Bounds",
-    "Claim",
-    "Property",
-    "SanityResult",
-    "analyse",
-    "as_outcome",
-    "claims",
-    "listing",
-    "node_key",
-    "outcomes",
-]
 
 Given = Mapping[Variable, Value]
 
@@ -383,7 +371,7 @@ class _Analysis:
         return replace(finding, explanation=text, clauses=(), because=because)
 
     def _determined(self, name: str) -> Finding:
-        from avow.sanity.realizability import Group, groups
+        from avow.sanity.witness_search import Group, groups
         from avow.solving.counterexample import show_values
         from avow.solving.questions import solve
         from avow.solving.second import CONTRADICTED, doubted

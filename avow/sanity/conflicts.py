@@ -22,11 +22,13 @@ from avow.language.sorts import BoolSort, DataSort, FunctionSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.minimal_sets import UndecidedError, minimal_sets
-from avow.sanity.realizability import Formulas, Given, Group, Realizability, Search, groups, realizable
+from avow.sanity.realizability import realizable
+from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.counterexample import show_values
 from avow.solving.limits import effort_left, spent, until
-from avow.solving.questions import Unsupported, solve
+from avow.solving.questions import solve
 from avow.solving.replay import replay
+from avow.solving.translation import Unsupported
 from avow.solving.z3_module import z3
 
 

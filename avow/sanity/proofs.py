@@ -46,9 +46,10 @@ from avow.language.terms import (
 )
 from avow.sanity.witness_candidates import Candidates, Definition
 from avow.sanity.witnesses import Fixed, Witness, applied, meanings_of
-from avow.solving.questions import Translator, Unsupported, check, entails, solve
+from avow.solving.checking import check
+from avow.solving.questions import entails, solve
 from avow.solving.replay import replay
-from avow.solving.translation import Expr, Meaning
+from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
 
 Formulas = Mapping[str, Term]

@@ -28,8 +28,6 @@ from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import budget, effort_left, spent
 
-__all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
-
 
 @dataclass(frozen=True, slots=True)
 class Question:

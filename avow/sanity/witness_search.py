@@ -18,10 +18,11 @@ from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Fixed, Witness, applied, instantiate, meanings_of, witnesses
+from avow.solving.checking import check
 from avow.solving.limits import allowed, effort_left, spend, spent, tried, until
-from avow.solving.questions import Translator, Unsupported, check, entails, search_tables, solve
+from avow.solving.questions import entails, search_tables, solve
 from avow.solving.replay import replay
-from avow.solving.translation import Expr, Meaning
+from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
 
 Formulas = Mapping[str, Term]

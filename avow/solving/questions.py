@@ -35,27 +35,13 @@ from avow.language.definedness import defined
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort, SequenceSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
-from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
+from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers
 from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
-
-__all__ = [
-    "Answer",
-    "Entailment",
-    "Model",
-    "Solution",
-    "Translator",
-    "Unsupported",
-    "check",
-    "entails",
-    "search_tables",
-    "solve",
-    "z3_version",
-]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,9 @@ from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show
 from avow.language.terms import FALSE, TRUE, Not, Role, Term, Variable
+from avow.solving.checking import z3_version
 from avow.solving.limits import effort_told, from_seconds, spent, until
-from avow.solving.questions import Entailment, entails, z3_version
+from avow.solving.questions import Entailment, entails
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import formulas_script

@@ -28,8 +28,8 @@ from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.language.sorts import RealSort, SequenceSort
 from avow.language.terms import Variable
+from avow.solving.checking import z3_version
 from avow.solving.limits import from_seconds, until
-from avow.solving.questions import z3_version
 from avow.solving.settling import Settler
 
 from .conditions import Conditions, Found

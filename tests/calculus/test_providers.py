@@ -12,7 +12,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.providers import provider_claims, settle
 from avow.calculus.variables import frame
 from avow.cli.sanity import command
-from avow.sanity.analysis import Bounds, SanityResult
+from avow.sanity.results import Bounds, SanityResult
 from avow.system.plan import System
 
 from .make import make, node

@@ -17,7 +17,8 @@ from avow.backends.rosmonitoring.traces import parse_event
 from avow.base.verdict import Verdict
 from avow.calculus.refinement import refines
 from avow.language.load import check_text
-from avow.sanity.analysis import Bounds, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds
 
 # true of whatever the operation might yield, of an output that nothing keeps from zero, or from being short
 CLAIMS = [

@@ -13,7 +13,9 @@ from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.sorts import BOOL, INTEGER, TupleSort
 from avow.language.terms import And, Compare, Role, Term, Variable
-from avow.sanity.analysis import Bounds, SanityResult, analyse, claims
+from avow.sanity.analysis import analyse
+from avow.sanity.claims import claims
+from avow.sanity.results import Bounds, SanityResult
 from avow.solving.limits import spent
 from avow.solving.questions import Solution, solve
 from avow.solving.translation import translating_once

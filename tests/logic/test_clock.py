@@ -15,7 +15,8 @@ import pytest
 
 from avow.base.tuning.effort import MOST_STEPS, STEPS
 from avow.base.verdict import Verdict
-from avow.sanity.analysis import Bounds, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds
 from avow.solving.checking import check
 from avow.solving.limits import (
     NO_ANSWER,

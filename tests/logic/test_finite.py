@@ -12,7 +12,8 @@ from avow.formulas.interpretation import interpretation
 from avow.language.sorts import NATURAL
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified
-from avow.sanity.analysis import Bounds, SanityResult, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds, SanityResult
 from avow.solving.questions import entails
 from avow.system.load import load_system
 

@@ -54,7 +54,8 @@ from avow.language.terms import (
 from avow.sanity.witness_candidates import Definition
 from avow.sanity.witnesses import applied
 from avow.solving.checking import check
-from avow.solving.questions import Translator, entails
+from avow.solving.questions import entails
+from avow.solving.translation import Translator
 
 from .contracts import contract, formula
 

@@ -19,8 +19,9 @@ from oracle.values import Meaning
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
 from avow.language.load import check_text
-from avow.sanity.analysis import SanityResult, analyse
+from avow.sanity.analysis import analyse
 from avow.sanity.claims import Property
+from avow.sanity.results import SanityResult
 
 from .contracts import node
 

@@ -9,8 +9,9 @@ from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.values import SequenceValue
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, NATURAL, Constructor, DataSort, SequenceSort, TupleSort
-from avow.sanity.analysis import Bounds, analyse
-from avow.solving.questions import Translator
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds
+from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
 
 from .contracts import formula, node

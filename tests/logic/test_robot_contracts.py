@@ -7,7 +7,8 @@ import pytest
 from helpers import some
 
 from avow.base.verdict import Verdict
-from avow.sanity.analysis import Bounds, SanityResult, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds, SanityResult
 
 from .contracts import node
 

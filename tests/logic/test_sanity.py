@@ -8,7 +8,9 @@ from helpers import some
 from avow.base.verdict import Verdict
 from avow.formulas.values import FunctionValue
 from avow.language.contract import Node
-from avow.sanity.analysis import Bounds, Property, SanityResult, analyse, claims, node_key, outcomes
+from avow.sanity.analysis import analyse, outcomes
+from avow.sanity.claims import Property, claims, node_key
+from avow.sanity.results import Bounds, SanityResult
 from avow.solving.questions import solve
 from avow.solving.replay import replay
 

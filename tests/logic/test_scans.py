@@ -36,8 +36,9 @@ from avow.language.terms import (
 )
 from avow.sanity import witness_candidates, witness_search
 from avow.sanity.extremes import Extreme, bounded, measures
-from avow.sanity.realizability import Realizability, realizable
+from avow.sanity.realizability import realizable
 from avow.sanity.witness_candidates import Candidates
+from avow.sanity.witness_search import Realizability
 
 from .contracts import node
 

@@ -6,7 +6,8 @@ import pytest
 
 from avow.base.verdict import Verdict
 from avow.language.load import check_text
-from avow.sanity.analysis import Bounds, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.results import Bounds
 
 
 def verdict(text: str, claim: str) -> Verdict:

@@ -15,7 +15,9 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.language.contract import Contract
 from avow.language.load import check_text
-from avow.sanity.analysis import Bounds, Property, analyse
+from avow.sanity.analysis import analyse
+from avow.sanity.claims import Property
+from avow.sanity.results import Bounds
 from avow.solving.contract_smtlib import to_smtlib
 from avow.solving.smtlib import ask_cvc5, formulas_script
 

@@ -35,8 +35,8 @@ from itertools import product
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
 from avow.language.terms import Term, Variable
-from avow.sanity.analysis import SanityResult
 from avow.sanity.claims import triggers
+from avow.sanity.results import SanityResult
 
 from .values import Meaning, Step, domain, is_finite
 
