@@ -23,7 +23,8 @@ sys.path.insert(0, str(ROOT))
 
 from avow.base.verdict import Verdict  # noqa: E402
 from avow.calculus.composition import compose  # noqa: E402
-from avow.calculus.obligations import composition_obligations, discharge  # noqa: E402
+from avow.calculus.discharge import Bounds  # noqa: E402
+from avow.calculus.obligations import composition_obligations, settle_each  # noqa: E402
 from avow.calculus.variables import frame  # noqa: E402
 from avow.formulas.formula import conjunction, negation  # noqa: E402
 from avow.language.terms import Term  # noqa: E402
@@ -31,13 +32,6 @@ from avow.solving.translation import Translator  # noqa: E402
 from avow.solving.z3_module import z3  # noqa: E402
 from avow.system.load import load_path  # noqa: E402
 from avow.system.plan import System  # noqa: E402
-
-
-class Limits:
-    """As `avow.backend_kit.protocol.Limits`."""
-
-    seconds = 20.0
-    seed = 0
 
 
 def node(name: str, reads: list[str], writes: str, assumed: str, guaranteed: str) -> str:
@@ -66,7 +60,7 @@ def synthetic(count: int) -> str:
 
 
 def calculus(system: System) -> None:
-    outcomes = discharge(system, composition_obligations(system), Limits())
+    outcomes = tuple(settle_each(compose(system), composition_obligations(system), Bounds(20_000)))
     composed = compose(system)
     assert len(composed.whole.conditions) == len(system.contract.nodes) - 1
     wrong = [o for o in outcomes if o.verdict is not Verdict.PROVED and ".persistence" not in o.obligation]

@@ -17,11 +17,12 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 import z3  # noqa: E402
+from calculus.make import discharge  # noqa: E402
 from scale.made import chain, fan, programs, seconds  # noqa: E402
 
 from avow.backend_kit.protocol import Limits  # noqa: E402
 from avow.base.workspace import Workspace  # noqa: E402
-from avow.calculus.obligations import composition_obligations, discharge  # noqa: E402
+from avow.calculus.obligations import composition_obligations  # noqa: E402
 from avow.pipeline.asking import request_of  # noqa: E402
 from avow.pipeline.blobs import decode  # noqa: E402
 from avow.pipeline.requests import read_request, request_bytes  # noqa: E402

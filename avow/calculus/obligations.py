@@ -1,15 +1,13 @@
 """Composition and requirement obligations: what has to be shown for the system's derivations to stand.
 
-Pure generation here (`composition_obligations`, `requirement_obligations`); the questions are put to the solver in
-`discharge`. Each obligation is made from a `Task`, which says how it is settled.
+Each obligation is made from a `Task`, which says how it is settled (`avow.calculus.discharge` asks the solver).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Protocol
 
 from avow.base.diagnostics import Span
 from avow.base.files import sha256
@@ -18,7 +16,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import Outcome
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
-from avow.calculus.composition import Composition, argument, asked, compose, composed
+from avow.calculus.composition import Composition, argument, asked, composed
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds, Claim
 from avow.calculus.existence import circles, joined, loops, start_name
@@ -35,18 +33,8 @@ from avow.kernel.statements import Claimed
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
-from avow.solving.limits import effort_told, from_seconds
+from avow.solving.limits import effort_told
 from avow.system.plan import Endpoint, Requirement, System
-
-
-class TimeLimits(Protocol):
-    """What of `avow.backend_kit.protocol.Limits` is used here."""
-
-    @property
-    def seconds(self) -> float: ...
-
-    @property
-    def seed(self) -> int: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,34 +55,16 @@ def composition_obligations(system: System) -> tuple[Obligation, ...]:
     return tuple(task.obligation for task in _tasks(composed(system)))
 
 
-def requirement_obligations(system: System) -> tuple[Obligation, ...]:
-    """An obligation for each requirement that has a formula or a temporal property; one in prose has none: it is
-    linked, and the assurance case shows it as linked. Raises Rejected for a formula that is wrong."""
-    return tuple(task.obligation for task in _requirements(composed(system)))
-
-
-def all_obligations(composition: Composition) -> tuple[Obligation, ...]:
-    """Both, of derivations that are made already."""
-    return tuple(task.obligation for task in all_tasks(composition))
-
-
 def all_tasks(composition: Composition) -> tuple[Task, ...]:
-    """As `all_obligations`, with what settles each."""
+    """What has to be shown for derivations that are made already, and an obligation for each requirement that has a
+    formula or a temporal property; one in prose has none: it is linked, and the assurance case shows it as linked. With
+    what settles each. Raises Rejected for a formula that is wrong."""
     return (*_tasks(composition), *_requirements(composition))
 
 
-def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
-    """Settle obligations made by the two functions above, one outcome for each, in their order."""
-    return settle_all(compose(system), obligations, limits)
-
-
-def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
-    """As `discharge`, of derivations that are made already (they remember what was settled)."""
-    return tuple(settle_each(composition, obligations, Bounds(from_seconds(limits.seconds), limits.seed)))
-
-
 def settle_each(composition: Composition, obligations: Sequence[Obligation], bounds: Bounds) -> Iterator[Outcome]:
-    """As `settle_all`, each outcome as soon as it is there."""
+    """One outcome for each obligation, in their order, each as soon as it is there. The derivations remember what was
+    settled."""
     made = tuple(_tasks(composition))
     resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
@@ -166,95 +136,56 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
     plan = asked(frame.system, goal.name)
     span = plan.span if plan else None
     for finding in goal.findings:
-        yield Task(
-            _obligation(
-                frame.system,
-                f"{goal.name}.rule",
-                f"{goal.name}: the rule that the plan names fits the selected nodes",
-                "",
-                sha256(f"rule\n{finding.message}"),
-                (),
-                finding.span,
-            ),
-            questions.RuleQuestion(finding.message),
-        )
+        claim = f"{goal.name}: the rule that the plan names fits the selected nodes"
+        misfit = questions.RuleQuestion(finding.message)
+        yield _task(frame, f"{goal.name}.rule", claim, ("rule", finding.message), misfit, span=finding.span)
     providers = dict.fromkeys(name for condition in goal.conditions for name in condition.providers)
     given = {name: _given(frame, name) for name in providers}
     for condition in goal.conditions:
         clause = frame.node(condition.consumer).clause(condition.clause)
-        yield Task(
-            _obligation(
-                frame.system,
-                f"{goal.name}.{condition.consumer}.{condition.clause}",
-                f"{goal.name}: {_sources(condition)} what {condition.consumer} assumes in {condition.clause}",
-                _implication(frame, condition, given),
-                sha256(
-                    "side\n"
-                    + "\n".join(
-                        [
-                            meanings.cone(condition.consumer, selected),
-                            meanings.environment(),
-                            digest(clause.formula),
-                        ]
-                    )
-                ),
-                tuple(
-                    dict.fromkeys(
-                        (innermost(str(condition.about)), *chain(*(given[p].guarantees for p in condition.providers)))
-                    )
-                ),
-                clause.span,
-            ),
+        about = innermost(str(condition.about))
+        yield _task(
+            frame,
+            f"{goal.name}.{condition.about}",
+            f"{goal.name}: {_sources(condition)} what {condition.consumer} assumes in {condition.clause}",
+            ("side", meanings.cone(condition.consumer, selected), meanings.environment(), digest(clause.formula)),
             questions.SideQuestion(goal.name, condition),
+            formula=_implication(frame, condition, given),
+            clauses=dict.fromkeys((about, *chain(*(given[p].guarantees for p in condition.providers)))),
+            span=clause.span,
         )
+    entered = argument(composition, goal.name, "entered")
     for part in goal.root.walk():
         if part.rule is Rule.R4:
-            yield Task(
-                _obligation(
-                    frame.system,
-                    _loop_name(composition, goal, part),
-                    f"{goal.name}: the assumptions around the loop of {_listed(part.nodes)} do not hold up one another",
-                    "",
-                    sha256(f"loop\n{meanings.all(selected)}\n{argument(composition, goal.name, 'entered')}"),
-                    tuple(str(c.about) for c in part.side_conditions),
-                    span,
-                ),
-                questions.LoopQuestion(goal.name, part.nodes, argument(composition, goal.name, "entered")),
+            yield _task(
+                frame,
+                _loop_name(composition, goal, part),
+                f"{goal.name}: the assumptions around the loop of {_listed(part.nodes)} do not hold up one another",
+                ("loop", meanings.all(selected), entered),
+                questions.LoopQuestion(goal.name, part.nodes, entered),
+                clauses=(str(c.about) for c in part.side_conditions),
+                span=span,
             )
     if goal.needs_persistence:
         listed = _listed(goal.nodes)
-        wiring = sha256("\n".join(sorted(meanings.cone(node, selected) for node in goal.nodes)))
+        wiring = sorted(meanings.cone(node, selected) for node in goal.nodes)
         for key, name, text in (("persistence", "persistence", PERSISTENCE), ("one_output", "one-output", ONE_OUTPUT)):
-            reason = argument(composition, goal.name, key)
-            yield Task(
-                _obligation(
-                    frame.system,
-                    f"{goal.name}.{name}",
-                    f"{goal.name}: {text.format(listed)}",
-                    "",
-                    sha256(f"{key}\n{wiring}"),
-                    (),
-                    span,
-                ),
-                questions.ArgumentQuestion(key, reason, goal.name),
-            )
+            claim, meaning = f"{goal.name}: {text.format(listed)}", (key, sha256("\n".join(wiring)))
+            question = questions.ArgumentQuestion(key, argument(composition, goal.name, key), goal.name)
+            yield _task(frame, f"{goal.name}.{name}", claim, meaning, question, span=span)
 
 
 def _environment_tasks(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
     for assumed in frame.assumed:
-        entry = next(e for e in frame.system.plan.environment if e.port == assumed.port)
-        yield Task(
-            _obligation(
-                frame.system,
-                f"environment.{assumed.port}",
-                f"the environment gives {assumed.port} as assumed",
-                show_term(assumed.formula),
-                sha256(f"environment\n{composition.meanings.environment([assumed.port])}"),
-                (),
-                entry.span,
-            ),
-            questions.ArgumentQuestion("because", assumed.because, "environment"),
+        yield _task(
+            frame,
+            f"environment.{assumed.port}",
+            f"the environment gives {assumed.port} as assumed",
+            ("environment", composition.meanings.environment([assumed.port])),
+            questions.ArgumentQuestion("environment", assumed.because, "environment"),
+            formula=show_term(assumed.formula),
+            span=next(e for e in frame.system.plan.environment if e.port == assumed.port).span,
         )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
     for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in composition.whole.root.assumed):
@@ -265,17 +196,15 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
             continue
         given = [reasons.get(frame.entry(name.node, port)) or "" for port in ports]
         because = "; ".join(dict.fromkeys(given)) if all(given) else ""
-        yield Task(
-            _obligation(
-                frame.system,
-                f"environment.{name}",
-                f"the environment meets what {name.node} assumes in {name.clause}",
-                show_clause(clause, node),
-                sha256(f"environment\n{digest(frame.clause(name.node, name.clause))}"),
-                (str(name),),
-                clause.span,
-            ),
+        yield _task(
+            frame,
+            f"environment.{name}",
+            f"the environment meets what {name.node} assumes in {name.clause}",
+            ("environment", digest(frame.clause(name.node, name.clause))),
             questions.ArgumentQuestion("environment", because, "environment"),
+            formula=show_clause(clause, node),
+            clauses=(str(name),),
+            span=clause.span,
         )
 
 
@@ -283,18 +212,10 @@ def _start_tasks(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
     everything = frozenset(frame.graph.nodes)
     for group in loops(frame):
-        yield Task(
-            _obligation(
-                frame.system,
-                start_name(group),
-                f"the loop of {', '.join(group)} has a first element",
-                "",
-                sha256(f"start\n{composition.meanings.cone(group[0], everything)}"),
-                (),
-                frame.node(group[0]).span,
-            ),
-            questions.StartQuestion(group),
-        )
+        claim = f"the loop of {', '.join(group)} has a first element"
+        meaning = ("start", composition.meanings.cone(group[0], everything))
+        question = questions.StartQuestion(group)
+        yield _task(frame, start_name(group), claim, meaning, question, span=frame.node(group[0]).span)
 
 
 def _joint_tasks(composition: Composition) -> Iterator[Task]:
@@ -304,58 +225,42 @@ def _joint_tasks(composition: Composition) -> Iterator[Task]:
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
     for group in circles(frame):
         meaning = sha256("\n".join([*(composition.meanings.node(name) for name in group), *map(str, sorted(arcs))]))
-        for name in group:
-            for clause in frame.node(name).guarantees:
-                situations = triggers(frame.clause(name, clause.name))
-                if not situations:
-                    continue
-                yield Task(
-                    _obligation(
-                        frame.system,
-                        f"joint.{name}.{clause.name}",
-                        f"{', '.join(group)}, taken together at one instant, do not exclude what "
-                        f"{name}.{clause.name} is about",
-                        " and ".join(show_term(situation) for situation in situations),
-                        sha256(
-                            "\n".join(["joint", meaning, composition.meanings.environment(), *map(digest, situations)])
-                        ),
-                        (f"{name}.{clause.name}",),
-                        clause.span,
-                    ),
-                    questions.JointQuestion(group, name, clause.name),
-                )
+        for name, clause in ((n, guarantee) for n in group for guarantee in frame.node(n).guarantees):
+            situations = triggers(frame.clause(name, clause.name))
+            if not situations:
+                continue
+            about = f"{name}.{clause.name}"
+            yield _task(
+                frame,
+                f"joint.{about}",
+                f"{', '.join(group)}, taken together at one instant, do not exclude what {about} is about",
+                ("joint", meaning, composition.meanings.environment(), *map(digest, situations)),
+                questions.JointQuestion(group, name, clause.name),
+                formula=" and ".join(show_term(situation) for situation in situations),
+                clauses=(about,),
+                span=clause.span,
+            )
 
 
 def _requirements(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
-    everything = frozenset(frame.graph.nodes)
+    scenario = frame.system.plan.scenario
+    everything = composition.meanings.all(frozenset(frame.graph.nodes))
     for requirement in frame.system.plan.requirements:
         question = requirement_question(frame, requirement)
         if question is None:
             continue
-        scenario = frame.system.plan.scenario
-        yield Task(
-            Obligation(
-                frame.system.name,
-                SYSTEM_LEVEL,
-                Kind.REQUIREMENT,
-                requirement.id,
-                requirement.text,
-                question.text,
-                sha256(
-                    "\n".join(
-                        [
-                            "requirement, with the assumptions behind it",
-                            question.digest,
-                            composition.meanings.all(everything),
-                            scenario.digest if scenario and requirement.temporal else "",
-                        ]
-                    )
-                ),
-                supports(composition, requirement),
-                requirement.span,
-            ),
+        tried = scenario.digest if scenario and requirement.temporal else ""
+        yield _task(
+            frame,
+            requirement.id,
+            requirement.text,
+            ("requirement, with the assumptions behind it", question.digest, everything, tried),
             question,
+            kind=Kind.REQUIREMENT,
+            formula=question.text,
+            clauses=supports(composition, requirement),
+            span=requirement.span,
         )
 
 
@@ -376,10 +281,21 @@ def supports(composition: Composition, requirement: Requirement) -> tuple[str, .
     return tuple(found)
 
 
-def _obligation(
-    system: System, name: str, claim: str, formula: str, meaning: str, clauses: tuple[str, ...], span: Span | None
-) -> Obligation:
-    return Obligation(system.name, SYSTEM_LEVEL, Kind.COMPOSITION, name, claim, formula, meaning, clauses, span)
+def _task(
+    frame: Frame,
+    name: str,
+    claim: str,
+    meaning: Iterable[str],
+    ask: questions.Question,
+    *,
+    kind: Kind = Kind.COMPOSITION,
+    formula: str = "",
+    clauses: Iterable[str] = (),
+    span: Span | None = None,
+) -> Task:
+    """`meaning`: what the digest is of."""
+    mark, system = sha256("\n".join(meaning)), frame.system.name
+    return Task(Obligation(system, SYSTEM_LEVEL, kind, name, claim, formula, mark, tuple(clauses), span), ask)
 
 
 def _sources(condition: SideCondition) -> str:

@@ -26,8 +26,9 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import compose
+from avow.calculus.discharge import Bounds
 from avow.calculus.kept_answers import keeping
-from avow.calculus.obligations import settle_all
+from avow.calculus.obligations import settle_each
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.pipeline import recheck
@@ -52,6 +53,7 @@ from avow.pipeline.work import (
     tool_identities,
 )
 from avow.solving.checking import z3_version
+from avow.solving.limits import from_seconds
 from avow.system.plan import System
 
 
@@ -114,7 +116,8 @@ def _execute(request: Request, root: Path) -> Report:
             claims = _claims(request, work.obligations, work.keys)
             answers = read_answers(request.earlier)
             with keeping(answers):
-                outcomes = settle_all(composition, claims, request.limits)
+                bounds = Bounds(from_seconds(request.limits.seconds), request.limits.seed)
+                outcomes = tuple(settle_each(composition, claims, bounds))
             kept = {recheck.FILE: recheck.written(composition.certificates)} if composition.certificates.made else {}
             kept |= {ANSWERS: write_answers(answers)} if answers.now else {}
             return Report(outcomes, "z3", z3_version(), logs=kept)

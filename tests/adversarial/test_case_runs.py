@@ -16,7 +16,7 @@ from random import Random
 
 import pytest
 from assurance.sample import RUN, TODAY, chain, evidence
-from calculus.make import Limits
+from calculus.make import Limits, settle_all
 
 from avow.assurance.case import conclude
 from avow.assurance.facts import facts_of_system
@@ -25,7 +25,6 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
-from avow.calculus.obligations import settle_all
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.pipeline import recheck

@@ -6,7 +6,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from calculus.make import Limits, make
+from calculus.make import Limits, all_obligations, make, settle_all
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
@@ -14,7 +14,6 @@ from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Hint
-from avow.calculus.obligations import all_obligations, settle_all
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.check import Kernel
 from avow.kernel.statements import Claimed

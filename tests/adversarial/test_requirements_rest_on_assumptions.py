@@ -6,10 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from calculus.make import discharge, requirement_obligations
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.obligations import discharge, requirement_obligations
 from avow.system.load import load_system
 
 

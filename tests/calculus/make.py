@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from avow.base.verdict import Outcome
 from avow.calculus.composition import Composition, compose
 from avow.calculus.discharge import Answers, Bounds
-from avow.calculus.obligations import composition_obligations, discharge, requirement_obligations
+from avow.calculus.obligations import all_tasks, settle_each
+from avow.evidence.obligation import Kind, Obligation
+from avow.solving.limits import from_seconds
 from avow.system.load import load_system
 from avow.system.plan import System
 
 CONTRACTS = Path(__file__).parents[2] / "contracts"
+
+
+class TimeLimits(Protocol):
+    @property
+    def seconds(self) -> float: ...
+
+    @property
+    def seed(self) -> int: ...
 
 
 class Limits:
@@ -46,9 +58,25 @@ def settled(system: System, goal: str = "whole", milliseconds: int = 10_000) -> 
     return composition, composition.settled(composition.goal(goal), Bounds(milliseconds))
 
 
+def all_obligations(composition: Composition) -> tuple[Obligation, ...]:
+    return tuple(task.obligation for task in all_tasks(composition))
+
+
+def requirement_obligations(system: System) -> tuple[Obligation, ...]:
+    return tuple(o for o in all_obligations(compose(system)) if o.kind is Kind.REQUIREMENT)
+
+
+def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
+    return tuple(settle_each(composition, obligations, Bounds(from_seconds(limits.seconds), limits.seed)))
+
+
+def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
+    return settle_all(compose(system), obligations, limits)
+
+
 def outcomes(system: System) -> dict[str, Outcome]:
     """Every composition and requirement obligation, by its name, settled."""
-    obligations = (*composition_obligations(system), *requirement_obligations(system))
+    obligations = all_obligations(compose(system))
     found = discharge(system, obligations, Limits())
     return {obligation.name: outcome for obligation, outcome in zip(obligations, found, strict=True)}
 

@@ -20,7 +20,7 @@ from avow.calculus import discharge as discharging
 from avow.calculus.composition import compose
 from avow.calculus.derivation import Settled, SideCondition
 from avow.calculus.notation import as_html, write_goal
-from avow.calculus.obligations import composition_obligations, discharge
+from avow.calculus.obligations import composition_obligations
 from avow.cli import main
 from avow.cli.compose import command as compose_command
 from avow.cli.graph import command as graph_command
@@ -30,7 +30,7 @@ from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow
 from avow.system.graph_svg import svg, text
 
-from .make import Limits, make, node
+from .make import Limits, discharge, make, node
 
 PROOFS = Path(__file__).parents[2] / "avow/calculus/proofs"
 

@@ -10,11 +10,10 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import compose
-from avow.calculus.obligations import all_obligations, settle_all
 from avow.kernel.certificate import How
 from avow.kernel.statements import Claimed
 
-from .make import Limits, make, node, outcomes
+from .make import Limits, all_obligations, make, node, outcomes, settle_all
 
 RELAY = node("a", "e : BOOL", "x : BOOL", "G keep: once(in.e) -> out.x") + node(
     "b", "x : BOOL", "y : BOOL", "G echo: out.y <=> in.x"

@@ -15,12 +15,12 @@ from oracle.values import domain, holds
 
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
-from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.calculus.obligations import composition_obligations
 from avow.language.contract import Port
 from avow.language.sorts import SequenceSort, Sort
 from avow.system.plan import Endpoint
 
-from .make import make, node
+from .make import make, node, requirement_obligations, settle_all
 
 Values = dict[str, Any]
 

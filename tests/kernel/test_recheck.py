@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from calculus.make import CONTRACTS, Limits, make
+from calculus.make import CONTRACTS, Limits, make, settle_all
 from calculus.test_commands import invoke
 
 from avow.base.codec import to_json
@@ -14,7 +14,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
-from avow.calculus.obligations import composition_obligations, reestablished, settle_all
+from avow.calculus.obligations import composition_obligations, reestablished
 from avow.cli.recheck import command
 from avow.system.load import load_system
 from kernel.test_kernel import LOOP, PLAN, made

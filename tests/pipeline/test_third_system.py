@@ -10,11 +10,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from calculus.make import discharge as discharge_composition
 
 from avow.backend_kit.protocol import Limits
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.obligations import discharge as discharge_composition
 from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.slices import SanitySlice
 from avow.pipeline.work import Work, method_backend, method_job, planned_method

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from calculus.make import discharge
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Verdict
-from avow.calculus.obligations import composition_obligations, discharge
+from avow.calculus.obligations import composition_obligations
 from avow.calculus.variables import closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.sorts import INTEGER

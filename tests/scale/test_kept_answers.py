@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from calculus.make import all_obligations, settle_all
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Verdict
@@ -12,7 +13,7 @@ from avow.base.workspace import Workspace
 from avow.calculus import entailment
 from avow.calculus.composition import Composition, compose
 from avow.calculus.kept_answers import KeptAnswers, keeping
-from avow.calculus.obligations import all_obligations, reestablished, settle_all
+from avow.calculus.obligations import reestablished
 from avow.evidence.ledger import ledger_of
 from avow.kernel.solvers import Said
 from avow.pipeline.answers_file import earlier, read_answers

@@ -11,12 +11,13 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from calculus.make import requirement_obligations, settle_all
 from click.testing import CliRunner
 
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Phase, Rule
-from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.calculus.obligations import composition_obligations
 from avow.calculus.variables import frame
 from avow.cli import simulate
 from avow.evaluation.evaluate import compile_term

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from calculus.make import all_obligations, settle_all
 from click.testing import CliRunner
 from drawn.memory import clause
 from helpers import some
@@ -19,7 +20,6 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
-from avow.calculus.obligations import all_obligations, settle_all
 from avow.cli.compose import command as compose_command
 from avow.cli.simulate import command as simulate
 from avow.formulas.temporal.cells import CELL
