@@ -28,13 +28,8 @@ def stands(record: Evidence, root: Path) -> bool:
 
 def changed(record: Evidence, root: Path) -> tuple[str, ...]:
     """The paths that are not as they were; relative ones are under `root`, the workspace."""
-    if OBSERVED not in record.details:
-        return ()
-    try:
-        seen = from_json(tuple[Observed, ...], record.details[OBSERVED])
-    except ValueError:
-        return ("what was observed cannot be read",)
-    return tuple(o.path for o in differing(seen, root))
+    seen = _rows(record)
+    return ("what was observed cannot be read",) if seen is None else tuple(o.path for o in differing(seen, root))
 
 
 def differing(seen: Iterable[Observed], root: Path) -> tuple[Observed, ...]:
@@ -78,18 +73,23 @@ def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
     """All that subjects looked at, each once, with its whole path; relative ones are under `root`, the workspace."""
     found: dict[tuple[str, Seen], Observed] = {}
     for entry in entries:
-        try:
-            seen = from_json(tuple[Observed, ...], entry.evidence.details.get(OBSERVED, []))
-        except ValueError:
-            continue
-        found |= {(o.path, o.kind): o for o in seen if o.kind is not Seen.OUTSIDE}
+        found |= {(o.path, o.kind): o for o in _rows(entry.evidence) or () if o.kind is not Seen.OUTSIDE}
     return tuple(Observed(o.kind, os.path.join(root, o.path), o.digest) for o in found.values())  # noqa: PTH118
 
 
 def undeclared(record: Evidence) -> bool:
     """Whether what it used that cannot be recorded kept it from an answer."""
-    rows = record.details.get(OBSERVED, [])
-    return record.verdict is Verdict.UNKNOWN and any(row[0] == Seen.OUTSIDE for row in rows)
+    return record.verdict is Verdict.UNKNOWN and any(o.kind is Seen.OUTSIDE for o in _rows(record) or ())
+
+
+def _rows(record: Evidence) -> tuple[Observed, ...] | None:
+    """What its subject was seen to look at; None where that cannot be read: a ledger may be forged."""
+    if OBSERVED not in record.details:
+        return ()
+    try:
+        return from_json(tuple[Observed, ...], record.details[OBSERVED])
+    except ValueError:
+        return None
 
 
 def _apart(record: Evidence) -> bool:
