@@ -235,6 +235,14 @@ WORKSPACE_CODES = register(
         "Two folders under contracts/ hold systems of one name; their evidence and reports would be mixed up.",
         "Give each its own `system:` in plan.yaml; a link to another system's folder is to be removed.",
     ),
+    declare(
+        "CLI021",
+        "plan that is not verified",
+        "A plan lies elsewhere than in `contracts/NAME/`, and `avow verify` leaves it out: the system around it does "
+        "not take it in (a warning), or there is none around it, and none takes it in (an error).",
+        "Move its folder into `contracts/`, or take it in under `subsystems`; where a warning's plan is to be left "
+        "out, `lints_off: [CLI021]` in the plan of the system around it says so.",
+    ),
     declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
     declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
     declare(

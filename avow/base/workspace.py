@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -53,12 +54,29 @@ class Workspace:
             return ()
         return tuple(sorted(p.parent for p in self.contracts.glob("*/plan.yaml")))
 
+    def stray_plans(self) -> tuple[Path, ...]:
+        """The plans under contracts/ that are in no system's folder."""
+        own = self.contracts / "plan.yaml"
+        below = [path for path in plans_below(self.contracts) if path.relative_to(self.contracts).parts[2:]]
+        held = set(self.systems())
+        return (*[own] * own.is_file(), *(path for path in below if held.isdisjoint(path.parents)))
+
     def relative(self, path: Path) -> str:
         """A path as records and reports show it: relative to the workspace, where it lies within."""
         try:
             return path.resolve().relative_to(self.root.resolve()).as_posix()
         except ValueError:
             return path.as_posix()
+
+
+def plans_below(folder: Path) -> tuple[Path, ...]:
+    """The plans in the folders below one, but for hidden folders and what lies behind links."""
+    found = []
+    for place, names, files in os.walk(folder):
+        names[:] = sorted(name for name in names if not name.startswith("."))
+        if "plan.yaml" in files and Path(place) != folder:
+            found.append(Path(place, "plan.yaml"))
+    return tuple(found)
 
 
 def find_workspace(start: Path) -> Workspace | None:

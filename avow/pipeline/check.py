@@ -13,14 +13,14 @@ from doit.exceptions import TaskError
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import COMMON_OPTIONS, asking
-from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf
 from avow.base.tuning.shown import WARNINGS
-from avow.base.workspace import Workspace
+from avow.base.workspace import Workspace, plans_below
 from avow.pipeline import export as exporting
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
@@ -99,6 +99,7 @@ def of_plan(
         *requirement_sentences(system),
         *without_words(system),
         *unconfirmed(system),
+        *(not_verified(path, system.name, Severity.WARNING) for path in _left_out(system)),
     ]
     for plan in system.plan.nodes:
         for method in plan.methods:
@@ -109,6 +110,19 @@ def of_plan(
                 if clean is not None and not said:
                     clean.add(name)
     return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
+
+
+def _left_out(system: System) -> tuple[Path, ...]:
+    """The plans below the system's that it does not take in."""
+    taken_in = {path.resolve() for path in system.plan.included}
+    return tuple(path for path in plans_below(system.plan.root) if path.resolve() not in taken_in)
+
+
+def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERROR) -> Diagnostic:
+    """What is to be said of a plan that no run looks at; `around`: the system in whose folder it lies."""
+    why = f"'{around}' does not take it in" if around else "its folder is not one of contracts/ itself"
+    hint = "move its folder into contracts/, or take it in under `subsystems` of another plan"
+    return Diagnostic("CLI021", f"this plan is not verified: {why}", Span(str(path), 1, 1, 1, 1), severity, hint)
 
 
 def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
@@ -254,5 +268,6 @@ def _key(surveyed: Survey) -> str:
     keys = sorted(key for work in surveyed.catalogue.works for key in work.keys.values())
     plan = surveyed.system.plan
     graph = plan.model.data.get("graph") if isinstance(plan.model.data, dict) else None
-    # No obligation depends on the ROS graph: only this stage reads it.
-    return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys])
+    # No obligation depends on the ROS graph, or on plans that are not taken in: only this stage reads them.
+    left_out = [str(path) for path in _left_out(surveyed.system)]
+    return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys, left_out])

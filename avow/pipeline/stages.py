@@ -63,6 +63,12 @@ def stages(state: State) -> Iterator[Task]:
             yield from _rejected(name, surveyed)
         else:
             yield from _system(state, surveyed)
+    systems = [surveyed.system for surveyed in found.values() if not isinstance(surveyed, Rejected)]
+    taken_in = {path.resolve() for system in systems for path in system.plan.included}
+    for path in state.workspace.stray_plans() if len(systems) == len(found) else ():
+        if path.resolve() not in taken_in:  # where a system cannot be read, it may be the one that takes it in
+            name = path.parent.relative_to(state.workspace.root).as_posix()
+            yield from _rejected(name, Rejected(checking.not_verified(path)))
 
 
 def _mixed_up(name: str, folders: Sequence[Path]) -> Rejected:
@@ -89,6 +95,7 @@ def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected
 
 def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
     """A system that cannot be read: its stages say so, the other systems go on."""
+    name = name.replace("=", "-")  # doit would refuse all tasks for one such name
     for stage in STAGES:
         action = (
             partial(checking.refuse, rejected)

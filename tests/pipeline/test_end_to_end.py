@@ -282,6 +282,39 @@ def test_two_systems_of_one_name_are_mixed_up_by_nobody(begun: Path, tmp_path: P
     assert all(f"contracts/{folder}/plan.yaml" in text for folder in ("another", name)), text
 
 
+@pytest.mark.slow
+def test_a_plan_below_another_is_told(begun: Path, tmp_path: Path) -> None:
+    """Nothing is green by omission: what no run looks at is named, with its place."""
+    robot = Path(shutil.copytree(begun, tmp_path / "robot"))
+    around, deep = robot / "contracts/thermostat", "contracts/thermostat/spare/plan.yaml"
+    shutil.copytree(around, robot / "contracts/thermostat/spare")
+    known = json.loads(run(robot, "avow", "check", "thermostat", "--json").stdout)["diagnostics"]
+    assert [(d["code"], d["severity"]) for d in known if d["code"] == "CLI021"] == [("CLI021", "warning")]
+    done = verify(robot, "check")
+    assert done.returncode == 0, done.stderr
+    assert f"warning[CLI021]: {deep}:1: this plan is not verified: 'thermostat' does not take it in" in done.stderr
+    edit(robot, "policy:", "lints_off: [CLI021]\npolicy:", "plan.yaml")
+    assert "CLI021" not in verify(robot, "check").stderr
+    edit(robot, "lints_off: [CLI021]", "subsystems: {spare: {system: spare}}", "plan.yaml")
+    assert "CLI021" not in verify(robot, "check").stderr
+
+
+@pytest.mark.slow
+def test_a_plan_in_no_systems_folder_is_an_error(begun: Path, tmp_path: Path) -> None:
+    robot = Path(shutil.copytree(begun, tmp_path / "robot"))
+    contracts = robot / "contracts"
+    shutil.copytree(contracts / "thermostat", contracts / "heating=hot/spare")
+    done = verify(robot, "check")
+    assert done.returncode == 2, done.stderr
+    assert "contracts/heating=hot/spare/plan.yaml:1:1" in done.stderr
+    assert "this plan is not verified" in done.stderr
+    edit(robot, "policy:", "subsystems: {spare: {system: ../heating=hot/spare}}\npolicy:", "plan.yaml")
+    assert "CLI021" not in verify(robot, "check").stderr
+    (contracts / "plan.yaml").write_text("{}")
+    done = verify(robot, "check")
+    assert (done.returncode, "contracts/plan.yaml:1:1" in done.stderr) == (2, True), done.stderr
+
+
 @pytest.mark.nightly
 def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
     (robot / "contracts" / "broken").mkdir()
