@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import read_regular
 from avow.base.suggestions import suggest
 from avow.system.paths import inside
 
@@ -62,6 +63,30 @@ def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hin
     if not path.is_file():
         raise Rejected(Diagnostic(absent, f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
     return path
+
+
+def file_bytes(path: Path, absent: str, wrong: str = "", most: int | None = None) -> bytes:
+    """What a file holds. Raises Rejected: with code `absent` where it cannot be read, with code `wrong` where it has
+    more than `most` bytes."""
+    start = Span(str(path), 1, 1, 1, 2)
+    try:
+        size = path.stat().st_size
+        data = read_regular(path) if most is None or size <= most else b""
+    except OSError as error:
+        raise Rejected(Diagnostic(absent, f"cannot be read: {error.strerror or error}", start)) from None
+    if most is not None and size > most:
+        raise Rejected(Diagnostic(wrong, f"the file has {size} bytes; at most {most} are read", start))
+    return data
+
+
+def file_text(path: Path, absent: str, wrong: str, most: int) -> str:
+    """The UTF-8 text of a file. Raises Rejected as `file_bytes`, and with code `wrong` where it is none."""
+    data = file_bytes(path, absent, wrong, most)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise Rejected(Diagnostic(wrong, "not UTF-8 text", Span(str(path), line, 1, line, 2))) from None
 
 
 def told(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:

@@ -20,8 +20,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular
+from avow.backend_kit.given import file_bytes
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system.plan import Located
 from avow.system.schema import violations
 from avow.system.strict_yaml import read_yaml
@@ -147,13 +147,7 @@ class Environment:
 
 def read_environment(path: Path) -> Environment:
     """Raises Rejected with every problem, located."""
-    name = str(path)
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        span = Span(name, 1, 1, 1, 2)
-        raise Rejected(Diagnostic("AJPF110", f"cannot be read: {error.strerror or error}", span)) from None
-    piece, problems = read_yaml(data, name)
+    piece, problems = read_yaml(file_bytes(path, "AJPF110"), str(path))
     if problems:
         raise Rejected(*problems)
     located = piece.located()

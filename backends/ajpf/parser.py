@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,8 @@ from typing import Any
 from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, v_args
 from lark.exceptions import VisitError
 
+from avow.backend_kit.given import file_text
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular
 from avow.base.grammars import lark_of
 
 from .syntax import (
@@ -52,19 +51,7 @@ _SAID = {
 
 def read_system(path: Path) -> tuple[Program, ...]:
     """The agents of a file. Raises Rejected."""
-    name = str(path)
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        raise Rejected(Diagnostic("AJPF101", f"cannot be read: {error.strerror or error}", _at(name, 1, 1))) from None
-    if len(data) > PROGRAM_BYTES:
-        raise Rejected(Diagnostic("AJPF101", f"{len(data)} bytes; at most {PROGRAM_BYTES} are read", _at(name, 1, 1)))
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise Rejected(Diagnostic("AJPF101", "not UTF-8 text", _at(name, line, 1))) from None
-    return parse_system(text, name)
+    return parse_system(file_text(path, "AJPF101", "AJPF101", PROGRAM_BYTES), str(path))
 
 
 def parse_fact(text: str) -> Struct | None:
@@ -190,11 +177,13 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     @_build
     def belief(self, meta: Any, parts: list[Struct]) -> Struct:
-        if not is_ground(parts[0]):
-            self.problems.append(
-                Diagnostic("AJPF103", f"the initial belief {show(parts[0])} has a variable", self.span(meta))
-            )
+        self.ground("belief", parts[0], meta)
         return parts[0]
+
+    def ground(self, what: str, term: Struct, meta: Any) -> None:
+        if not is_ground(term):
+            message = f"the initial {what} {show(term)} has a variable"
+            self.problems.append(Diagnostic("AJPF103", message, self.span(meta)))
 
     def several(self, parts: list[Any]) -> tuple[Any, ...]:
         """All that is there."""
@@ -227,34 +216,32 @@ class _Builder(Transformer):  # type: ignore[misc]
         test = "==" if str(parts[1]) == "is" else str(parts[1])
         return test, Struct(test, (parts[0], parts[2]))
 
+    # Conditions, each with the sign that denies it, if it has one
+
+    def believed(self, parts: list[Any]) -> Condition:
+        return Condition(parts[1], parts[0] is None)
+
     def holding(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0][1], test=parts[0][0])
+        test, term = parts[1]
+        return Condition(term, parts[0] is None, test=test)
 
-    def not_holding(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0][1], positive=False, test=parts[0][0])
-
-    def no_way(self, parts: list[Any]) -> Condition:
-        return Condition(None, positive=False, group=tuple(parts))
-
-    def cut(self, parts: list[Any]) -> Condition:
-        return Condition(None, is_cut=True)
+    def wanted_goal(self, parts: list[Any]) -> Condition:
+        return Condition(parts[1], parts[0] is None, is_goal=True, goal=parts[2])
 
     def sent(self, parts: list[Any]) -> Condition:
         """Without a sender: the agent itself; it remembers nobody else's messages."""
-        to, sender, force, content = parts
-        return Condition(Struct(SENT, (to, sender or self.anonymous([]), _force(force), content)))
+        denied, to, sender, force, content = parts
+        term = Struct(SENT, (to, sender or self.anonymous([]), _force(force), content))
+        return Condition(term, denied is None)
 
-    def not_sent(self, parts: list[Any]) -> Condition:
-        return replace(self.sent(parts), positive=False)
+    def no_way(self, parts: list[Any]) -> Condition:
+        return Condition(None, positive=False, group=tuple(parts[1:]))
 
-    def refuse(self, what: str, span: Span) -> None:
-        self.problems.append(Diagnostic("AJPF105", f"{what}: the checker does not run that", span))
+    def anything(self, parts: list[Any]) -> Condition:
+        return Condition(None)
 
-    def positive(self, parts: list[Struct]) -> Condition:
-        return Condition(parts[0])
-
-    def negative(self, parts: list[Struct]) -> Condition:
-        return Condition(parts[0], positive=False)
+    def cut(self, parts: list[Any]) -> Condition:
+        return Condition(None, is_cut=True)
 
     @_build
     def rule(self, meta: Any, parts: list[Any]) -> Rule:
@@ -265,10 +252,7 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     @_build
     def goal(self, meta: Any, parts: list[Any]) -> Goal:
-        if not is_ground(parts[0]):
-            self.problems.append(
-                Diagnostic("AJPF103", f"the initial goal {show(parts[0])} has a variable", self.span(meta))
-            )
+        self.ground("goal", parts[0], meta)
         return Goal(parts[0], parts[1] or GoalKind.PERFORM)
 
     # Plans
@@ -283,21 +267,13 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     def trigger(self, event: Event, meta: Any) -> Event:
         if isinstance(event.term, Var):
-            self.refuse(f"a plan for any {'goal' if event.is_goal else 'belief'} at all", self.span(meta))
+            message = f"a plan for any {'goal' if event.is_goal else 'belief'} at all: the checker does not run that"
+            self.problems.append(Diagnostic("AJPF105", message, self.span(meta)))
         return event
 
     def received(self, parts: list[Any]) -> Event:
         """AIL calls the sender `From` and the receiver `To`: a plan may use these variables."""
         return Event(Sign.ADD, Struct(RECEIVED, (Var("From"), Var("To"), _force(parts[1]), parts[2])))
-
-    def wanted_goal(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0], is_goal=True, goal=parts[1])
-
-    def not_wanted_goal(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0], positive=False, is_goal=True, goal=parts[1])
-
-    def anything(self, parts: list[Any]) -> Condition:
-        return Condition(None)
 
     def guard(self, parts: list[Condition]) -> tuple[Condition, ...]:
         return _as_tried(parts)
@@ -309,16 +285,13 @@ class _Builder(Transformer):  # type: ignore[misc]
         return Deed(DeedKind(f"{parts[0]}!"), parts[1], parts[2] or GoalKind.PERFORM)
 
     def wait(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.WAIT, parts[0])
+        return Deed(DeedKind.WAIT if parts[0] is None else DeedKind.WAIT_NOT, parts[1])
 
     def send(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.SEND, Struct("send", (parts[0], _force(parts[1]), parts[2])))
 
     def lock(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind(f"{parts[0]}.lock"), Struct(".lock"))
-
-    def wait_not(self, parts: list[Any]) -> Deed:
-        return Deed(DeedKind.WAIT_NOT, parts[0])
 
     def action(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.ACTION, parts[0])

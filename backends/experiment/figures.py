@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
-from avow.base.files import read_regular
+from avow.backend_kit.given import file_bytes
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.records import dataclass
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -37,13 +37,7 @@ class Figures:
 
 def read_figures(path: Path, unit: str) -> Figures:
     """Raises Rejected. `unit` is that of the plan; the file's own `unit` is that of its figures without one."""
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        raise Rejected(
-            Diagnostic("EXP102", f"cannot be read: {error.strerror or error}", Span(str(path), 1, 1, 1, 2))
-        ) from None
-    piece, problems = read_yaml(data, str(path))
+    piece, problems = read_yaml(file_bytes(path, "EXP102"), str(path))
     found = [p for p in problems if p.severity is Severity.ERROR]
     if piece.entries is None:
         raise Rejected(*found, Diagnostic("EXP121", "expected figures by name (n, mean, min, max, sd)", piece.span))

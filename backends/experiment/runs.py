@@ -9,9 +9,9 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+from avow.backend_kit.given import file_text
 from avow.base.alike import alike
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
-from avow.base.files import read_regular
 from avow.base.records import dataclass
 
 from .expression import Expression, Interval
@@ -70,17 +70,7 @@ class _RunsReader:
         return Runs(tuple(runs), tuple(self.copies(runs)))
 
     def rows(self) -> list[tuple[int, list[str]]]:
-        try:
-            size = self.path.stat().st_size
-            data = read_regular(self.path) if size <= TABLE_BYTES else b""
-        except OSError as error:
-            raise self.fail(1, "EXP102", f"cannot be read: {error.strerror or error}") from None
-        if size > TABLE_BYTES:
-            raise self.fail(1, "EXP111", f"the file has {size} bytes; at most {TABLE_BYTES} are read")
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise self.fail(data[: error.start].count(b"\n") + 1, "EXP111", "not UTF-8 text") from None
+        text = file_text(self.path, "EXP102", "EXP111", TABLE_BYTES)
         if "\0" in text:
             raise self.fail(text[: text.index("\0")].count("\n") + 1, "EXP111", "a NUL character in the data")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -10,9 +10,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from avow.backend_kit.given import file_bytes
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular
 from avow.base.persons import unreadable
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
@@ -93,12 +93,7 @@ def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
 
 def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
     """The record's YAML. Raises Rejected."""
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        place = Span(str(path), 1, 1, 1, 2)
-        raise Rejected(Diagnostic("REV102", f"cannot be read: {error.strerror or error}", place)) from None
-    return read_yaml(data, str(path))
+    return read_yaml(file_bytes(path, "REV102"), str(path))
 
 
 class _RecordReader:
