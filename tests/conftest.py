@@ -57,8 +57,9 @@ def pytest_configure() -> None:
     settings.load_profile("avow")
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test whose tool is missing is skipped, visibly."""
+    """A test whose tool is missing is skipped, visibly. What only tests need that are left out is not looked for."""
     for item in items:
         for name in {mark.name for mark in item.iter_markers()} & _NEEDS.keys():
             if not _NEEDS[name]():
@@ -70,7 +71,9 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
     The plugin pytest-rerunfailures does so too, and talks with xdist's master for each test: 40 ms, thousands of times.
     """
-    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    shown = not hasattr(item.config, "workerinput") or item.config.option.verbose > 0
+    if shown:  # else each is a message of xdist's that its master does nothing with
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     reports = runtestprotocol(item, nextitem=nextitem, log=False)
     if any(report.failed for report in reports):
         for report in reports:
@@ -82,7 +85,8 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     for report in reports:
         if _tells(report, item.config):
             item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    if shown:
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
 
 
@@ -115,8 +119,7 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_finish() -> None:
-    """Thousands of collected tests stay till the end: the garbage collector need not walk them again and again."""
-    gc.collect()
+    """Thousands of collected tests stay till the end: the garbage collector need not walk them, not even once."""
     gc.freeze()
     gc.set_threshold(100_000, 20, 20)
 
