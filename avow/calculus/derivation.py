@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.temporal.cell import CELL
-from avow.system.graph import Edge
+from avow.system.plan import Edge
 
 
 class Rule(StrEnum):

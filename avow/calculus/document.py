@@ -110,7 +110,7 @@ def told(
         composition.frame.system.name,
         Graph(
             graph.nodes,
-            tuple(Edge(str(e.source), str(e.target), e.delayed, e.declared) for e in graph.edges),
+            tuple(Edge(str(e.source), str(e.target), e.delayed, not e.implied) for e in graph.edges),
             tuple(map(str, graph.environment)),
             tuple(map(str, graph.dangling)),
             tuple(Finding(f.code, f.severity, f.message) for f in graph.findings),

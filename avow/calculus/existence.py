@@ -16,7 +16,7 @@ from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
 from avow.sanity.claims import triggers
 from avow.system.formulas import initial_condition
-from avow.system.graph import Edge
+from avow.system.plan import Edge
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.language.styles import latex_escape
-from avow.system.graph import Edge
+from avow.system.plan import Edge
 
 # -- a little mathematics ----------------------------------------------------------------------------------------------
 

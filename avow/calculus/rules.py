@@ -21,8 +21,7 @@ from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCon
 from avow.calculus.variables import Frame
 from avow.language.contract import Clause
 from avow.language.terms import Role
-from avow.system.graph import Edge
-from avow.system.plan import ComposeGoal, Endpoint
+from avow.system.plan import ComposeGoal, Edge, Endpoint
 
 WHOLE = "whole"
 """The name of the derivation over every node."""
@@ -127,7 +126,7 @@ class _Builder:
                 edge = self.frame.graph.by_target.get(at)
                 found.append((port.name, replace(edge, delayed=True) if edge is not None and remembered else edge))
             elif remembered:
-                found.append((port.name, Edge(at, at, delayed=True)))
+                found.append((port.name, Edge(at, at, delayed=True, implied=True)))
         return found
 
     def environment(self, node: str, ports: Sequence[str]) -> tuple[str, ...]:

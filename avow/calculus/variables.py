@@ -25,8 +25,8 @@ from avow.language.subterms import histories, ports_of, timed
 from avow.language.terms import TRUE, Role, Term, Variable
 from avow.system.folding import own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
-from avow.system.graph import Edge, Graph, dataflow
-from avow.system.plan import Endpoint, System
+from avow.system.graph import Graph, dataflow
+from avow.system.plan import Edge, Endpoint, System
 from avow.system.temporal import parse_state
 
 OBSERVED = "requirement "

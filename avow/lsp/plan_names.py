@@ -17,7 +17,7 @@ from avow.language.contract import Contract
 from avow.language.environment import of_contract
 from avow.language.terms import Role
 from avow.lsp.names import Meaning, Occurrence, Ports, What
-from avow.system.strict_yaml import Piece, listed, read_yaml
+from avow.system.strict_yaml import Piece, read_yaml
 
 _WORD = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\.")
 _PORT = re.compile(r"\b(?:in|out)\s*\.\s*[A-Za-z_]")
@@ -93,7 +93,7 @@ class _Reader:
 
     def scalar(self, piece: Piece | None, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
         """A scalar, or each of a list, that is one name."""
-        for item in listed(piece):
+        for item in piece.each() if piece is not None else ():
             region = self.region(item.span)
             if self.plan.text[region.start : region.end] == item.text:
                 yield from self.one(what(item.text), region.start)
@@ -164,13 +164,13 @@ class _Reader:
                 pass
 
     def formula(self, piece: Piece | None, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
-        for item in listed(piece):
+        for item in piece.each() if piece is not None else ():
             yield from self.words(self.region(item.span), node, side)
 
     # -- the plan ------------------------------------------------------------------------------------------------------
 
     def everything(self, root: Piece) -> Iterator[Occurrence]:
-        for connection in listed(root.at("connections")):
+        for connection in root.each("connections"):
             for key, side in (("from", Role.OUTPUT), ("to", Role.INPUT)):
                 yield from self.formula(connection.at(key), None, side)
             source = connection.at("from")
@@ -195,16 +195,16 @@ class _Reader:
         for _, _, picture in self.keys(root.at("pictures")):
             yield from self.scalar(picture.at("places"), self.element)
         for key in _FINDINGS:
-            for finding in listed(root.at(key)):
+            for finding in root.each(key):
                 for inner in ("obligation", "matched"):
-                    for item in listed(finding.at(inner)):
+                    for item in finding.each(inner):
                         yield from self.obligation(item)
 
     def requirements(self, root: Piece) -> Iterator[Occurrence]:
         for _, _, requirement in self.keys(root.at("requirements")):
             for key in ("formula", "temporal"):
                 yield from self.formula(requirement.at(key), None)
-            for item in listed(requirement.at("supported_by")):
+            for item in requirement.each("supported_by"):
                 node, dot, name = item.text.partition(".")
                 region = self.region(item.span)
                 yield from self.one(self.node(node), region.start)
@@ -222,7 +222,7 @@ class _Reader:
 
     def method_options(self, piece: Piece | None, node: str) -> Iterator[Occurrence]:
         """The names in the options of a node's methods, at any depth."""
-        for inner in listed(piece) if piece is not None and piece.items is not None else ():
+        for inner in (piece.items or ()) if piece is not None else ():
             yield from self.method_options(inner, node)
         if piece is not None and piece.entries is None and piece.items is None:
             region = self.region(piece.span)

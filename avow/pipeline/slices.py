@@ -12,7 +12,6 @@ from pathlib import Path
 
 from avow.backend_kit.linked import beside, connected, reads_recordings, told_too
 from avow.backend_kit.protocol import Backend, Job
-from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.calculus.providers import ProviderClaim, provider_claims
@@ -25,8 +24,8 @@ from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options, upstream_of
 from avow.pipeline.work import is_portable
-from avow.system.graph import Edge, dataflow
-from avow.system.plan import Connection, Located, NodePlan, Plan, Ros, System
+from avow.system.graph import dataflow
+from avow.system.plan import NOWHERE, NodePlan, Plan, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +73,11 @@ def compose_slice(system: System) -> ComposeSlice:
         system.plan,
         title="",
         contract_files=(),
-        model=_NOTHING,
+        model=NOWHERE,
         messages=(),
         requirements=tuple(replace(r, confirmed=None, linked="") for r in system.plan.requirements),
         nodes=tuple(replace(node, criticality="", methods=(), source=None) for node in system.plan.nodes),
-        policy=_NOTHING,
+        policy=NOWHERE,
         expected=None,
         accepted=(),
         plugins=(),
@@ -118,7 +117,7 @@ def method_slice(
             _planned(tool, plan.node(job.node.name), job, told_of_itself),
             *(_told(plan.node(name), told_too(tool, job)) for name in sorted(sources)),
         ),
-        connections=tuple(_connection(edge) for edge in edges),
+        connections=tuple(replace(edge, implied=False, topic="") for edge in edges),
         messages=plan.messages if looks else (),
         ros=plan.ros if looks else Ros(),
         scenario=plan.scenario if tool.uses_scenario or reads_recordings(job) else None,
@@ -184,31 +183,6 @@ def _told(node: NodePlan, backends: Collection[str]) -> NodePlan:
     return replace(node, criticality="", source=None, methods=tuple(m for m in node.methods if m.backend in backends))
 
 
-def _connection(edge: Edge) -> Connection:
-    return Connection(edge.source, edge.target, edge.delayed, edge.initial, edge.span, edge.initial_span)
-
-
-_NOTHING = Located({}, Span("", 1, 1, 1, 1))
-
-
 def _bare(plan: Plan) -> Plan:
     """Nothing but the plan's name and place."""
-    return Plan(
-        plan.system,
-        "",
-        plan.path,
-        (),
-        _NOTHING,
-        (),
-        (),
-        (),
-        None,
-        (),
-        (),
-        (),
-        _NOTHING,
-        None,
-        (),
-        (),
-        (),
-    )
+    return Plan(plan.system, "", plan.path, ())

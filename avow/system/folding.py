@@ -16,8 +16,8 @@ from avow.base.records import dataclass
 from avow.language.contract import Node, Port
 from avow.language.sorts import Sort
 from avow.language.terms import Role
-from avow.system.graph import Edge, Graph, wired
-from avow.system.plan import Endpoint, EnvironmentInput, Plan, System
+from avow.system.graph import Graph, wired
+from avow.system.plan import Edge, Endpoint, EnvironmentInput, Plan, System
 
 
 @dataclass(frozen=True, slots=True)

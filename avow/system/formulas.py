@@ -9,8 +9,8 @@ from avow.language.sorts import BOOL
 from avow.language.subterms import histories, ports_of
 from avow.language.terms import Past, Role, Term, Variable
 from avow.system.folding import holders
-from avow.system.graph import Edge, Graph
-from avow.system.plan import Endpoint, System
+from avow.system.graph import Graph
+from avow.system.plan import Edge, Endpoint, System
 from avow.system.temporal import parse_property, parse_state
 
 

@@ -18,26 +18,8 @@ from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
-from avow.system.plan import Connection, Endpoint, System
+from avow.system.plan import Edge, Endpoint, System
 from avow.system.topics import Carrier, Ends, contradicted, ends, unheard, unlinked, wrong_types
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """An output that feeds an input. `declared`: by the plan, not by names."""
-
-    source: Endpoint
-    target: Endpoint
-    delayed: bool = False
-    initial: str | None = None
-    declared: bool = False
-    topic: str = field(default="", compare=False)
-    """The topic that carries it, by its whole name; empty where an end has none."""
-    span: Span | None = field(default=None, compare=False, repr=False)
-    initial_span: Span | None = field(default=None, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"{self.source} → {self.target}" + (" (delayed)" if self.delayed else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,19 +158,11 @@ def _declared(system: System, faults: list[Diagnostic]) -> list[Edge]:
             notes = (("first connected here", edges[target].span),)
             faults.append(Diagnostic("PLAN122", message, connection.span, notes=notes))
             continue
-        edges[target] = Edge(
-            source,
-            target,
-            connection.delayed,
-            connection.initial,
-            True,
-            span=connection.span,
-            initial_span=connection.initial_span,
-        )
+        edges[target] = connection
     return list(edges.values())
 
 
-def _ports(system: System, connection: Connection) -> tuple[Port, Port] | None:
+def _ports(system: System, connection: Edge) -> tuple[Port, Port] | None:
     try:
         source = system.contract.node(connection.source.node).output(connection.source.port)
         return source, system.contract.node(connection.target.node).input(connection.target.port)
@@ -228,7 +202,7 @@ def _by_topics(nodes: Sequence[Node], taken: Collection[Endpoint], found: Ends, 
             if len(chosen) == 1:
                 at, output = chosen[0]
                 if fits(output.sort, port.sort):
-                    edges.append(Edge(at, target, span=port.span))
+                    edges.append(Edge(at, target, implied=True, span=port.span))
                 else:
                     faults.append(_other_type(at, output, target, port, carrier))
             elif chosen:
@@ -273,7 +247,7 @@ def _by_names(
             others = [(name, output) for name, output in outputs[port.name] if name != node.name]
             if target in taken:
                 edge = taken[target]
-                if not edge.declared or edge.source.node in relays:  # heard on a topic: no connection chose it
+                if edge.implied or edge.source.node in relays:  # heard on a topic: no connection chose it
                     also = [Endpoint(name, o.name) for name, o in others if fits(o.sort, port.sort)]
                     faults += [_beside(edge, at, port) for at in also if at not in found.outputs]
                 continue
@@ -289,7 +263,7 @@ def _by_names(
             fitting = [(name, output) for name, output in others if fits(output.sort, port.sort)]
             if len(fitting) == 1:
                 name, output = fitting[0]
-                edges.append(Edge(Endpoint(name, output.name), target, span=port.span))
+                edges.append(Edge(Endpoint(name, output.name), target, implied=True, span=port.span))
             elif fitting:
                 faults.append(_several(target, [name for name, _ in fitting], port))
             elif others:

@@ -10,7 +10,8 @@ from itertools import pairwise
 from avow.base.graphs import components
 from avow.base.records import dataclass
 from avow.base.tuning.shown import NODES_DRAWN, SUBSYSTEMS_DRAWN
-from avow.system.graph import Edge, Graph
+from avow.system.graph import Graph
+from avow.system.plan import Edge
 
 _WIDTH, _HEIGHT = 150, 46
 _GAP_X, _GAP_Y = 110, 34

@@ -18,7 +18,7 @@ from avow.language.contract import Contract
 from avow.ros.names import Placed, Resolver
 from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
-from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
+from avow.system.plan import Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
 
 Load = Callable[[Path], System]
 
@@ -86,13 +86,13 @@ def _taken_in(
 
     graph = dataflow(part)
     connections = tuple(
-        Connection(
-            Endpoint(called(e.source.node), e.source.port),
-            Endpoint(called(e.target.node), e.target.port),
-            e.delayed,
-            e.initial,
-            subsystem.span,
-            e.initial_span,
+        replace(
+            e,
+            source=Endpoint(called(e.source.node), e.source.port),
+            target=Endpoint(called(e.target.node), e.target.port),
+            implied=False,
+            topic="",
+            span=subsystem.span,
         )
         for e in graph.edges
     )

@@ -6,7 +6,7 @@ import re
 
 from avow.base.diagnostics import Diagnostic
 from avow.system.plan import Method
-from avow.system.strict_yaml import Piece, listed
+from avow.system.strict_yaml import Piece
 
 _METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
 
@@ -16,8 +16,7 @@ def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Dia
     found: list[Method] = []
     faults: list[Diagnostic] = []
     used: set[str] = set()
-    methods = piece.at("methods")
-    for item in (methods.items or []) if methods else []:
+    for item in piece.each("methods"):
         method = _method(node, item, used, faults)
         if method is not None:
             found.append(method)
@@ -58,7 +57,7 @@ def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnost
     if piece is None:
         return ()
     where = f"nodes.{node}: {method}: guarantees"
-    names = [part.text for part in listed(piece)]
+    names = piece.texts()
     if not names or not all(names) or piece.entries is not None:
         hint = "leave the key out for all of the node's guarantees, or the method for none"
         faults.append(
@@ -67,4 +66,4 @@ def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnost
     for index, name in enumerate(names):
         if name in names[:index] and piece.items is not None:
             faults.append(Diagnostic("PLAN105", f"{where}: {name!r} stands there twice", piece.items[index].span))
-    return tuple(names)
+    return names

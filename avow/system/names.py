@@ -12,7 +12,7 @@ from avow.language.sorts import BOOL, REAL, FunctionSort
 from avow.system.plan import STEP_LENGTH, Plan
 from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.source_plan import check_memory
-from avow.system.strict_yaml import Piece, listed
+from avow.system.strict_yaml import Piece
 
 _FORMER = {
     "tautology": "not-tautological",
@@ -67,9 +67,9 @@ def _unknown(what: str, name: str, known: Iterable[str], span: Span) -> Diagnost
 
 def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     subsystems = {subsystem.name for subsystem in plan.subsystems}
-    for index, piece in enumerate(listed(root.at("connections"))):
+    for index, piece in enumerate(root.each("connections")):
         for key, side in (("from", "output"), ("to", "input")):
-            for item in listed(piece.at(key)):
+            for item in piece.each(key):
                 name, _, port = item.text.partition(".")
                 where = f"connections[{index}].{key}"
                 if name in subsystems:
@@ -101,7 +101,7 @@ def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
     for name, _, requirement in root.keyed("requirements"):
-        for item in listed(requirement.at("supported_by")):
+        for item in requirement.each("supported_by"):
             owner, dot, clause = item.text.partition(".")
             if item.text in goals or (not dot and owner in nodes):
                 continue
@@ -124,7 +124,7 @@ def _suppositions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
 def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     known = [*nodes, *(subsystem.name for subsystem in plan.subsystems)]
     for name, _, goal in root.keyed("compose"):
-        for item in listed(goal.at("select")):
+        for item in goal.each("select"):
             if item.text not in known:
                 yield _unknown(f"compose.{name}.select: node", item.text, known, item.span)
 
@@ -201,11 +201,11 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
 
 def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     for key in ("expected", "accepted"):
-        for item in listed(root.at(key)):
+        for item in root.each(key):
             obligation = item.at("obligation")
             if obligation is None:
                 continue
-            for piece in (obligation, *listed(item.at("matched"))):
+            for piece in (obligation, *item.each("matched")):
                 if today := renamed(piece.text):
                     message = f"{key}: sanity's {piece.text!r} is now named by the good thing that it states"
                     yield Diagnostic("PLAN106", message, piece.span, hint=f"write {today!r}")

@@ -41,6 +41,10 @@ class Located:
         return self.span
 
 
+NOWHERE = Located({}, Span("", 1, 1, 1, 1))
+"""What nobody has written."""
+
+
 @dataclass(frozen=True, slots=True)
 class Endpoint:
     """``agent.command``: a node's port."""
@@ -53,7 +57,7 @@ class Endpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Connection:
+class Edge:
     """An output that feeds an input. A delayed one carries the value of the step before, first `initial`."""
 
     source: Endpoint
@@ -61,8 +65,15 @@ class Connection:
     delayed: bool = False
     initial: str | None = None
     """An RCL formula over ``out.<port>`` of the source or a value, as text; None: any value."""
+    implied: bool = False
+    """By a topic, or by names and types: the plan has no connection there."""
+    topic: str = field(default="", compare=False)
+    """The topic that carries it, by its whole name; empty where an end has none."""
     span: Span | None = field(default=None, compare=False, repr=False)
     initial_span: Span | None = field(default=None, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.source} → {self.target}" + (" (delayed)" if self.delayed else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +214,7 @@ class Source:
     numbers: Numbers = Numbers.FLOAT64
     memory: Mapping[str, str] = field(default_factory=dict)
     """Port → attribute, without ``self.``."""
-    place: Located = field(default=Located({}, Span("", 1, 1, 1, 1)), compare=False, repr=False)
+    place: Located = field(default=NOWHERE, compare=False, repr=False)
     kind: Driving = Driving.STEP
 
 
@@ -345,21 +356,21 @@ class Plan:
     title: str
     path: Path
     contract_files: tuple[Path, ...]
-    model: Located
-    messages: tuple[Path, ...]
-    connections: tuple[Connection, ...]
-    environment: tuple[EnvironmentInput, ...]
-    scenario: Scenario | None
-    requirements: tuple[Requirement, ...]
-    compose: tuple[ComposeGoal, ...]
-    nodes: tuple[NodePlan, ...]
-    policy: Located
-    expected: tuple[Finding, ...] | None
+    model: Located = NOWHERE
+    messages: tuple[Path, ...] = ()
+    connections: tuple[Edge, ...] = ()
+    environment: tuple[EnvironmentInput, ...] = ()
+    scenario: Scenario | None = None
+    requirements: tuple[Requirement, ...] = ()
+    compose: tuple[ComposeGoal, ...] = ()
+    nodes: tuple[NodePlan, ...] = ()
+    policy: Located = NOWHERE
+    expected: tuple[Finding, ...] | None = None
     """None: no reproduction of known-bad material; a tuple (even empty): strict both ways."""
-    accepted: tuple[Finding, ...]
-    plugins: tuple[str, ...]
+    accepted: tuple[Finding, ...] = ()
+    plugins: tuple[str, ...] = ()
     """Modules that hold further backends."""
-    lints_off: tuple[str, ...]
+    lints_off: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     subsystems: tuple[Subsystem, ...] = ()
     statements: tuple[Statement, ...] = ()

@@ -23,7 +23,7 @@ from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
     Confirmation,
-    Connection,
+    Edge,
     Endpoint,
     EnvironmentInput,
     Finding,
@@ -42,7 +42,7 @@ from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape, without_faults
 from avow.system.source_plan import files_of, read_source
 from avow.system.statements import read_statements, wrong_words
-from avow.system.strict_yaml import Piece, listed, read_yaml
+from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
 
 T = TypeVar("T")
@@ -94,25 +94,7 @@ def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
     """The plan of a system for which nobody wrote one: names link, nothing else is decided."""
     root = files[0].parent if files else Path()
     nowhere = Located({}, Span(str(files[0]) if files else "", 1, 1, 1, 1))
-    return Plan(
-        system=name,
-        title=name,
-        path=root / "plan.yaml",
-        contract_files=files,
-        model=nowhere,
-        messages=(),
-        connections=(),
-        environment=(),
-        scenario=None,
-        requirements=(),
-        compose=(),
-        nodes=(),
-        policy=nowhere,
-        expected=None,
-        accepted=(),
-        plugins=(),
-        lints_off=(),
-    )
+    return Plan(name, name, root / "plan.yaml", files, model=nowhere, policy=nowhere)
 
 
 class _PlanReader:
@@ -128,16 +110,16 @@ class _PlanReader:
 
     def plan(self) -> Plan:
         folder = self.path.resolve().parent.name
-        name = self.text("system") or re.sub(r"[^A-Za-z0-9_-]", "_", folder) or "system"
+        name = self.root.said("system") or re.sub(r"[^A-Za-z0-9_-]", "_", folder) or "system"
         located = {
             key: (self.root.at(key) or Piece(self.root.span, value=None)).located() for key in ("model", "policy")
         }
         self.model_graph()
         scenario = self.scenario()
-        launched = self.noted(read_launched(self.path, self.items("ros", "launch")))
+        launched = self.noted(read_launched(self.path, self.root.each("ros", "launch")))
         return Plan(
             system=name,
-            title=self.text("title") or name,
+            title=self.root.said("title") or name,
             path=self.path,
             contract_files=self.contract_files(),
             model=located["model"],
@@ -151,8 +133,8 @@ class _PlanReader:
             policy=located["policy"],
             expected=tuple(self.findings("expected")) if self.root.at("expected") else None,
             accepted=tuple(self.findings("accepted")),
-            plugins=tuple(_texts(self.root.at("plugins"))),
-            lints_off=tuple(_texts(self.root.at("lints_off"))),
+            plugins=self.root.texts("plugins"),
+            lints_off=self.root.texts("lints_off"),
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
             statements=self.noted(read_statements(self.root)),
@@ -182,16 +164,7 @@ class _PlanReader:
                 self.fault("PLAN109", message, column.span)
             if not missing:
                 texts = {key: column.text for key, column in columns.items()}
-                places = tuple(_texts(piece.at("places")))
-                yield Picture(name, table.name, texts["x"], texts["y"], texts.get("label"), places)
-
-    def text(self, *keys: str) -> str | None:
-        piece = self.root.at(*keys)
-        return None if piece is None or piece.value is None else piece.text
-
-    def items(self, *keys: str) -> list[Piece]:
-        piece = self.root.at(*keys)
-        return (piece.items or []) if piece is not None else []
+                yield Picture(name, table.name, texts["x"], texts["y"], texts.get("label"), piece.texts("places"))
 
     def resolve(self, piece: Piece) -> Path | None:
         path = inside(self.path.parent, piece.text)
@@ -210,7 +183,7 @@ class _PlanReader:
         return False
 
     def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:
-        for item in listed(self.root.at(*keys)):
+        for item in self.root.each(*keys):
             path = self.resolve(item)
             if path is not None:
                 yield item, path
@@ -232,34 +205,32 @@ class _PlanReader:
         for piece, path in self.paths("model", "graph"):
             self.present(piece, path)
 
-    def connections(self) -> Iterator[Connection]:
-        for piece in self.items("connections"):
+    def connections(self) -> Iterator[Edge]:
+        for piece in self.root.each("connections"):
             entries = piece.entries or {}
             delayed, initial = entries.get("delayed"), entries.get("initial")
             if initial is not None and not (delayed and delayed.value):
                 self.fault("PLAN110", "an initial value needs a delayed edge", initial.span, hint="add  delayed: true")
-            for target in listed(entries["to"]):
-                yield Connection(
+            for target in entries["to"].each():
+                yield Edge(
                     _endpoint(entries["from"].text),
                     _endpoint(target.text),
                     bool(delayed and delayed.value),
                     _value(initial) if initial is not None else None,
-                    target.span,
-                    initial.span if initial is not None else None,
+                    span=target.span,
+                    initial_span=initial.span if initial is not None else None,
                 )
 
     def environment(self) -> Iterator[EnvironmentInput]:
         for port, _, piece in self.root.keyed("environment"):
-            assume = piece.at("assume")
-            because = piece.at("because")
-            constant = piece.at("constant")
+            assume, constant = piece.at("assume"), piece.at("constant")
             if assume is None and constant is not None and constant.entries is not None:
                 message = f"environment.{port}: constant has words of its own only beside an assume"
                 self.fault("PLAN110", message, constant.span, "write  constant: true ; the entry's words are about it")
             yield EnvironmentInput(
                 port,
                 assume.text if assume else None,
-                because.text if because else None,
+                piece.said("because"),
                 piece.span,
                 constant is not None and constant.value is not False,
                 assume.span if assume else None,
@@ -315,15 +286,15 @@ class _PlanReader:
 
     def requirements(self) -> Iterator[Requirement]:
         for name, _, piece in self.root.keyed("requirements"):
-            formula, temporal, text = piece.at("formula"), piece.at("temporal"), piece.at("text")
+            formula, temporal = piece.at("formula"), piece.at("temporal")
             if formula is not None and temporal is not None:
                 self.fault("PLAN110", f"{name}: either formula or temporal, not both", temporal.span)
             yield Requirement(
                 name,
-                text.text if text else "",
-                formula.text if formula else None,
-                temporal.text if temporal else None,
-                tuple(_texts(piece.at("supported_by"))),
+                piece.said("text") or "",
+                piece.said("formula"),
+                piece.said("temporal"),
+                piece.texts("supported_by"),
                 piece.span,
                 (formula or temporal or piece).span,
                 self.confirmation(name, piece.at("confirmed")),
@@ -332,28 +303,25 @@ class _PlanReader:
     def confirmation(self, name: str, piece: Piece | None) -> Confirmation | None:
         if piece is None:
             return None
-        texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items()}
         self.faults += wrong_words(f"requirements.{name}.confirmed", piece, done=("on",))
-        return Confirmation(**texts)
+        return Confirmation(**piece.words())
 
     def goals(self) -> Iterator[ComposeGoal]:
         for name, _, piece in self.root.keyed("compose"):
-            rule = piece.at("rule")
-            select = tuple(_texts(piece.at("select")))
+            select = piece.texts("select")
             for twice in [node for node, count in Counter(select).items() if count > 1]:
                 self.fault("PLAN110", f"compose.{name}.select: {twice!r} is named twice", piece.span)
-            yield ComposeGoal(name, select, rule.text if rule else None, piece.located(), piece.span)
+            yield ComposeGoal(name, select, piece.said("rule"), piece.located(), piece.span)
 
     def subsystems(self) -> Iterator[Subsystem]:
         for name, span, piece in self.root.keyed("subsystems"):
-            nodes, folder, rule = piece.at("nodes"), piece.at("system"), piece.at("rule")
+            nodes, folder = piece.at("nodes"), piece.at("system")
             if nodes is None and folder is None:
                 self.fault("PLAN104", f"subsystems.{name}: either nodes or system is wanted", piece.span)
             if nodes is not None and folder is not None:
                 self.fault("PLAN110", f"subsystems.{name}: either nodes or system, not both", folder.span)
             path = self.beside(folder) if folder is not None else None
-            members = tuple(_texts(nodes))
-            yield Subsystem(name, members, rule.text if rule else None, piece.located(), path, span)
+            yield Subsystem(name, piece.texts("nodes"), piece.said("rule"), piece.located(), path, span)
 
     def beside(self, piece: Piece) -> Path | None:
         """A folder beside the system's, or below it."""
@@ -369,10 +337,9 @@ class _PlanReader:
 
     def nodes(self) -> Iterator[NodePlan]:
         for name, _, piece in self.root.keyed("nodes"):
-            criticality, title = piece.at("criticality"), piece.at("title")
             methods = self.noted(read_methods(name, piece))
-            level = criticality.text if criticality else "medium"
-            words = " ".join(title.text.split()) if title else ""
+            level = piece.said("criticality") or "medium"
+            words = " ".join((piece.said("title") or "").split())
             yield NodePlan(name, level, methods, piece.span, words, self.source(name, piece))
 
     def source(self, name: str, piece: Piece) -> Source | None:
@@ -383,8 +350,8 @@ class _PlanReader:
         return found
 
     def findings(self, key: str) -> Iterator[Finding]:
-        for piece in self.items(key):
-            texts = {name: " ".join(part.text.split()) for name, part in (piece.entries or {}).items()}
+        for piece in self.root.each(key):
+            texts = piece.words()
             self.faults += wrong_words(key, piece)
             matched = piece.at("matched")
             if matched is not None and not is_wild(texts["obligation"]):
@@ -405,7 +372,7 @@ class _PlanReader:
                 texts.get("expires"),
                 texts.get("method"),
                 piece.span,
-                tuple(_texts(matched)),
+                piece.texts("matched"),
                 texts.get("found", ""),
             )
 
@@ -432,7 +399,3 @@ def _endpoint(text: str) -> Endpoint:
 
 def _value(piece: Piece) -> str:
     return plain(piece.value) if isinstance(piece.value, bool) else piece.text
-
-
-def _texts(piece: Piece | None) -> list[str]:
-    return [item.text for item in listed(piece)]

@@ -14,9 +14,8 @@ def read_ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
     piece = root.at("ros")
     if piece is None:
         return Ros(), faults
-    distro = piece.at("distro")
     placed = tuple((node, _placed(node, entry, faults)) for node, _, entry in piece.keyed("nodes"))
-    return Ros(distro.text if distro is not None else None, Resolver(placed)), faults
+    return Ros(piece.said("distro"), Resolver(placed)), faults
 
 
 def _placed(node: str, entry: Piece, faults: list[Diagnostic]) -> Placed:

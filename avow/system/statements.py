@@ -95,7 +95,7 @@ def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
 
 
 def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
-    texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items() if part.items is None}
+    texts = piece.words()
     says = piece.at("says")
     if says is not None:
         number = len(texts["says"].split())

@@ -69,6 +69,24 @@ class Piece:
                 piece = piece.entries.get(step) if piece.entries is not None else None
         return piece
 
+    def each(self, *path: str | int) -> list[Piece]:
+        """The pieces of the list at a path; a piece that is none stands for a list of it alone."""
+        piece = self.at(*path)
+        return [] if piece is None else [piece] if piece.items is None else piece.items
+
+    def texts(self, *path: str | int) -> tuple[str, ...]:
+        """The texts of `each`."""
+        return tuple(item.text for item in self.each(*path))
+
+    def said(self, *path: str | int) -> str | None:
+        """The text at a path; None where there is nothing."""
+        piece = self.at(*path)
+        return None if piece is None else piece.text
+
+    def words(self) -> dict[str, str]:
+        """The texts of a mapping, with single blanks."""
+        return {key: " ".join(part.text.split()) for key, part in (self.entries or {}).items() if part.items is None}
+
     def keyed(self, *path: str | int) -> Iterator[tuple[str, Span, Piece]]:
         """Each key of the mapping at a path, with its place and what stands under it."""
         piece = self.at(*path)
@@ -283,13 +301,6 @@ class _Builder:
 
     def reject(self, event: Any, code: str, message: str) -> Rejected:
         return Rejected(Diagnostic(code, message, self.span(event)))
-
-
-def listed(piece: Piece | None) -> list[Piece]:
-    """The pieces of a list; a piece that is none stands for a list of it alone."""
-    if piece is None:
-        return []
-    return piece.items if piece.items is not None else [piece]
 
 
 def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:

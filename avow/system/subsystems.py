@@ -10,7 +10,7 @@ from avow.base.graphs import components, cycle_in
 from avow.base.suggestions import suggest
 from avow.language.contract import Contract
 from avow.system.folding import leaves, parents
-from avow.system.plan import Connection, Endpoint, Plan, Subsystem
+from avow.system.plan import Edge, Endpoint, Plan, Subsystem
 
 
 def check_subsystems(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
@@ -86,7 +86,7 @@ def resolved(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ..
     """
     inside = leaves(plan)
     faults: list[Diagnostic] = []
-    found: list[Connection] = []
+    found: list[Edge] = []
     outside = [*(c for c in plan.connections if c.target.node not in inside)]
     taken = {connection.target for connection in outside}
     for connection in plan.connections:
@@ -107,7 +107,7 @@ def _having(names: tuple[str, ...], port: str, contract: Contract, side: str) ->
 
 
 def _sources(
-    connection: Connection, inside: dict[str, tuple[str, ...]], contract: Contract, faults: list[Diagnostic]
+    connection: Edge, inside: dict[str, tuple[str, ...]], contract: Contract, faults: list[Diagnostic]
 ) -> list[Endpoint]:
     owner, port = connection.source.node, connection.source.port
     if owner not in inside:
@@ -126,7 +126,7 @@ def _sources(
 
 
 def _targets(
-    connection: Connection,
+    connection: Edge,
     inside: dict[str, tuple[str, ...]],
     contract: Contract,
     taken: set[Endpoint],

@@ -22,7 +22,7 @@ from avow.ros.calls import CALL_PARTS, part_topic
 from avow.ros.definitions import canonical
 from avow.ros.names import Resolver
 from avow.ros.sources import definitions
-from avow.system.plan import Connection, Endpoint, Plan
+from avow.system.plan import Edge, Endpoint, Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
                 yield Diagnostic("ROS116", message, placed.span, Severity.WARNING, hint)
 
 
-def contradicted(connections: Sequence[Connection], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:
+def contradicted(connections: Sequence[Edge], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:
     """Connections whose ends have topics of different names, and those beside which an input hears its topic."""
     for connection in connections:
         source, target = connection.source, connection.target
@@ -221,9 +221,9 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
                 c for c in connections if c.target != target or not (c.source in known or c.source.node in relays)
             ]  # another source contradicts the topics, which `contradicted` tells
             for (source, _), inner in zip(sources, relay.inputs, strict=True):
-                given = next((c for c in mine if c.source == source), Connection(source, target, span=carrier.span))
+                given = next((c for c in mine if c.source == source), Edge(source, target, span=carrier.span))
                 connections.append(replace(given, target=Endpoint(name, inner.name)))
-            connections.append(Connection(Endpoint(name, port.name), target, span=carrier.span))
+            connections.append(Edge(Endpoint(name, port.name), target, span=carrier.span))
     if not nodes:
         return plan, contract, tuple(faults)
     whole = replace(contract, nodes=(*contract.nodes, *nodes))
@@ -231,7 +231,7 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
 
 
 def _sources(
-    target: Endpoint, port: Port, found: Ends, connections: Sequence[Connection]
+    target: Endpoint, port: Port, found: Ends, connections: Sequence[Edge]
 ) -> tuple[tuple[tuple[Endpoint, Port], ...], tuple[tuple[str, str], ...]]:
     """Every output that reaches an input by one of its topics: of each node on each topic the one that carries the
     input's value; and the nodes, with the topic, of which that cannot be told."""

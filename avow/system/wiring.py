@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.system.graph import Edge, Graph
-from avow.system.plan import Endpoint, System
+from avow.system.graph import Graph
+from avow.system.plan import Edge, Endpoint, System
 from avow.system.topics import ends, whole_name
 
 

@@ -15,8 +15,8 @@ from typing import assert_never
 from avow.language.contract import Node
 from avow.language.subterms import ports_of
 from avow.language.terms import Role
-from avow.system.graph import Edge, dataflow
-from avow.system.plan import System
+from avow.system.graph import dataflow
+from avow.system.plan import Edge, System
 
 from .engine import Monitor
 from .tuning import BREACHES_KEPT, BREACHES_OPEN

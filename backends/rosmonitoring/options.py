@@ -21,9 +21,9 @@ from avow.ros.bags import publisher
 from avow.ros.calls import CALL, part_topic
 from avow.ros.definitions import Definitions, Message, Wire
 from avow.ros.sources import definitions
-from avow.system.graph import Edge, dataflow
+from avow.system.graph import dataflow
 from avow.system.paths import inside
-from avow.system.plan import Located, System
+from avow.system.plan import Edge, Located, System
 
 from . import observing
 from .bags import Event, Origin, carried, is_bag
