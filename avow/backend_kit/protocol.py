@@ -305,7 +305,7 @@ class Backend(ABC):
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         """Why a backend that `remembers` cannot be asked about a guarantee that speaks of other steps, or whose node
-        assumes something that does; None where it can. See `avow.backend_kit.runs`."""
+        assumes something that does; None where it can. See `avow.backend_kit.one_step`."""
         return None
 
     def answers_itself(self, job: Job) -> bool:

@@ -4,14 +4,31 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from fractions import Fraction
 
-from avow.base.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.suggestions import suggest
+from avow.base.tuning.bounds import VALUES_LOOKED_AT
 from avow.language.contract import Contract, Node, Port
-from avow.language.sorts import BOOL, REAL, FunctionSort
+from avow.language.load import parse_term
+from avow.language.printer import show_type
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.system.node_plan import check_memory
 from avow.system.plan import STEP_LENGTH, Plan
-from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
-from avow.system.source_plan import check_memory
 from avow.system.strict_yaml import Piece
 
 _FORMER = {
@@ -179,7 +196,7 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
             continue
         given = plan.scenario.table(table)
         for column, cells in zip(columns, (*sort.parameters, sort.result), strict=False):
-            yield from unusable(
+            yield from _unusable(
                 f"scenario.interpret.{name}: {table}.{column}", given.column(column), cells, contract, span
             )
     domains = root.at("scenario", "domains")
@@ -187,16 +204,16 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
     for name, texts in plan.scenario.domains.items():
         span = domains.key_span(name) if domains else root.span
         if name == STEP_LENGTH and name not in types:
-            yield from unusable(f"scenario.domains.{name}", texts, REAL, contract, span)
+            yield from _unusable(f"scenario.domains.{name}", texts, REAL, contract, span)
             continue
-        if name not in BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
-            yield _unknown("scenario.domains: type or port", name, [*BASE_SORTS, *types, *everything], span)
+        if name not in _BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
+            yield _unknown("scenario.domains: type or port", name, [*_BASE_SORTS, *types, *everything], span)
             continue
         place = (domains.at(name) or domains).span if domains else root.span
-        named = BASE_SORTS.get(name) or types.get(name)
-        sorts = [named] if named else [domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
+        named = _BASE_SORTS.get(name) or types.get(name)
+        sorts = [named] if named else [_domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
         if len(set(sorts)) == 1 and not isinstance(sorts[0], FunctionSort):
-            yield from unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
+            yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
 
 
 def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
@@ -212,3 +229,47 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
             owner = obligation.text.split("/")[0]
             if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
                 yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)
+
+
+# -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------
+
+_BASE_SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
+
+
+def _unusable(where: str, texts: tuple[str, ...], sort: Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
+    """The first of the values that is none of the sort."""
+    for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
+        reason = _wrong(text, sort, contract)
+        if reason is not None:
+            message = f"{where}: {text!r} is no value of {show_type(sort)}: {reason}"
+            yield Diagnostic("PLAN109", message, span)
+            return
+
+
+def _domain_sort(sort: Sort) -> Sort:
+    """What the values under ``domains`` of a port are: a relation's are places, another function's its results."""
+    if not isinstance(sort, FunctionSort):
+        return sort
+    if sort.result != BOOL:
+        return sort.result
+    return sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
+
+
+def _wrong(text: str, sort: Sort, contract: Contract) -> str | None:
+    match sort:
+        case OpaqueSort() | StringSort():
+            return None
+        case RealSort() | IntegerSort() | NaturalSort():
+            try:
+                number = Fraction(text)
+            except (ValueError, ZeroDivisionError):
+                pass  # perhaps arithmetic, or a constant's name
+            else:
+                if isinstance(sort, RealSort) or number.denominator == 1:
+                    return "it is negative" if isinstance(sort, NaturalSort) and number < 0 else None
+                return "it is not whole"
+    try:
+        parse_term(text, None, contract, sort=sort)
+    except Rejected as rejected:
+        return rejected.diagnostics[0].message
+    return None

@@ -17,8 +17,9 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
+from avow.ros.names import Placed, Resolver, is_name
 from avow.system.launched import read_launched
-from avow.system.methods_plan import read_methods
+from avow.system.node_plan import files_of, read_methods, read_source
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
@@ -32,15 +33,14 @@ from avow.system.plan import (
     Picture,
     Plan,
     Requirement,
+    Ros,
     Scenario,
     Source,
     Subsystem,
     Table,
     is_wild,
 )
-from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape, without_faults
-from avow.system.source_plan import files_of, read_source
 from avow.system.statements import read_statements, wrong_words
 from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
@@ -138,7 +138,7 @@ class _PlanReader:
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
             statements=self.noted(read_statements(self.root)),
-            ros=self.noted(read_ros(self.root)),
+            ros=self.noted(_ros(self.root)),
             launched=launched,
             included=launched.files if launched is not None else (),
         )
@@ -399,3 +399,37 @@ def _endpoint(text: str) -> Endpoint:
 
 def _value(piece: Piece) -> str:
     return plain(piece.value) if isinstance(piece.value, bool) else piece.text
+
+
+# -- how nodes and topics are called -----------------------------------------------------------------------------------
+
+
+def _ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
+    """What a well-shaped plan says of ROS, and what is wrong with the names in it."""
+    faults: list[Diagnostic] = []
+    piece = root.at("ros")
+    if piece is None:
+        return Ros(), faults
+    placed = tuple((node, _placed(node, entry, faults)) for node, _, entry in piece.keyed("nodes"))
+    return Ros(piece.said("distro"), Resolver(placed)), faults
+
+
+def _placed(node: str, entry: Piece, faults: list[Diagnostic]) -> Placed:
+    name = entry.at("name")
+    whole = f"/{name.text.lstrip('/')}" if name is not None else f"/{node}"
+    if name is not None and not is_name(name.text):
+        faults.append(_no_name(f"ros.nodes.{node}.name", name))
+    remaps: list[tuple[str, str]] = []
+    for old, span, new in entry.keyed("remap"):
+        if not is_name(old):
+            faults.append(_no_name(f"ros.nodes.{node}.remap", Piece(span, text=old)))
+        elif not is_name(new.text):
+            faults.append(_no_name(f"ros.nodes.{node}.remap.{old}", new))
+        else:
+            remaps.append((old, new.text))
+    return Placed(whole, tuple(remaps), entry.span, name is not None)
+
+
+def _no_name(where: str, piece: Piece) -> Diagnostic:
+    hint = "letters, digits and _, set apart by /, with / or ~ before it"
+    return Diagnostic("PLAN105", f"{where}: {piece.text!r} is no name that ROS takes", piece.span, hint=hint)

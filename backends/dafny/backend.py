@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avow.backend_kit.given import existing_file, file, file_path, schema, told
+from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
-from avow.backend_kit.runs import unsaid
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular

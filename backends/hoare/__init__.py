@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from avow.backend_kit.given import file, schema
+from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
-from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Verdict

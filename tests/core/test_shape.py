@@ -43,7 +43,7 @@ ELSEWHERE = {
     "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
-    "avow/base/file_systems._known": ONCE,
+    "avow/base/files._known": ONCE,
     "avow/base/process.here": PROCESS,
     "avow/base/tools.libraries": ONCE,
     "avow/calculus/kept_answers._kept": "where a work's answers are kept, for the time of that work",
@@ -252,8 +252,7 @@ def test_a_constant_is_none() -> None:
 
 
 GIVEN = {
-    "avow/base/file_systems.py",  # /proc/self/mountinfo
-    "avow/base/files.py",
+    "avow/base/files.py",  # /proc/self/mountinfo
     "avow/cli/from_ros.py",  # a listing may come through a pipe, as what the next three read
     "avow/assurance/requirements_import.py",
     "avow/evidence/signing.py",

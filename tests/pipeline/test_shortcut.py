@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence, guarantee
 
-from avow.base import file_systems, files
+from avow.base import files
 from avow.base.codec import to_json
 from avow.base.files import sha256
 from avow.base.tools import package_digest
@@ -107,8 +107,8 @@ def test_where_times_of_change_can_be_set_back_the_bytes_count(
     """FAT, some of the network; a second in which a file was written twice. For all that the shortcut looks at."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     if times == "set back":
-        monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
-    monkeypatch.setattr(file_systems, "_known", {})
+        monkeypatch.setattr(files, "_mounts", lambda: (("/", "vfat"),))
+    monkeypatch.setattr(files, "_known", {})
     monkeypatch.setattr(files, "SETTLED_NS", 10**12)  # however long this test takes, it is the same moment
     Restoring(monkeypatch, times)
     workspace = Workspace(tmp_path / "w")
@@ -161,12 +161,12 @@ def test_a_whole_second_that_is_over_tells_a_file(tmp_path: Path, monkeypatch: p
     assert looked_at(0)
     assert looked_at(-100), "from the future: the clock was set back"
     assert not looked_at(100)
-    monkeypatch.setattr(file_systems, "_mounts", lambda: (("/", "vfat"),))
-    monkeypatch.setattr(file_systems, "_known", {})
+    monkeypatch.setattr(files, "_mounts", lambda: (("/", "vfat"),))
+    monkeypatch.setattr(files, "_known", {})
     assert looked_at(100)
 
 
-@pytest.mark.skipif(file_systems._kind("/dev/shm") != "tmpfs", reason="no file system in memory here")
+@pytest.mark.skipif(files._kind("/dev/shm") != "tmpfs", reason="no file system in memory here")
 def test_what_is_written_through_a_mapping_in_memory_is_seen() -> None:
     """The first change moves the file's times, the next does not."""
     with tempfile.NamedTemporaryFile(dir="/dev/shm") as file:
@@ -189,8 +189,8 @@ def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, m
     ]
     mounts = tmp_path / "mountinfo"
     mounts.write_text("\n".join(lines) + "\n")
-    monkeypatch.setattr(file_systems, "_MOUNTS", mounts)
-    kinds = {p: file_systems._kind(p) for p in ("/", "/home/a", "/media/x", "/media/my stick/a", "/mediax")}
+    monkeypatch.setattr(files, "_MOUNTS", mounts)
+    kinds = {p: files._kind(p) for p in ("/", "/home/a", "/media/x", "/media/my stick/a", "/mediax")}
     assert kinds == {
         "/": "ext4",
         "/home/a": "ext4",
@@ -198,20 +198,20 @@ def test_kinds_of_file_systems_are_told_by_the_innermost_mount(tmp_path: Path, m
         "/media/my stick/a": "vfat",
         "/mediax": "ext4",
     }
-    assert file_systems._kind("/media/my stick/data/a") == "ext4"
+    assert files._kind("/media/my stick/data/a") == "ext4"
     mounts.unlink()
-    assert file_systems._kind("/home/a") == ""  # no Linux: nobody says, and the bytes count
+    assert files._kind("/home/a") == ""  # no Linux: nobody says, and the bytes count
 
 
 def test_what_is_mounted_later_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An editor's server runs for days; a stick that is put in meanwhile has a device that nobody saw."""
     mounts, root = tmp_path / "mountinfo", "23 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw\n"
     mounts.write_text(root)
-    monkeypatch.setattr(file_systems, "_MOUNTS", mounts)
-    monkeypatch.setattr(file_systems, "_known", {})
-    assert file_systems.keeps_changes("/home/a", 1)
+    monkeypatch.setattr(files, "_MOUNTS", mounts)
+    monkeypatch.setattr(files, "_known", {})
+    assert files.keeps_changes("/home/a", 1)
     mounts.write_text(f"{root}24 23 8:2 / /media/stick rw - vfat /dev/sdb1 rw\n")
-    assert not file_systems.keeps_changes("/media/stick/a", 2)
+    assert not files.keeps_changes("/media/stick/a", 2)
 
 
 def test_where_a_contract_was_edited_what_earlier_runs_wrote_is_not_looked_at(
