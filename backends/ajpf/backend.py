@@ -13,6 +13,9 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
+from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
+from avow.language.subterms import subterms
+from avow.language.terms import Arithmetic, Compare, Negative, Operation, Term
 
 from .codes import CODES
 from .schema import SCHEMA
@@ -47,9 +50,13 @@ class AjpfBackend(Backend):
         return (ajpf_tool.tool(), spin_tool.tool())
 
     def suits(self, node: Node) -> bool:
-        from .suits import looks_like_an_agent
-
-        return looks_like_an_agent(node)
+        """Agents decide: some output is a choice, none is a number or a table of numbers, and no clause measures. What
+        compares or computes measured values is a program's affair, and Gwendolen has no arithmetic for it."""
+        sorts = [port.sort for port in node.outputs]
+        decides = any(
+            isinstance(sort, DataSort) or (isinstance(sort, EnumSort) and len(sort.members) > 1) for sort in sorts
+        )
+        return decides and not any(map(_is_measured, sorts)) and not any(_measures(c.formula) for c in node.clauses)
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         from .timing import unsaid
@@ -59,13 +66,12 @@ class AjpfBackend(Backend):
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .instances import diagnose, instances
         from .options import read
-        from .vocabulary import unknown_words
 
         try:
             setup = read(job)
         except Rejected as error:
             return error.diagnostics
-        return (*diagnose(job, setup, instances(job, setup)), *unknown_words(job, setup))
+        return tuple(diagnose(job, setup, instances(job, setup)))
 
     def files(self, job: Job) -> tuple[Path, ...]:
         return tuple(path for key in ("program", "environment") if (path := file_path(job, key)) is not None)
@@ -82,3 +88,17 @@ class AjpfBackend(Backend):
         from .run import settle
 
         return settle(job, folder, limits, self.version)
+
+
+def _is_measured(sort: Sort) -> bool:
+    return isinstance(sort, RealSort) or (isinstance(sort, FunctionSort) and isinstance(sort.result, RealSort))
+
+
+def _measures(formula: Term) -> bool:
+    for term in subterms(formula):
+        match term:
+            case Arithmetic(sort=RealSort()) | Negative(sort=RealSort()) | Operation(sort=RealSort()):
+                return True
+            case Compare(operator="<" | "<=" | ">" | ">=", left=left) if isinstance(left.sort, RealSort):
+                return True
+    return False

@@ -1,4 +1,4 @@
-"""Model checking of properties on an explored state graph; vacuity; runs that refute."""
+"""Model checking of properties on an explored state graph, made smaller up to stuttering; vacuity; runs that refute."""
 
 from __future__ import annotations
 
@@ -9,19 +9,95 @@ from functools import cache
 from typing import Any
 
 from avow.base.graphs import strong_components
-from avow.formulas.lasso import Fair, Lasso
+from avow.formulas.lasso import Fair, Lasso, accepted_run
 from avow.formulas.ltl import Automaton
 
-from .automaton import build, compiled
 from .explore import Graph, System
-from .fixed_beliefs import standing
 from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
-from .psl import Atom, Formula, Modality, Not, atoms, conjunction
-from .structure import Kripke, find_lasso, reduce
+from .psl import Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
 from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
-from .tautology import Laws, is_valid
+from .tautology import Laws, is_valid, standing
+
+
+@dataclass(frozen=True, slots=True)
+class Kripke:
+    """States by numbers, their successors, and a label for each: a bit set. Runs are endless: one that comes to a state
+    without successors is none."""
+
+    initial: tuple[int, ...]
+    successors: Sequence[Sequence[int]]
+    labels: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+
+def reduce(graph: Kripke) -> Kripke:
+    """A smaller graph with the same runs up to stuttering (and up to nothing else: endless stuttering stays).
+
+    States of one label that reach each other become one with a loop; a state whose only way leads to a state of its
+    own label becomes that state. Properties without "next" do not see the difference.
+    """
+    labels, successors = graph.labels, graph.successors
+
+    def alike(node: int) -> list[int]:
+        label = labels[node]
+        return [t for t in successors[node] if labels[t] == label]
+
+    number = [-1] * len(labels)
+    new_successors: list[tuple[int, ...]] = []
+    new_labels: list[int] = []
+    seen: dict[tuple[int, bool, tuple[int, ...]], int] = {}
+    pending: list[tuple[int, list[int], bool]] = []
+    # Components come after those that they reach along equal labels, so "only way leads to its own label" is known.
+    for component in strong_components(range(len(labels)), alike):
+        label = labels[component[0]]
+        members = set(component)
+        loop = len(component) > 1 or component[0] in successors[component[0]]
+        outside = [t for node in component for t in successors[node] if t not in members]
+        same = {number[t] for t in outside if labels[t] == label}
+        different = any(labels[t] != label for t in outside)
+        if not loop and not different and len(same) == 1:
+            target = next(iter(same))
+        else:
+            target = len(pending)
+            pending.append((label, outside, loop))
+        for node in component:
+            number[node] = target
+    merged = list(range(len(pending)))
+    for at, (label, outside, loop) in enumerate(pending):
+        targets = sorted({number[t] for t in outside} | ({at} if loop else set()))
+        key = (label, loop, tuple(t for t in targets if t != at))
+        known = seen.setdefault(key, at)
+        merged[at] = known
+        new_labels.append(label)
+        new_successors.append(tuple(targets))
+    initial = tuple(dict.fromkeys(merged[number[s]] for s in graph.initial))
+    successors_now = [tuple(dict.fromkeys(merged[t] for t in targets)) for targets in new_successors]
+    return _reachable(Kripke(initial, successors_now, new_labels))
+
+
+def _reachable(graph: Kripke) -> Kripke:
+    order: dict[int, int] = {s: i for i, s in enumerate(graph.initial)}
+    queue = list(graph.initial)
+    for node in queue:
+        for target in graph.successors[node]:
+            if target not in order:
+                order[target] = len(order)
+                queue.append(target)
+    return Kripke(
+        tuple(range(len(graph.initial))),
+        [tuple(order[t] for t in graph.successors[node]) for node in queue],
+        [graph.labels[node] for node in queue],
+    )
+
+
+def find_lasso(graph: Kripke, automaton: Automaton[Formula], fair: Sequence[Fair] = ()) -> Lasso | None:
+    """A fair run of the graph that the automaton accepts, or None if there is none."""
+    following, labels = graph.successors.__getitem__, graph.labels.__getitem__
+    return accepted_run(graph.initial, following, labels, automaton, fair)
 
 
 class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
@@ -89,7 +165,7 @@ class Checker:
         return Kripke(self.graph.initial, [self.graph.after(s) for s in range(len(self.graph))], labels)
 
     def check(self, wanted: Property, deadline: float | None = None) -> Result:
-        """Raises OutOfTime, automaton.TooLarge."""
+        """Raises OutOfTime, ltl.TooLarge."""
         if deadline is not None and time.monotonic() > deadline:
             raise OutOfTime
         automaton, fair, labels = self._projected(wanted, self.reduced.labels)
@@ -145,7 +221,7 @@ class Checker:
         return frozenset(filter(compiled(formula, self.places), set(self.reduced.labels)))
 
     def _projected(self, wanted: Property, labels: Sequence[int]) -> tuple[Automaton[Formula], list[Fair], list[int]]:
-        automaton = build(Not(wanted.formula))
+        automaton = automaton_of(Not(wanted.formula))
         low, base = len(automaton.leaves), len(self.atoms)
         tests = [compiled(leaf, self.places) for leaf in automaton.leaves]
         new: dict[int, int] = {}

@@ -12,10 +12,9 @@ from typing import Any, Protocol
 from .beliefs import TooDeep
 from .builtin import Crash
 from .environment import Environment
-from .interpreter import Agent, Semantics, State
+from .interpreter import Agent, Semantics, State, World
 from .syntax import Struct
 from .tuning import INTENTIONS, STATES
-from .world import World
 
 
 class System(Protocol):

@@ -11,16 +11,16 @@ without a plan stands still under an event `-!g`; an initial goal enters the goa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
 from typing import NamedTuple
 
-from .environment import Environment
+from .environment import Choice, Environment
 from .intentions import PERCEPTION, START, achieve, of_deed, of_event, perform
-from .mind import NONE, Done, Mind
+from .mind import NONE, Done, Mind, Table
 from .syntax import Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
-from .world import World
 
 
 class Semantics(StrEnum):
@@ -33,6 +33,36 @@ class Semantics(StrEnum):
     EDGE = "edge"
     """AIL's rule "Direct Perception with Events": what changes is believed at once, and is an event; and ``*f`` wakes
     when f has become derivable."""
+
+
+class World:
+    """An environment whose draws have numbers (`choices`)."""
+
+    def __init__(self, environment: Environment) -> None:
+        self.environment = environment
+        self.choices: Table[Choice] = Table()
+        self.before = self.choices.number(environment.before)
+        self.after = cache(self._after)
+        self.offers = cache(self._offers)
+
+    def first(self) -> tuple[int, ...]:
+        """The first draws."""
+        return self._draws(self.environment.before, self.environment.start)
+
+    def drawn(self, choice: int) -> tuple[Struct, ...]:
+        """What is on offer, in the order of the environment's groups."""
+        return self.environment.percepts(self.choices.items[choice])
+
+    def _after(self, choice: int, action: str) -> tuple[int, ...]:
+        """Everything that can be drawn after an action; the draw of an idle agent is that after ``""``."""
+        return self._draws(self.choices.items[choice], self.environment.after.get(action, {}))
+
+    def _draws(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
+        return tuple(self.choices.number(d) for d in self.environment.draws(choice, narrowed))
+
+    def _offers(self, choice: int) -> tuple[Struct, ...]:
+        """Percepts in the order in which they are taken up: that of their texts."""
+        return tuple(sorted(set(self.environment.percepts(self.choices.items[choice])), key=plain))
 
 
 class State(NamedTuple):

@@ -9,12 +9,11 @@ from typing import Any
 
 from avow.formulas.ltl import Automaton
 
-from .automaton import build, compiled
 from .builtin import Crash
 from .checker import Property, label_states
 from .explore import Graph, System
 from .mind import Table
-from .psl import Formula, Not, atoms
+from .psl import Formula, Not, atoms, automaton_of, compiled
 from .tuning import TAIL
 
 
@@ -45,11 +44,11 @@ class _Part:
 
 def open_part(system: System, wanted: Property, states: int, seconds: float) -> Graph | None:
     """The states in which the property is neither kept nor broken for good, and those next to them: enough to decide
-    it. None where the bounds do not let it be found. Raises automaton.TooLarge, TooDeep."""
+    it. None where the bounds do not let it be found. Raises ltl.TooLarge, TooDeep."""
     if system.environment.fair:
         return None
     deadline = time.monotonic() + seconds
-    automaton = build(Not(wanted.formula))
+    automaton = automaton_of(Not(wanted.formula))
     places = {atom: at for at, atom in enumerate(dict.fromkeys(atoms(wanted.formula)))}
     tests = [compiled(leaf, places) for leaf in automaton.leaves]
     useful, lost = _useful(automaton), _lost(automaton)

@@ -10,12 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from .environment import Environment
-from .interpreter import PRINT, Agent, Semantics
+from .interpreter import PRINT, Agent, Semantics, World
 from .mind import NONE
 from .parser import parse_fact, read_system
 from .syntax import Struct, plain
 from .tuning import LIVE_JOBS
-from .world import World
 
 
 class Endless(RuntimeError):  # noqa: N818 - it says what the program is

@@ -21,11 +21,10 @@ from avow.system.schema import violations
 
 from .environment import Environment, read_environment
 from .interpreter import Semantics
-from .mapping import Row
+from .mapping import Row, domain_of
 from .parser import read_system
 from .psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from .psl_parser import Malformed, index_names, instantiate, parse_psl
-from .scenario import domain_of
 from .schema import SCHEMA
 from .shape import TooComplex, shape
 from .syntax import Program

@@ -1,17 +1,21 @@
 """AJPF's property specification language: formulas, and how they are written so that AJPF reads what is meant.
 
-AJPF's grammar has traps: ``||`` binds tighter than ``&``,
-``->`` associates to the left, ``<>[]p`` loses its inner operator. The printer brackets whatever is no proposition.
+AJPF's grammar has traps: ``||`` binds tighter than ``&``, ``->`` associates to the left, ``<>[]p`` loses its inner
+operator. The printer brackets whatever is no proposition. As automata, properties are over *leaves*: the greatest parts
+without temporal operators, which are tests of one state.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import assert_never
 
+from avow.formulas import ltl
 from avow.formulas.flattening import joined
+from avow.formulas.ltl import Automaton
 
 from .syntax import Struct, Term, Var
 
@@ -158,37 +162,50 @@ def negation(formula: Formula) -> Formula:
             return Not(formula)
 
 
-def show(formula: Formula) -> str:
-    """As AJPF reads it."""
+@dataclass(frozen=True, slots=True)
+class Notation:
+    """How formulas are written, where brackets stand around whatever is no proposition."""
+
+    atom: Callable[[Atom], str]
+    truth: tuple[str, str]
+    """False and true."""
+    no: str
+    both: str
+    release: str
+
+
+def _atom(atom: Atom) -> str:
+    who = "" if atom.modality is Modality.PERCEPT else f"{atom.agent}, "
+    return f"{atom.modality}({who}{show_term(atom.term)})"
+
+
+_AJPF = Notation(_atom, ("F", "T"), "~", "&", "R")
+
+
+def show(formula: Formula, written: Notation = _AJPF) -> str:
+    """As AJPF reads it, unless it is written for others."""
     match formula:
-        case Atom(modality=Modality.PERCEPT, term=term):
-            return f"P({show_term(term)})"
-        case Atom(modality=modality, agent=agent, term=term):
-            return f"{modality}({agent}, {show_term(term)})"
+        case Atom():
+            return written.atom(formula)
         case Truth(value=value):
-            return "T" if value else "F"
-        case Not(body=body):
-            return f"~{_operand(body)}"
-        case Always(body=body):
-            return f"[] {_operand(body)}"
-        case Eventually(body=body):
-            return f"<> {_operand(body)}"
-        case And(items=items):
-            return " & ".join(map(_operand, items)) if items else "T"
-        case Or(items=items):
-            return " || ".join(map(_operand, items)) if items else "F"
-        case Implies(left=left, right=right):
-            return f"{_operand(left)} -> {_operand(right)}"
-        case Until(left=left, right=right):
-            return f"{_operand(left)} U {_operand(right)}"
-        case Release(left=left, right=right):
-            return f"{_operand(left)} R {_operand(right)}"
+            return written.truth[value]
+        case And(items=()) | Or(items=()):
+            return written.truth[isinstance(formula, And)]
+        case Not() | Always() | Eventually():
+            sign = {Not: written.no, Always: "[] ", Eventually: "<> "}[type(formula)]
+            return f"{sign}{_operand(formula.body, written)}"
+        case And() | Or() | Implies() | Until() | Release():
+            between = {And: written.both, Or: "||", Implies: "->", Until: "U", Release: written.release}
+            return f" {between[type(formula)]} ".join(_operand(part, written) for part in parts(formula))
+        case _:
+            assert_never(formula)
 
 
-def _operand(formula: Formula) -> str:
-    if isinstance(formula, And | Or) and len(formula.items) < 2:
-        return _operand(formula.items[0]) if formula.items else ("T" if isinstance(formula, And) else "F")
-    return show(formula) if isinstance(formula, Atom | Truth) else f"({show(formula)})"
+def _operand(formula: Formula, written: Notation) -> str:
+    while isinstance(formula, And | Or) and len(formula.items) == 1:
+        (formula,) = formula.items
+    alone = isinstance(formula, Atom | Truth) or not parts(formula)
+    return show(formula, written) if alone else f"({show(formula, written)})"
 
 
 def show_term(term: Term) -> str:
@@ -200,3 +217,57 @@ def show_term(term: Term) -> str:
 def show_template(formula: Formula) -> str:
     """For people: index terms as the plan writes them."""
     return re.sub(r"([+-])\((\w+), (\w+)\)", r"\2 \1 \3", show(formula))
+
+
+def automaton_of(formula: Formula) -> Automaton[Formula]:
+    """The automaton that accepts just the runs on which the formula holds. Raises TooLarge."""
+    return ltl.build(_normal(formula, True))
+
+
+def _normal(formula: Formula, positive: bool) -> ltl.Normal[Formula]:
+    if isinstance(formula, Truth):
+        return ltl.join((), formula.value is positive)
+    if isinstance(formula, Not):
+        return _normal(formula.body, not positive)
+    if not is_temporal(formula):
+        return ltl.Lit(formula, positive)
+    match formula:
+        case And(items=items) | Or(items=items):
+            return ltl.join([_normal(i, positive) for i in items], isinstance(formula, And) is positive)
+        case Implies(left=left, right=right):
+            return ltl.join([_normal(left, not positive), _normal(right, positive)], not positive)
+        case Always(body=body):
+            return ltl.always(_normal(body, positive), positive)
+        case Eventually(body=body):
+            return ltl.eventually(_normal(body, positive), positive)
+        case Until(left=left, right=right):
+            return ltl.until(_normal(left, positive), _normal(right, positive), positive)
+        case Release(left=left, right=right):
+            return ltl.until(_normal(left, positive), _normal(right, positive), not positive)
+        case Atom():
+            raise AssertionError("an atom is not temporal")
+        case _:
+            assert_never(formula)
+
+
+def compiled(formula: Formula, places: Mapping[Atom, int]) -> Callable[[int], bool]:
+    """A formula without temporal operators as a test of a state's label, a bit set of atoms."""
+    match formula:
+        case Atom():
+            bit = 1 << places[formula]
+            return lambda label: bool(label & bit)
+        case Truth(value=value):
+            return lambda label: value
+        case Not(body=body):
+            inner = compiled(body, places)
+            return lambda label: not inner(label)
+        case And(items=items):
+            tests = [compiled(i, places) for i in items]
+            return lambda label: all(test(label) for test in tests)
+        case Or(items=items):
+            tests = [compiled(i, places) for i in items]
+            return lambda label: any(test(label) for test in tests)
+        case Implies(left=left, right=right):
+            first, second = compiled(left, places), compiled(right, places)
+            return lambda label: not first(label) or second(label)
+    raise AssertionError(formula)

@@ -13,10 +13,9 @@ from typing import NamedTuple, TypeVar
 from .beliefs import apart
 from .environment import Environment
 from .intentions import of_event
-from .interpreter import PRINT, Agent, Semantics, State
+from .interpreter import PRINT, Agent, Semantics, State, World
 from .mind import NONE, Table
 from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, Term, name_of, plain
-from .world import World
 
 T = TypeVar("T")
 

@@ -82,8 +82,9 @@ def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, s
         lines.append(f"  :: atomic {{ c_expr {{ MORE_{way} }} -> c_code {{ go(HERE, {way}); }} }}")
     lines += ["  od", "}", ""]
     premise = [f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)]
+    notation = psl.Notation(lambda atom: f"a{checker.places[atom]}", ("false", "true"), "!", "&&", "V")
     for number, p in enumerate(properties):
-        formula = _ltl(p.formula, checker.places)
+        formula = psl.show(p.formula, notation)
         whole = f"(!({' && '.join(premise)})) || ({formula})" if premise else formula
         lines.append(f"ltl c{number} {{ {whole} }}")
     runner = {path.name: path.read_text(encoding="utf-8") for path in promela.RUNNER}
@@ -110,27 +111,3 @@ def _verdict(folder: Path, claim: str, deepest: int, deadline: float, outside: O
     if found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
         raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")
     return found[1] == "0"
-
-
-def _ltl(formula: psl.Formula, places: Mapping[psl.Atom, int]) -> str:
-    match formula:
-        case psl.Atom():
-            return f"a{places[formula]}"
-        case psl.Truth(value=value):
-            return "true" if value else "false"
-        case psl.Not(body=body):
-            return f"(! {_ltl(body, places)})"
-        case psl.And(items=items):
-            return f"({' && '.join(_ltl(i, places) for i in items)})"
-        case psl.Or(items=items):
-            return f"({' || '.join(_ltl(i, places) for i in items)})"
-        case psl.Implies(left=left, right=right):
-            return f"({_ltl(left, places)} -> {_ltl(right, places)})"
-        case psl.Always(body=body):
-            return f"([] {_ltl(body, places)})"
-        case psl.Eventually(body=body):
-            return f"(<> {_ltl(body, places)})"
-        case psl.Until(left=left, right=right):
-            return f"({_ltl(left, places)} U {_ltl(right, places)})"
-        case psl.Release(left=left, right=right):
-            return f"({_ltl(left, places)} V {_ltl(right, places)})"

@@ -16,11 +16,10 @@ from avow.base.verdict import Counterexample
 from avow.formulas.lasso import Lasso
 
 from . import psl
-from .automaton import compiled
 from .checker import Property, label_states
 from .explore import Graph, System
 from .mapping import Row
-from .psl import Always, Atom, Eventually, Formula, Implies, Release, Until
+from .psl import Always, Atom, Eventually, Formula, Implies, Release, Until, compiled
 from .psl_parser import Malformed, index_names, instantiate
 from .syntax import Struct, Term, show
 from .tuning import INDICES_TRIED

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.backends.ajpf import promela
+from avow.backends.ajpf.checker import Kripke
 from avow.backends.ajpf.explore import System
 from avow.backends.ajpf.psl import Atom
-from avow.backends.ajpf.structure import Kripke
 
 _DRIVER = r"""
 #include <stdio.h>

@@ -12,10 +12,10 @@ from small_agents import case
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.files import program_text
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.mind import NONE
 from avow.backends.ajpf.parser import parse_fact, parse_system
-from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
 from avow.backends.ajpf.society import system
 from avow.backends.ajpf.syntax import show, show_deed, show_event

@@ -13,17 +13,16 @@ from test_ajpf_ltl import Not as Negation
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, psl
-from avow.backends.ajpf.automaton import compiled
 from avow.backends.ajpf.checker import label_states
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.fixed_beliefs import standing
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.parser import parse_system
+from avow.backends.ajpf.psl import compiled
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.society import system
 from avow.backends.ajpf.syntax import Struct
-from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid
+from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid, standing
 from avow.backends.ajpf.tuning import TAUTOLOGY_CASES
 from avow.base.verdict import Verdict
 from avow.sanity.mutants import mutants

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from avow.backends.ajpf.automaton import build, compiled
+from avow.backends.ajpf.checker import Kripke, find_lasso, reduce
 from avow.backends.ajpf.psl import (
     FALSE,
     TRUE,
@@ -27,9 +27,10 @@ from avow.backends.ajpf.psl import (
     Or,
     Release,
     Until,
+    automaton_of,
+    compiled,
     parts,
 )
-from avow.backends.ajpf.structure import Kripke, find_lasso, reduce
 from avow.backends.ajpf.syntax import Struct
 from avow.formulas.lasso import Fair
 
@@ -50,7 +51,7 @@ def project(graph: Kripke, automaton) -> Kripke:
 
 def satisfiable(graph: Kripke, formula, fair: bool, *, small: bool):
     """A fair run of the graph on which the formula holds, by the code under test."""
-    automaton = build(formula)
+    automaton = automaton_of(formula)
     projected = project(graph, automaton)
     if small:
         projected = reduce(projected)

@@ -16,14 +16,13 @@ from small_agents import case, formula
 from small_societies import society
 
 from avow.backends.ajpf import spin, spin_tool
-from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
+from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts, reduce
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.parser import parse_system, read_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
-from avow.backends.ajpf.structure import reduce
 from avow.base.process import Completed
 from avow.isolation.outside import Outside
 

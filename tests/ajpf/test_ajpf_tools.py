@@ -16,11 +16,11 @@ from avow.backends.ajpf.asking import ask, keep, recall
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.files import program_text
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.java import environment_class
 from avow.backends.ajpf.options import Setup
 from avow.backends.ajpf.parser import parse_system
-from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
 from avow.base import programs

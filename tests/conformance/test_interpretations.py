@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from avow.backend_kit.protocol import Job
-from avow.backends.ajpf.scenario import Decider
+from avow.backends.ajpf.mapping import Decider
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.backends.rosmonitoring.options import usable
 from avow.backends.rosmonitoring.rules import Constant
