@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, assert_never, cast
+from typing import Any, cast
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
@@ -28,24 +28,7 @@ from avow.kernel.certificate import Certificate
 from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
-from avow.language.sorts import (
-    INTEGER,
-    NATURAL,
-    BoolSort,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language.sorts import INTEGER, NATURAL, DataSort, Sort, parts, rebuilt
 from avow.language.terms import Compare, Literal, Quantified, Term, Variable
 from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER
@@ -335,38 +318,13 @@ def _recasting(concrete: Node, abstract: Node) -> Callable[[Term], Term]:
 def _match(one: Sort, other: Sort, mapping: dict[Sort, Sort]) -> None:
     if one == other or sort_digest(one) != sort_digest(other):
         return
-    match one, other:
-        case FunctionSort(), FunctionSort():
-            for a, b in zip((*one.parameters, one.result), (*other.parameters, other.result), strict=True):
-                _match(a, b, mapping)
-        case TupleSort(), TupleSort():
-            for a, b in zip(one.items, other.items, strict=True):
-                _match(a, b, mapping)
-        case SequenceSort(), SequenceSort():
-            _match(one.item, other.item, mapping)
-        case DataSort(), DataSort():
-            for made in one.constructors:
-                for a, b in zip(made.parameters, other.constructor(made.name).parameters, strict=True):
-                    _match(a, b, mapping)
+    theirs = parts(other)
+    if isinstance(one, DataSort) and isinstance(other, DataSort):  # its constructors may be listed in another order
+        theirs = tuple(p for made in one.constructors for p in other.constructor(made.name).parameters)
+    for a, b in zip(parts(one), theirs, strict=True):
+        _match(a, b, mapping)
     mapping[one] = other
 
 
 def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
-    if sort in mapping:
-        return mapping[sort]
-    match sort:
-        case FunctionSort():
-            return FunctionSort(tuple(_mapped(p, mapping) for p in sort.parameters), _mapped(sort.result, mapping))
-        case TupleSort():
-            return TupleSort(tuple(_mapped(item, mapping) for item in sort.items), sort.labels)
-        case SequenceSort():
-            return SequenceSort(_mapped(sort.item, mapping))
-        case SetSort():
-            return SetSort(_mapped(sort.item, mapping))
-        case DataSort(name=name, constructors=constructors):
-            made = (Constructor(c.name, tuple(_mapped(p, mapping) for p in c.parameters)) for c in constructors)
-            return DataSort(name, tuple(made))
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | EnumSort() | OpaqueSort():
-            return sort
-        case _:
-            assert_never(sort)
+    return mapping[sort] if sort in mapping else rebuilt(sort, (_mapped(part, mapping) for part in parts(sort)))

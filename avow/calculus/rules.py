@@ -152,75 +152,56 @@ class _Builder:
             guaranteed=(node,),
         )
 
+    def instance(
+        self,
+        rule: Rule,
+        nodes: Sequence[str],
+        before: Sequence[Derivation],
+        consumers: Sequence[str],
+        givers: Sequence[str],
+        hypotheses: tuple[str, ...] = (),
+        entries: Sequence[str] = (),
+    ) -> Derivation:
+        """A rule by which the consumers, each fed by the givers, are added to what was derived before."""
+        parts = [self.conditions(node, givers) for node in consumers]
+        return Derivation(
+            rule,
+            tuple(nodes),
+            tuple(e for node in consumers for e in self.edges_into(node, givers)),
+            tuple(o for node in consumers for o in self.outside(node, givers)),
+            tuple(c for conditions, _ in parts for c in conditions),
+            hypotheses,
+            _union([*(part.assumed for part in before), *(kept for _, kept in parts)]),
+            tuple(consumers),
+            (*before, *(self.premise(node) for node in consumers)),
+            entries=tuple(entries),
+        )
+
     def sequence(self, before: Derivation, provider: str, node: str) -> Derivation:
         """R1: one node more at the end of a sequence, or a sequence of two."""
-        conditions, kept = self.conditions(node, (provider,))
-        linking, outside = self.edges_into(node, (provider,)), self.outside(node, (provider,))
-        if before.rule is Rule.R1 and before.nodes[-1] == provider:
-            return Derivation(
-                Rule.R1,
-                (*before.nodes, node),
-                before.linking + linking,
-                before.outside + outside,
-                before.side_conditions + conditions,
-                assumed=before.assumed + kept,
-                guaranteed=(node,),
-                children=(*before.children, self.premise(node)),
-            )
-        return Derivation(
-            Rule.R1,
-            (provider, node),
-            linking,
-            outside,
-            conditions,
-            assumed=before.assumed + kept,
-            guaranteed=(node,),
-            children=(before, self.premise(node)),
+        found = self.instance(Rule.R1, (provider, node), (before,), (node,), (provider,))
+        if before.rule is not Rule.R1 or before.nodes[-1] != provider:
+            return found
+        return replace(
+            found,
+            nodes=(*before.nodes, node),
+            linking=before.linking + found.linking,
+            outside=before.outside + found.outside,
+            side_conditions=before.side_conditions + found.side_conditions,
+            children=(*before.children, *found.children[1:]),
         )
 
     def branching(self, before: Derivation, root: str, leaves: Sequence[str]) -> Derivation:
-        parts = [self.conditions(leaf, (root,)) for leaf in leaves]
-        return Derivation(
-            Rule.R2,
-            (root, *leaves),
-            tuple(e for leaf in leaves for e in self.edges_into(leaf, (root,))),
-            tuple(o for leaf in leaves for o in self.outside(leaf, (root,))),
-            tuple(c for conditions, _ in parts for c in conditions),
-            assumed=before.assumed + tuple(k for _, kept in parts for k in kept),
-            guaranteed=tuple(leaves),
-            children=(before, *(self.premise(leaf) for leaf in leaves)),
-        )
+        return self.instance(Rule.R2, (root, *leaves), (before,), leaves, (root,))
 
     def union(self, before: Sequence[Derivation], sources: Sequence[str], sink: str) -> Derivation:
-        conditions, kept = self.conditions(sink, sources)
-        listed = _listed(sources)
-        return Derivation(
-            Rule.R3,
-            (*sources, sink),
-            self.edges_into(sink, sources),
-            self.outside(sink, sources),
-            conditions,
-            (PERSISTENCE.format(listed), ONE_OUTPUT.format(_listed((*sources, sink)))),
-            _union(part.assumed for part in before) + kept,
-            (sink,),
-            (*before, self.premise(sink)),
-        )
+        together = (PERSISTENCE.format(_listed(sources)), ONE_OUTPUT.format(_listed((*sources, sink))))
+        return self.instance(Rule.R3, (*sources, sink), before, (sink,), sources, together)
 
     def loop(self, before: Sequence[Derivation], members: Sequence[str], entries: Sequence[str]) -> Derivation:
         givers = (*entries, *members)
-        parts = [self.conditions(node, givers) for node in members]
-        return Derivation(
-            Rule.R4,
-            tuple(members),
-            tuple(e for node in members for e in self.edges_into(node, givers)),
-            tuple(o for node in members for o in self.outside(node, givers)),
-            tuple(c for conditions, _ in parts for c in conditions),
-            (PERSISTENCE.format(_listed(givers)), ONE_OUTPUT.format(_listed(givers))),
-            _union([*(part.assumed for part in before), *(kept for _, kept in parts)]),
-            tuple(members),
-            (*before, *(self.premise(node) for node in members)),
-            entries=tuple(entries),
-        )
+        together = (PERSISTENCE.format(_listed(givers)), ONE_OUTPUT.format(_listed(givers)))
+        return self.instance(Rule.R4, members, before, members, givers, together, entries)
 
     # -- as the plan asks ----------------------------------------------------------------------------------------------
 

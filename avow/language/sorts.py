@@ -6,8 +6,9 @@ A declared name is a name for a sort; sets of names become `EnumSort`, sets of c
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import field
+from itertools import islice
 from typing import assert_never
 
 from avow.base.records import dataclass
@@ -136,6 +137,25 @@ def components(*sorts: Sort) -> Iterator[Sort]:
         seen.add(sort)
         yield sort
         stack.extend(parts(sort))
+
+
+def rebuilt(sort: Sort, made_of: Iterable[Sort]) -> Sort:
+    """The sort, made of others in the place of its `parts`."""
+    given = iter(made_of)
+    match sort:
+        case DataSort(name=name, constructors=constructors):
+            made = (Constructor(c.name, tuple(islice(given, len(c.parameters)))) for c in constructors)
+            return DataSort(name, tuple(made))
+        case FunctionSort(parameters=parameters):
+            return FunctionSort(tuple(islice(given, len(parameters))), next(given))
+        case TupleSort(labels=labels):
+            return TupleSort(tuple(given), labels)
+        case SequenceSort() | SetSort():
+            return type(sort)(next(given))
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | EnumSort() | OpaqueSort():
+            return sort
+        case _:
+            assert_never(sort)
 
 
 def parts(sort: Sort) -> tuple[Sort, ...]:
