@@ -25,7 +25,7 @@ from avow.calculus.node_outputs import Doubts, Stuck, judge
 from avow.calculus.open_values import Holds
 from avow.calculus.questions import Answer
 from avow.calculus.replaying import completions, holds, truths, unsupported
-from avow.calculus.scenario import CannotRun, key, restrictions, world
+from avow.calculus.scenario import CannotRun, key, restrictions
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
@@ -93,25 +93,15 @@ class Explored:
         return self.following[memory] + stays
 
 
-def judge_property(
-    frame: Frame, name: str, formula: Property, bounds: Bounds, machine: Machine | None = None
-) -> Answer:
-    """Whether every run of the composed contracts has the property, within the scenario.
-
-    A `machine` that answered other questions is quicker: it remembers the steps.
-    """
-    try:
-        machine = machine or Machine(world(frame), bounds.seed)
-
-        found = _tried(machine, frame, name, formula, bounds)
-        if found is not None:
-            return found
-        explored = _begin(machine, frame, formula)
-        stopped = explored.cannot_start is not None and demands_progress(formula)
-        done = stopped or _explore(explored, formula, bounds)
-
-    except CannotRun as reason:
-        return _cannot_run(frame, name, formula, str(reason))
+def judge_property(machine: Machine, name: str, formula: Property, bounds: Bounds) -> Answer:
+    """Whether every run of the composed contracts has the property, within the scenario. Raises CannotRun: see
+    `cannot_run`."""
+    found = _tried(machine, name, formula, bounds)
+    if found is not None:
+        return found
+    explored = _begin(machine, formula)
+    stopped = explored.cannot_start is not None and demands_progress(formula)
+    done = stopped or _explore(explored, formula, bounds)
     if isinstance(done, Lasso):
         answer = _broken(explored, name, formula, done)
         bad = _prefix(explored, formula, bounds) if answer.verdict is not Verdict.REFUTED else None
@@ -186,19 +176,22 @@ def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step
     names = list(dict.fromkeys([*spoken, *outputs]))[:STEP_VARIABLES]
     trace = tuple(step.shown([n for n in names if n not in machine.constants]) for step in steps)
     told = f"{name} is false at step {len(steps)} of a run of the composed contracts"
-    broken = sorted({clause for step in steps for clause in step.broken})
-    if broken:
-        told += f"; on the way an assumption does not hold: {', '.join(broken)}"
+    told += _on_the_way(steps)
     bound: dict[str, object] = {"steps": len(steps), "scenario": machine.world.scenario.content}
     shown = Counterexample(trace[-1], told, trace)
     return Answer(Verdict.REFUTED, told, shown, bound=bound, details={"genuine": True, "run": len(steps)})
 
 
-def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds: Bounds) -> Answer | None:
+def _on_the_way(steps: Sequence[Step]) -> str:
+    broken = sorted({clause for step in steps for clause in step.broken})
+    return f"; on the way an assumption does not hold: {', '.join(broken)}" if broken else ""
+
+
+def _tried(machine: Machine, name: str, formula: Property, bounds: Bounds) -> Answer | None:
     """Some runs at random: most systems that break a property do so soon, and a search need not even begin."""
     random = Random(bounds.seed)
     deadline = until(bounds.effort / 4)
-    judges = _judges(machine, frame, formula)
+    judges = _judges(machine, formula)
     best: tuple[Walk, int | None] | None = None  # a run that gets stuck tells more than one that goes round
     for _ in range(RUNS_TRIED):
         walk = machine.walk(random, RUN_LENGTH, until_repeat=True, judges=tuple(judges.values()))
@@ -214,7 +207,7 @@ def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds:
         return None
     walk, closes = best
     stuck = None if closes is None else walk.stuck
-    return _shown_run(machine, frame, name, formula, list(walk.steps), closes, stuck, {"runs": RUNS_TRIED})
+    return _shown_run(machine, name, formula, list(walk.steps), closes, stuck, {"runs": RUNS_TRIED})
 
 
 def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[State, Holds]) -> bool:
@@ -232,12 +225,12 @@ def _refuted_at(steps: Sequence[Step], formula: Property, judges: dict[State, Ho
         return None
 
 
-def _judges(machine: Machine, frame: Frame, formula: Property) -> dict[State, Holds]:
-    return {state: machine.judge(system_term(frame, state.term)) for state in states_of(formula)}
+def _judges(machine: Machine, formula: Property) -> dict[State, Holds]:
+    return {state: machine.judge(system_term(machine.frame, state.term)) for state in states_of(formula)}
 
 
-def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
-    explored = Explored(machine, _judges(machine, frame, formula))
+def _begin(machine: Machine, formula: Property) -> Explored:
+    explored = Explored(machine, _judges(machine, formula))
 
     found: dict[int, None] = {}
     for memory in machine.initial():
@@ -317,7 +310,7 @@ def _prefix(explored: Explored, formula: Property, bounds: Bounds) -> tuple[int,
 
 def _broken_prefix(explored: Explored, name: str, formula: Property, prefix: tuple[int, ...]) -> Answer:
     machine, steps = explored.machine, explored.concrete(list(prefix))
-    return _shown_run(machine, machine.frame, name, formula, steps, None, None, _bound(explored))
+    return _shown_run(machine, name, formula, steps, None, None, _bound(explored))
 
 
 def _broken(explored: Explored, name: str, formula: Property, lasso: Lasso) -> Answer:
@@ -327,12 +320,11 @@ def _broken(explored: Explored, name: str, formula: Property, lasso: Lasso) -> A
     stays = len(lasso.cycle) == 1 and run[-1] not in explored.following.get(last.memory, ())
     stuck = machine.stuck.get(last.memory) if stays else None
     steps = explored.concrete(run)
-    return _shown_run(machine, machine.frame, name, formula, steps, len(lasso.prefix), stuck, _bound(explored))
+    return _shown_run(machine, name, formula, steps, len(lasso.prefix), stuck, _bound(explored))
 
 
 def _shown_run(
     machine: Machine,
-    frame: Frame,
     name: str,
     formula: Property,
     steps: list[Step],
@@ -341,9 +333,9 @@ def _shown_run(
     bound: dict[str, object],
 ) -> Answer:
     """A run that breaks the property, as a counterexample."""
-    trace = tuple(step.shown(_interesting(machine, frame, formula)) for step in steps)
-    false = _false_at(machine, frame, formula, steps)
-    bad = _refuted_at(steps, formula, _judges(machine, frame, formula)) if false is None and back is None else None
+    trace = tuple(step.shown(_interesting(machine, formula)) for step in steps)
+    false = _false_at(machine, formula, steps)
+    bad = _refuted_at(steps, formula, _judges(machine, formula)) if false is None and back is None else None
     if stuck is not None:
         told = f"stuck after step {len(steps)}: {stuck.text()}"
     elif false is not None:
@@ -357,9 +349,7 @@ def _shown_run(
             if back is not None
             else f"after step {len(steps)} nothing can mend it"
         )
-    broken = sorted({clause for step in steps for clause in step.broken})
-    if broken:
-        told += f"; on the way an assumption does not hold: {', '.join(broken)}"
+    told += _on_the_way(steps)
     shown = Counterexample(trace[-1] if trace else (), told, trace, back)
     if stuck is not None and not stuck.genuine:
         doubt = "perhaps only because the scenario lacks the value"
@@ -393,36 +383,35 @@ def _doubt_of(
     return "" if broken else "but replayed it does not break the property"
 
 
-def _false_at(machine: Machine, frame: Frame, formula: Property, steps: Sequence[Step]) -> int | None:
+def _false_at(machine: Machine, formula: Property, steps: Sequence[Step]) -> int | None:
     """Of ``always F``: the step at which F is false. What comes after it does not matter."""
     match formula:
         case Temporal(operator=Operator.ALWAYS, parts=(State() as state,)):
-            holds = _judges(machine, frame, state)[state]
+            holds = _judges(machine, state)[state]
             return next((number for number, step in enumerate(steps) if not holds(step.values)), None)
     return None
 
 
-def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]:
+def _interesting(machine: Machine, formula: Property) -> list[str]:
     """The variables worth showing: what the environment chose, the outputs, and what the property speaks of."""
     about = [
         variable.qualified
         for state in states_of(formula)
-        for variable in sorted(free_variables(system_term(frame, state.term)), key=lambda v: v.qualified)
+        for variable in sorted(free_variables(system_term(machine.frame, state.term)), key=lambda v: v.qualified)
     ]
     given = [values for choices in machine.environment.values() for values in choices]
     chosen = [name for name in given[0] if len({key(values[name]) for values in given}) > 1]
-    outputs = [f"{node}.{port.name}" for node in machine.order for port in frame.node(node).outputs]
+    outputs = [f"{node}.{port.name}" for node in machine.order for port in machine.frame.node(node).outputs]
     return list(dict.fromkeys([*about, *chosen, *outputs]))[:STEP_VARIABLES]
 
 
-def _cannot_run(frame: Frame, name: str, formula: Property, reason: str) -> Answer:
-    if frame.graph.deadlocks and demands_progress(formula) and reason.startswith("start-up deadlock"):
-        return Answer(
-            Verdict.REFUTED,
-            f"no run ever takes a step, so {name} is not met: {reason}",
-            Counterexample(explanation=reason),
-        )
-    return Answer(Verdict.UNKNOWN, f"the contracts cannot be run over the scenario: {reason}")
+def cannot_run(frame: Frame, name: str, formula: Property, reason: CannotRun) -> Answer:
+    """The answer where the contracts cannot be run: a system that never takes a step does nothing that is demanded."""
+    told = str(reason)
+    if frame.graph.deadlocks and demands_progress(formula) and told.startswith("start-up deadlock"):
+        summary = f"no run ever takes a step, so {name} is not met: {told}"
+        return Answer(Verdict.REFUTED, summary, Counterexample(explanation=told))
+    return Answer(Verdict.UNKNOWN, f"the contracts cannot be run over the scenario: {told}")
 
 
 def _bound(explored: Explored) -> dict[str, object]:

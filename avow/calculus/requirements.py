@@ -22,9 +22,10 @@ from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import steps
 from avow.calculus.invariants import INVARIANT, Written, further, in_words
-from avow.calculus.model_checking import judge_property, refuting_run
+from avow.calculus.model_checking import cannot_run, judge_property, refuting_run
 from avow.calculus.questions import Answer, as_far_as_shown, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
+from avow.calculus.scenario import CannotRun
 from avow.calculus.variables import Frame, Observed, system_term
 from avow.formulas.formula import digest, free_variables
 from avow.language.printer import show_term
@@ -73,8 +74,6 @@ class FormulaQuestion:
     def broken_by_a_run(self, composition: Composition, bounds: Bounds) -> tuple[Answer | None, str]:
         """A run of the composed contracts over the plan's scenario, at one of whose steps the formula is false; else
         how far it was looked for."""
-        from avow.calculus.scenario import CannotRun
-
         if composition.frame.system.plan.scenario is None:
             return None, ""
         try:
@@ -235,13 +234,10 @@ class TemporalQuestion:
     digest: str
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        from avow.calculus.scenario import CannotRun
-
         try:
-            machine = composition.machine(bounds.seed)
-        except CannotRun:
-            machine = None  # the judge meets the same obstacle, and says what it means for the property
-        judged = judge_property(composition.frame, self.name, self.formula, bounds, machine)
+            judged = judge_property(composition.machine(bounds.seed), self.name, self.formula, bounds)
+        except CannotRun as reason:
+            judged = cannot_run(composition.frame, self.name, self.formula, reason)
         answer = as_far_as_shown(composition.frame, judged)
         if not answer.verdict.supports:
             return answer
