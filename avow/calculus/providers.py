@@ -26,7 +26,7 @@ from avow.language.printer import show_term
 from avow.language.subterms import ports_of
 from avow.language.terms import TRUE, Term
 from avow.sanity.claims import Claim, Property
-from avow.sanity.results import Bounds, SanityResult, as_outcome, listing
+from avow.sanity.results import Bounds, Finding, SanityResult, as_outcome, listing
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
@@ -155,19 +155,6 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             verdict, text = Verdict.UNKNOWN, answer.reason
         case _:
             assert_never(answer.status)
-    return SanityResult(
-        node.name,
-        claim.about,
-        claim.subject,
-        claim.name,
-        claim.sentence,
-        verdict,
-        claim.severity,
-        answer.core if verdict is Verdict.REFUTED else (),
-        None,
-        text,
-        because=because,
-        engine=answer.engine,
-        seconds=answer.seconds,
-        span=claim.span,
-    )
+    core = answer.core if verdict is Verdict.REFUTED else ()
+    found = Finding(verdict, text, core, because=because, engine=answer.engine)
+    return SanityResult.of(node.name, claim, found, answer.seconds)

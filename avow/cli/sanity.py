@@ -94,15 +94,15 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
         line = Text.assemble((f"{result.verdict:9}", _style(result)), result.name)
         if result.explanation:
             line.append(f": {result.explanation}")
-        if result.severity != "error" and result.verdict is not Verdict.PROVED:
-            line.append(f" ({result.severity})", style="dim")
+        if result.asked.severity != "error" and result.verdict is not Verdict.PROVED:
+            line.append(f" ({result.asked.severity})", style="dim")
         if result.because:
             line.append(f" (a consequence of {result.because})", style="dim")
         console.print(Padding(line, (0, 0, 0, 2)))
         for example in _examples(result):
             console.print(Padding(Text(example.text()), (0, 0, 0, 13)))
     if folded:
-        names = ", ".join(f"{r.node}.{r.subject}" for r in folded)
+        names = ", ".join(f"{r.node}.{r.asked.subject}" for r in folded)
         console.print(Text(f"more than one value is allowed for the same inputs: {names} (--all shows which)", "dim"))
     refuted = [r for r in results if r.verdict is Verdict.REFUTED]
     unknown = sum(r.verdict is Verdict.UNKNOWN for r in results)
@@ -121,11 +121,11 @@ def _free(result: SanityResult) -> bool:
     """Whether it says only that an output is the implementation's to choose."""
     from avow.sanity.claims import Property
 
-    return result.about is Property.DETERMINED and result.verdict == "refuted" and not result.because
+    return result.asked.about is Property.DETERMINED and result.verdict == "refuted" and not result.because
 
 
 def _style(result: SanityResult) -> str:
-    if result.verdict == "refuted" and result.severity != "error":
+    if result.verdict == "refuted" and result.asked.severity != "error":
         return "yellow"
     return _COLOURS.get(str(result.verdict), "")
 

@@ -150,10 +150,10 @@ def main(parent: int) -> None:
         answers = tuple(
             Answer(
                 result.name,
-                result.subject or "",
-                result.claim,
+                result.asked.subject or "",
+                result.asked.sentence,
                 str(result.verdict),
-                str(result.severity),
+                str(result.asked.severity),
                 result.explanation,
                 result.counterexample.text() if result.counterexample is not None else "",
                 result.because or "",

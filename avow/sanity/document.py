@@ -81,10 +81,10 @@ class SanityDocument:
 
 def told(result: SanityResult) -> Result:
     """One result, for machines."""
-    shown, span = result.counterexample, result.span
+    asked, shown, span = result.asked, result.counterexample, result.asked.span
     conflicts = tuple(Conflict(clauses, _shown(example)) for clauses, example in result.conflicts)
     return Result(
-        *(result.node, result.about, result.subject, result.name, result.claim, result.verdict, result.severity),
+        *(result.node, asked.about, asked.subject, asked.name, asked.sentence, result.verdict, asked.severity),
         *(result.clauses, None if shown is None else _shown(shown), result.explanation, conflicts, result.cut_short),
         *(result.because, result.engine, result.bounded, round(result.seconds, 3)),
         None if span is None else Place(span.file, span.line, span.column),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, fields
 
-from avow.base.diagnostics import Severity, Span
+from avow.base.diagnostics import Severity
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict, bound
 from avow.formulas.values import Value
 from avow.language.terms import Variable
-from avow.sanity.claims import Claim, Property
+from avow.sanity.claims import Claim
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,57 +29,43 @@ class Finding:
     verdict: Verdict
     explanation: str = ""
     clauses: tuple[str, ...] = ()
+    """Those that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
     counterexample: Counterexample | None = None
-    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
-    because: str | None = None
-    engine: str = "z3"
-    bounded: bool = False
-    cut_short: bool = False
-    example: Mapping[Variable, Value] = field(default_factory=dict)
-    """Values for which what was asked holds, where there are."""
-
-
-@dataclass(frozen=True, slots=True)
-class SanityResult:
-    """What became of one claim. `subject` is the clause or output that the claim is about, if it is about one."""
-
-    node: str
-    about: Property
-    subject: str | None
-    name: str
-    """``realizable``, ``not-vacuous-G1``."""
-    claim: str
-    verdict: Verdict
-    severity: Severity
-    clauses: tuple[str, ...] = ()
-    """The clauses that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
-    counterexample: Counterexample | None = None
-    explanation: str = ""
     conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
     """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
-    cut_short: bool = False
-    """The search for conflicts was: there may be others, or smaller ones."""
     because: str | None = None
     """The name of the result of which this one is a mere consequence."""
     engine: str = "z3"
     bounded: bool = False
     """The answer is about the scenario only."""
-    seconds: float = 0.0
-    span: Span | None = field(default=None, compare=False, repr=False)
+    cut_short: bool = False
+    """The search for conflicts was: there may be others, or smaller ones."""
+    example: Mapping[Variable, Value] = field(default_factory=dict)
+    """Values for which what was asked holds, where there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class SanityResult(Finding):
+    """What became of one claim of a node, in so many seconds."""
+
+    node: str = field(kw_only=True)
+    asked: Claim = field(kw_only=True)
+    seconds: float = field(kw_only=True)
 
     @classmethod
     def of(cls, node: str, claim: Claim, found: Finding, seconds: float) -> SanityResult:
-        """What was found of a claim, in so many seconds."""
-        return cls(
-            *(node, claim.about, claim.subject, claim.name, claim.sentence, found.verdict, claim.severity),
-            *(found.clauses, found.counterexample, found.explanation, found.conflicts, found.cut_short, found.because),
-            *(found.engine, found.bounded, seconds, claim.span),
-        )
+        own = {each.name: getattr(found, each.name) for each in fields(found)}
+        return cls(**own, node=node, asked=claim, seconds=seconds)
+
+    @property
+    def name(self) -> str:
+        """``realizable``, ``not-vacuous-G1``."""
+        return self.asked.name
 
     @property
     def fails(self) -> bool:
         """Whether it is reason enough to call the contract bad."""
-        return self.verdict is Verdict.REFUTED and self.severity is Severity.ERROR
+        return self.verdict is Verdict.REFUTED and self.asked.severity is Severity.ERROR
 
 
 @dataclass(slots=True)
@@ -109,7 +95,7 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
     """A result as the outcome of an obligation; None says that there is no such claim."""
     if result is None:
         return Outcome(identity, Verdict.ERROR, f"{node} has no sanity claim named {name}")
-    details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
+    details: dict[str, object] = {"severity": str(result.asked.severity), "clauses": list(result.clauses)}
     details["solver"] = result.engine
     if result.because:
         details["because"] = result.because

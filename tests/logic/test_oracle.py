@@ -107,8 +107,8 @@ def test_a_flipped_verdict_is_caught() -> None:
         asked, results = analysed(seed)
         flipped = {r.name: replace(r, verdict=OPPOSITE[r.verdict]) for r in results if r.verdict in OPPOSITE}
         judgement = judge(asked, flipped.values())
-        caught |= {flipped[name].about for name in judgement.wrong}
-        missed |= {flipped[name].about for name in judgement.right}
+        caught |= {flipped[name].asked.about for name in judgement.wrong}
+        missed |= {flipped[name].asked.about for name in judgement.right}
     assert caught == set(Property) - {Property.MEETABLE}
     assert missed <= ONE_SIDED
 

@@ -152,8 +152,8 @@ def found_in(name: str) -> None:
     found = analyse(node(f"{ports}|{clauses}", context))
     assert not [r.name for r in found if r.verdict is Verdict.UNKNOWN]
     refuted = [r for r in found if r.verdict is Verdict.REFUTED and not r.because]
-    assert {r.name for r in refuted if r.severity != "note"} == set(faults.split())
-    assert {r.name for r in refuted if r.severity == "note"} == set(notes.split())
+    assert {r.name for r in refuted if r.asked.severity != "note"} == set(faults.split())
+    assert {r.name for r in refuted if r.asked.severity == "note"} == set(notes.split())
 
 
 def realizable(ports: str, clauses: str) -> SanityResult:

@@ -25,7 +25,7 @@ def refuted(of: Node) -> set[str]:
     """The names of the refuted claims that are no mere consequence of another; no claim may stay open, but whether an
     assumption is needed where the contract is not realizable."""
     found = results(of)
-    unknown = {r.name for r in found.values() if r.verdict is Verdict.UNKNOWN and r.about is not Property.NEEDED}
+    unknown = {r.name for r in found.values() if r.verdict is Verdict.UNKNOWN and r.asked.about is not Property.NEEDED}
     assert not unknown
     return {r.name for r in found.values() if r.verdict is Verdict.REFUTED and not r.because}
 
@@ -203,7 +203,7 @@ def test_the_repaired_nodes_are_realizable(repaired: dict[str, dict[str, SanityR
         for claim in ("assumptions-satisfiable", "consistent", "realizable"):
             assert found[claim].verdict is Verdict.PROVED, (name, claim)
         assert not [r.name for r in found.values() if r.fails]
-        assert not [r.name for r in found.values() if r.verdict is Verdict.REFUTED and r.severity == "warning"]
+        assert not [r.name for r in found.values() if r.verdict is Verdict.REFUTED and r.asked.severity == "warning"]
     assert set(repaired["agent"]["realizable"].clauses) == {"exit_known", "one_waypoint"}
 
 

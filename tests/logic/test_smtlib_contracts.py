@@ -70,7 +70,8 @@ def test_the_exported_contract_has_the_verdict_of_sanity() -> None:
         contract = generated(seed)
         node = contract.nodes[0]
         found = {
-            r.about: r for r in analyse(node, bounds=Bounds(1_000, 0), wanted=("assumptions-satisfiable", "consistent"))
+            r.asked.about: r
+            for r in analyse(node, bounds=Bounds(1_000, 0), wanted=("assumptions-satisfiable", "consistent"))
         }
         questions = {
             Property.CONSISTENT: to_smtlib(contract),
