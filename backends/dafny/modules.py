@@ -18,8 +18,17 @@ from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
 
 from .history import ESTABLISHED, History, history
-from .names import RESERVED, Names, file_stem, identifier
-from .printer import NotExpressible, Predicate, Vocabulary, print_clause, sort_text
+from .printer import (
+    RESERVED,
+    Names,
+    NotExpressible,
+    Predicate,
+    Vocabulary,
+    file_stem,
+    identifier,
+    print_clause,
+    sort_text,
+)
 
 _MODULE = 'module {:options "--function-syntax:3"}'
 """Ignored by 2.3; makes `predicate` ghost in 4.x, as it is in 2.3."""
@@ -59,7 +68,7 @@ def _complete() -> None:
     if missing or unkept:
         raise TypeError(
             f"Dafny functions without a text in modules.py: {sorted(missing)}; "
-            f"their names that names.py does not reserve: {sorted(unkept)}"
+            f"their names that printer.py does not reserve: {sorted(unkept)}"
         )
 
 

@@ -77,7 +77,7 @@ class Hoare(Backend):
         return (z3_tool(),)
 
     def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
-        from .model import answering
+        from .work import answering
 
         return answering(job)
 

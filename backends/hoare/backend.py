@@ -30,15 +30,13 @@ from avow.solving.smtlib import formulas_script
 from avow.solving.translation import Unsupported
 from avow.solving.z3_sorts import Sorts
 
-from .endless import endless_run
 from .memory import knowing, remembered
-from .numbers import other_numbers
 from .outline import one_line, outline
 from .program import While, has_loops, statements
 from .triples import Triple
 from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
-from .witness import Breach, breach
-from .work import Work, load, run_conditions
+from .witness import Breach, breach, endless_run
+from .work import Work, load, other_numbers, run_conditions
 from .wp import Condition, TooLarge, conditions
 
 GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})

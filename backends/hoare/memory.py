@@ -2,12 +2,18 @@
 
 An invariant over what the program keeps and what the contract remembers is shown to hold first and to be kept; it is
 then known before every step. Guesses that runs of the program do not contradict are tried beside the plan's own.
+
+What runs from the start show is so. Their inputs are drawn, the same ones every time: at, beside and between the
+numbers of program and contract, often those of the step before. A run ends where no input is found that the
+assumptions allow.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
+from fractions import Fraction
 
 from avow.backend_kit.protocol import Job
 from avow.backend_kit.stepping import Held, Invariant, Stepping, guesses, stepping
@@ -15,18 +21,24 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
 from avow.evaluation.compiler import member_of
-from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term, evaluate
+from avow.evaluation.running import Keeper
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import longest_limits, remembers
+from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
+from avow.language.terms import Role, Term, Variable
+from avow.solving.models import default_value
+from avow.solving.translation import Unsupported
 
 from .checker import Checked
+from .guesses import Draw, expressions, numbers, strings
+from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .names import Names, vocabulary
-from .runs import Runner, Seen, Step, look
 from .syntax import Memory, Source
 from .triples import Triple, triples
-from .tuning import GUESSES, LONGEST_RUN
+from .tuning import DRAWS, GUESSES, LONGEST_RUN, RUN_LENGTH, RUNS, STICKY
 from .typing import Scope, fit, rejected, term
 from .wp import Condition, TooLarge, conditions
 
@@ -172,3 +184,202 @@ def _contradicted(invariant: Invariant, memories: Sequence[Step]) -> bool:
         except NotEvaluable:
             continue
     return False
+
+
+# -- runs from the start -----------------------------------------------------------------------------------------------
+
+
+Step = Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Its steps, each with the node's inputs and outputs by qualified name; the last has no outputs where the program
+    stops at a fault."""
+
+    steps: tuple[Step, ...]
+    why: str
+
+    def shown(self, node: Node) -> list[tuple[tuple[str, str], ...]]:
+        """The steps in the contract's words."""
+        ports = [p.variable.qualified for p in (*node.inputs, *node.outputs)]
+        return [tuple((name, show(step[name])) for name in ports if name in step) for step in self.steps]
+
+
+@dataclass(slots=True)
+class Seen:
+    """What the runs have shown."""
+
+    broken: dict[str, Run] = field(default_factory=dict)
+    """Guarantee → a run whose last step breaks it."""
+    fault: Run | None = None
+    """A run at whose last step the program stops without an output."""
+    memories: list[Step] = field(default_factory=list)
+    """What cells and program had before a step, by qualified name."""
+
+
+class Runner:
+    """Runs a program step after step. `node` is the contract's own; a reading that cannot be run is told by
+    NotEvaluable."""
+
+    def __init__(self, node: Node, steps: Stepping, checked: Checked, wanted: Iterable[Clause]) -> None:
+        self.node, self.steps, self.checked = node, steps, checked
+        self.machine = Machine()
+        if checked.reading.predicates:
+            raise NotEvaluable("a relation is read as a formula")
+        terms = checked.reading.terms
+        self.inputs = {
+            p.variable.qualified: terms[Role.INPUT, p.name] for p in node.inputs if (Role.INPUT, p.name) in terms
+        }
+        self.outputs = {
+            p.variable.qualified: terms[Role.OUTPUT, p.name] for p in node.outputs if (Role.OUTPUT, p.name) in terms
+        }
+        self.assumptions = [compile_term(a.formula) for a in steps.node.assumptions]
+        self.wanted: dict[str, Evaluator] = {c.name: compile_term(c.formula) for c in wanted}
+        self.keeper = Keeper(steps.cells)
+        held = {h.name for h in steps.held}
+        cells = {c.name for c in steps.cells}
+        self.given = sorted({v for t in self.inputs.values() for v in free_variables(t)}, key=lambda v: v.name)
+        ghosts = {ghost: v for v, ghost in checked.program.ghosts.items()}
+        self.given = [ghosts.get(v, v) for v in self.given]
+        drawn = {*self.given}
+        self.locals = [
+            v for v in checked.program.state if v not in drawn and v.name not in held and v.name not in cells
+        ]
+        formulas = [c.formula for c in steps.node.clauses]
+        texts = (*formulas, *expressions(checked.program))
+        between, at = numbers(texts)
+        beside = {n + d for n in at for d in (-1, 1)}
+        pool = sorted({*between, *at, *beside, *map(Fraction, range(4))})
+        self.draw = Draw(random.Random(0), pool, sorted(strings(texts)))
+        self.memory: dict[str, Value] = {}
+
+    def begin(self) -> None:
+        """Before the first step."""
+        self.keeper.restart()
+        self.memory = {h.name: evaluate(h.initial, {}) for h in self.steps.held}
+
+    def before(self) -> Step:
+        """Cells and memory, by qualified name."""
+        return {**self.keeper.memory, **{f"in.{name}": value for name, value in self.memory.items()}}
+
+    def allowed(self, given: Mapping[Variable, Value]) -> bool:
+        """Whether the assumptions certainly hold of these inputs now."""
+        values = {**self.before(), **self._read(self.inputs, self._start(given))}
+        return all(holds(values) is True for holds in self.assumptions)
+
+    def step(self, given: Mapping[Variable, Value]) -> tuple[Step, tuple[str, ...]]:
+        """One step: its ports, and the guarantees that it breaks. Raises Fault, NoEnd, Endless, NotEvaluable."""
+        end = self.machine.run(self.checked.program.body, self._start(given))
+        ports = {**self._read(self.inputs, end), **self._read(self.outputs, end)}
+        values = {**self.before(), **ports}
+        broken = tuple(name for name, holds in self.wanted.items() if holds(values) is False)
+        self.keeper.advance(ports)
+        self.memory = {name: end[name] for name in self.memory}
+        return ports, broken
+
+    def inputs_of(self, given: Mapping[Variable, Value]) -> Step:
+        """The contract's inputs."""
+        return self._read(self.inputs, self._start(given))
+
+    def _start(self, given: Mapping[Variable, Value]) -> State:
+        start: State = {v.name: value for v, value in given.items()} | self.memory
+        for v in self.locals:
+            try:
+                start.setdefault(v.name, default_value(v.sort))
+            except Unsupported:
+                continue
+        for v, ghost in self.checked.program.ghosts.items():
+            if v.name in start:
+                start[ghost.name] = start[v.name]
+        return start
+
+    def _read(self, terms: Mapping[str, Term], state: State) -> dict[str, Value]:
+        return {name: evaluate(term, state) for name, term in terms.items()}
+
+
+Given = dict[Variable, Value]
+
+
+def look(runner: Runner, longer: int) -> Seen:
+    """What some runs show, the first of them short; `longer` steps are added for limits."""
+    seen, rng = Seen(), random.Random(1)
+    for k in range(RUNS):
+        length = RUN_LENGTH if k % 3 else RUN_LENGTH + longer
+        _run(runner, rng, length, rng.choice(STICKY), seen)
+        if seen.fault is not None or len(seen.broken) == len(runner.wanted) > 0:
+            break
+    return seen
+
+
+def _run(runner: Runner, rng: random.Random, length: int, sticky: float, seen: Seen) -> None:
+    runner.begin()
+    taken: list[Given] = []
+    try:
+        for _ in range(length):
+            given = _drawn(runner, rng, taken[-1] if taken else None, sticky)
+            if given is None:
+                return
+            seen.memories.append(runner.before())
+            taken.append(given)
+            _, broken = runner.step(given)
+            for name in broken:
+                if name not in seen.broken:
+                    held = runner.keeper.memory, runner.memory
+                    seen.broken[name] = _shortest(runner, taken, name)
+                    runner.keeper.memory, runner.memory = held
+    except Fault as fault:
+        seen.fault = _faulting(runner, taken, f"the program asks for {fault}: there is no output")
+    except (NoEnd, Endless, NotEvaluable):
+        return
+
+
+def _drawn(runner: Runner, rng: random.Random, last: Given | None, sticky: float) -> Given | None:
+    for _ in range(DRAWS):
+        if last is not None and rng.random() < sticky:
+            given = dict(last)
+            if given and rng.random() < 0.5:
+                changed = rng.choice(runner.given)
+                given[changed] = runner.draw.value(changed.sort)
+        else:
+            given = {v: runner.draw.value(v.sort) for v in runner.given}
+        if runner.allowed(given):
+            return given
+    return None
+
+
+def _replayed(runner: Runner, taken: list[Given], name: str) -> Run | None:
+    """The run of these inputs up to a step that breaks the guarantee, if it is allowed and one does."""
+    runner.begin()
+    steps: list[Step] = []
+    try:
+        for given in taken:
+            if not runner.allowed(given):
+                return None
+            ports, broken = runner.step(given)
+            steps.append(ports)
+            if name in broken:
+                return Run(tuple(steps), f"guarantee {name} does not hold of the last of {len(steps)} steps")
+    except (Fault, NoEnd, Endless, NotEvaluable):
+        return None
+    return None
+
+
+def _shortest(runner: Runner, taken: list[Given], name: str) -> Run:
+    best, at = list(taken), len(taken) - 2
+    while at >= 0:
+        tried = [given for k, given in enumerate(best) if k != at]
+        if _replayed(runner, tried, name) is not None:
+            best = tried
+        at -= 1
+    found = _replayed(runner, best, name)
+    assert found is not None, "the run that was taken breaks it"
+    return found
+
+
+def _faulting(runner: Runner, taken: list[Given], why: str) -> Run | None:
+    runner.begin()
+    steps: list[Step] = []
+    for given in taken[:-1]:
+        steps.append(runner.step(given)[0])
+    return Run((*steps, runner.inputs_of(taken[-1])), why)

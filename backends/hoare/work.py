@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.given import existing_file
-from avow.backend_kit.protocol import Job
+from avow.backend_kit.protocol import Job, NoModel
 from avow.backend_kit.stepping import Stepping
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_text
-from avow.language.terms import TRUE
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.values import Value
+from avow.language.bounds import bounds, constant
+from avow.language.contract import Clause
+from avow.language.printer import show_number
+from avow.language.subterms import subterms
+from avow.language.terms import TRUE, Role, Term, Variable
+from avow.solving.models import default_value
 from avow.solving.settling import Settler
+from avow.solving.translation import Unsupported
 
 from .checker import Checked, check
+from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .memory import kept, knowing, steps_of
 from .parser import parse_program
-from .program import Program
+from .program import Assign, If, Program, Update, While, statements
 from .triples import Triple, every_run, triples
 from .wp import Condition, conditions
 
@@ -120,3 +130,91 @@ def _table(job: Job) -> dict[str, tuple[str, Span]]:
         str(key): (words[value] if isinstance(value, bool) else str(value), options.at("variables", key))
         for key, value in given.items()
     }
+
+
+# -- the program as a model that can be run ----------------------------------------------------------------------------
+
+
+def answering(job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
+    """Raises Rejected where the program is at fault, and NoModel where it is none of single steps on the contract's own
+    inputs."""
+    work = load(job)
+    checked, machine = work.checked, Machine()
+    terms = checked.reading.terms
+    if work.steps is not None:
+        raise NoModel("it keeps something from step to step")
+    if checked.reading.predicates:
+        raise NoModel("a relation is read as a formula")
+    inputs: dict[str, Variable] = {}
+    for port in job.node.inputs:
+        term = terms.get((Role.INPUT, port.name))
+        if isinstance(term, Variable):
+            inputs[port.variable.qualified] = term
+        elif term is not None:
+            raise NoModel(f"in.{port.name} is read as an expression of the program")
+    outputs = {
+        p.variable.qualified: terms[Role.OUTPUT, p.name] for p in job.node.outputs if (Role.OUTPUT, p.name) in terms
+    }
+    ghosts = checked.program.ghosts
+
+    def run(given: Mapping[str, Value]) -> Mapping[str, Value]:
+        start: State = {}
+        for name, variable in inputs.items():
+            own = next((v for v, ghost in ghosts.items() if ghost == variable), variable)
+            if name in given:  # one that a program is not given is anything
+                start[own.name] = start[variable.name] = given[name]
+        for variable in checked.program.state:
+            try:
+                start.setdefault(variable.name, default_value(variable.sort))
+            except Unsupported:
+                continue
+        try:
+            end = machine.run(checked.program.body, start)
+            return {name: evaluate(term, end) for name, term in outputs.items()}
+        except (Fault, NoEnd, Endless, NotEvaluable, KeyError) as error:
+            raise NoModel(str(error)) from error
+
+    return run
+
+
+# -- the numbers of program and contract, side by side -----------------------------------------------------------------
+
+
+_COMMON = frozenset({Fraction(-1), Fraction(0), Fraction(1)})
+"""Numbers that stand in programs for reasons of their own."""
+
+
+def other_numbers(program: Program, clauses: Iterable[Clause]) -> Iterator[Diagnostic]:
+    """A warning where the program compares with numbers that are not the contract's, and the contract with numbers that
+    are not the program's: a hint, where a proof cannot give one. A program with other thresholds is refuted, as a rule;
+    a guarantee that is weaker than it looks (a lost pair of parentheses can make it a tautology) is proved of it."""
+    formulas = [clause.formula for clause in clauses]
+    conditions = [s for s in statements(program.body) if isinstance(s, If | While)]
+    assigned = [s.value for s in statements(program.body) if isinstance(s, Assign | Update)]
+    in_program = _numbers([*(s.condition for s in conditions), *assigned])
+    foreign = _thresholds(s.condition for s in conditions) - _numbers(formulas)
+    missing = _thresholds(formulas) - in_program
+    if not foreign or not missing:
+        return
+    first = next(s for s in conditions if _thresholds([s.condition]) & foreign)
+    yield Diagnostic(
+        "HOARE410",
+        f"the program compares with {_shown(foreign)}, and the contract has no such number; the contract compares with "
+        f"{_shown(missing)}, and the program does not",
+        first.span,
+        Severity.WARNING,
+        hint="if the program means the contract's thresholds, write these",
+    )
+
+
+def _thresholds(formulas: Iterable[Term]) -> frozenset[Fraction]:
+    return frozenset(b.number for formula in formulas for b in bounds(formula)) - _COMMON
+
+
+def _numbers(terms: Iterable[Term]) -> frozenset[Fraction]:
+    return frozenset(n for term in terms for part in subterms(term) if (n := constant(part)) is not None)
+
+
+def _shown(numbers: Iterable[Fraction]) -> str:
+    texts = [show_number(number)[0] for number in sorted(numbers)]
+    return ", ".join(texts[:6]) + (", …" if len(texts) > 6 else "")

@@ -25,10 +25,10 @@ from avow.isolation.level import Unavailable, available
 from avow.language.contract import Clause, Node
 from avow.solving.replay import opaque_sorts
 
-from . import callbacks, export, wire
-from .exchange import Answer, Tried
+from . import callbacks, export
+from .convention import ANY, EXACT
+from .exchange import Answer, TooDeep, Tried
 from .judging import failure_bound
-from .machine import ANY, EXACT
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -41,7 +41,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
         export.files(job, subject(job))
     except Rejected as rejected:
         return rejected.diagnostics
-    except (wire.TooDeep, RecursionError):
+    except (TooDeep, RecursionError):
         return (Diagnostic("HYPO105", "a formula of this node is nested too deeply to be tested", job.node.span),)
     return ()
 
@@ -51,7 +51,7 @@ def files(job: Job) -> Mapping[str, str]:
         return {}
     try:
         return export.files(job, subject(job))
-    except (Rejected, wire.TooDeep, RecursionError):
+    except (Rejected, TooDeep, RecursionError):
         return {}
 
 

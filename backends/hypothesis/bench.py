@@ -35,15 +35,26 @@ from avow.isolation.scout import Scout, Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
 
-from . import seek, wire
+from . import steer
 from .beside import kept_inputs, system_root, table_rows
-from .cases import Case, asked_with, pairs, sent_inputs, told, valuation
-from .convention import Malformed, outputs
-from .exchange import Answer, Met, Pairs, Question, Tried
+from .convention import (
+    EXACT,
+    SPECIAL,
+    Case,
+    Malformed,
+    as_double,
+    asked_with,
+    outputs,
+    pairs,
+    rounded,
+    sent_inputs,
+    told,
+    valuation,
+)
+from .exchange import Answer, Met, Pairs, Question, Tried, decode
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
-from .machine import EXACT, SPECIAL, as_double, rounded
 from .pools import constants, pools
 from .shrink import OutOfTime, configuration, smallest
 from .tuning import AFTER_COUNTING, APART, ASKED_AGAIN, BATCH, CASE_BYTES, COUNTED, EDGES, SCOUT_PATIENCE, TRIED
@@ -62,10 +73,10 @@ class Bench:
         self.cases = asked.cases
         self.seed = asked.seed
         self.doubles = asked.numbers != EXACT
-        self.inputs_sorts: dict[str, Sort] = {p.name: wire.decode(p.sort) for p in asked.inputs}
-        self.output_sorts: dict[str, Sort] = {p.name: wire.decode(p.sort) for p in asked.outputs}
+        self.inputs_sorts: dict[str, Sort] = {p.name: decode(p.sort) for p in asked.inputs}
+        self.output_sorts: dict[str, Sort] = {p.name: decode(p.sort) for p in asked.outputs}
         records = Records()
-        self.formulas = [wire.decode(c.formula) for c in (*asked.assumptions, *asked.guarantees)]
+        self.formulas = [decode(c.formula) for c in (*asked.assumptions, *asked.guarantees)]
         formulas = iter(self.formulas)
         self.assumptions = tuple(judged(c.name, next(formulas), c.text, records) for c in asked.assumptions)
         self.guarantees = {c.name: guarantee(c.name, next(formulas), c.text, records) for c in asked.guarantees}
@@ -169,7 +180,7 @@ class Bench:
             self.scout.close()
             failed = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
             smaller = {name: case for name, case in failed.items() if case is not None}
-            self.only_after = seek.only_after(self, smaller)
+            self.only_after = steer.only_after(self, smaller)
             if self.crash is not None and not self.subject.fault:
                 self.crash = self._shrunk_crash()
             elif not self.subject.fault:
@@ -229,12 +240,12 @@ class Bench:
 
         try:
             self._replay()
-            seek.learn(self)
+            steer.learn(self)
             self._edges()
             every()
             if queue:
                 self._try(queue)
-            seek.steer(self)
+            steer.steer(self)
         except OutOfTime:
             return "time"
         except _Enough:

@@ -32,9 +32,9 @@ from avow.isolation.observed import Observed
 from avow.ros.sources import message_files
 from avow.system.plan import Driving
 
+from .convention import ANY, EXACT, SPECIAL
 from .export import cases, numbers
 from .judging import failure_bound
-from .machine import ANY, EXACT, SPECIAL
 from .tuning import (
     APART,
     ASKED_AGAIN,

@@ -1,12 +1,18 @@
-"""Between the contract's values and what a subject gets and returns (`host` has the Python side of it)."""
+"""Between the contract's values and what a subject gets and returns (`host` has the Python side of it).
+
+What computes with floating-point numbers, as robots do, gets inputs that are rounded to doubles before anything is
+judged, so that judge and subject speak of the same numbers; the judge stays exact. What no REAL is (NaN, the
+infinities) is tried apart, and so is the negative zero.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value, show
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     BoolSort,
@@ -23,6 +29,9 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+
+from .exchange import Pairs
+from .generate import Inputs
 
 
 class Malformed(Exception):  # noqa: N818 - it names what is wrong
@@ -88,7 +97,7 @@ def received(data: Any, sort: Sort, what: str) -> Value:
                 return table
         case SetSort(), _:
             pass
-    raise Malformed(f"{what} is {told(data)}, which is no value of {show_sort(sort)}")
+    raise Malformed(f"{what} is {_shown(data)}, which is no value of {show_sort(sort)}")
 
 
 def _label(pair: Any) -> str:
@@ -150,10 +159,10 @@ def _point(data: Any, parameters: Sequence[Sort], what: str) -> tuple[Value, ...
                     raise
     if len(parameters) == 1:
         return (received(data, parameters[0], place),)
-    raise Malformed(f"{place} is {told(data)}; it needs {len(parameters)} values")
+    raise Malformed(f"{place} is {_shown(data)}; it needs {len(parameters)} values")
 
 
-def told(data: Any) -> str:
+def _shown(data: Any) -> str:
     """What the subject returned, for people."""
     match data:
         case {"?": what}:
@@ -161,9 +170,9 @@ def told(data: Any) -> str:
         case {"q": [numerator, denominator]}:
             return str(Fraction(int(numerator), int(denominator)))
         case {"t": parts}:
-            return f"({', '.join(map(told, parts))})"
+            return f"({', '.join(map(_shown, parts))})"
         case {"s": parts}:
-            return f"{{{', '.join(map(told, parts))}}}"
+            return f"{{{', '.join(map(_shown, parts))}}}"
         case {"m": _}:
             return "a dict"
         case {"f": _}:
@@ -185,10 +194,83 @@ def outputs(data: Any, ports: Mapping[str, Sort]) -> dict[str, Value]:
             found = {next(iter(names)): data}
         case _:  # several names
             listed = ", ".join(sorted(names))
-            raise Malformed(f"the subject returned {told(data)}; it has to return a dict of {listed}")
+            raise Malformed(f"the subject returned {_shown(data)}; it has to return a dict of {listed}")
     if set(found) != names:
         missing, extra = sorted(names - set(found)), sorted(set(found) - names)
         parts = [f"lacks {', '.join(missing)}"] if missing else []
         parts += [f"has {', '.join(map(repr, extra))}, which the node has not"] if extra else []
         raise Malformed(f"the dict that the subject returned {' and '.join(parts)}")
     return {name: received(found[name], sort, f"out.{name}") for name, sort in ports.items()}
+
+
+# -- cases in the contract's words -------------------------------------------------------------------------------------
+
+
+Case = tuple[Inputs, dict[str, Value]]
+
+
+def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
+    """Qualified names to values."""
+    return {f"in.{n}": v for n, v in inputs.items()} | {f"out.{n}": v for n, v in found.items()}
+
+
+def told(inputs: Inputs, found: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in pairs(inputs, found))
+
+
+def pairs(inputs: Inputs, found: Mapping[str, Value]) -> Pairs:
+    return tuple((name, show(value)) for name, value in valuation(inputs, found).items())
+
+
+def asked_with(inputs: Inputs, name: str, word: str) -> Pairs:
+    """The inputs, of which one is what the word says."""
+    return tuple((n, word if n == f"in.{name}" else value) for n, value in pairs(inputs, {}))
+
+
+def sent_inputs(inputs: Inputs) -> dict[str, Any]:
+    return {name: sent(value) for name, value in inputs.items()}
+
+
+# -- machine numbers ---------------------------------------------------------------------------------------------------
+
+
+EXACT, FINITE, ANY = "exact", "float64", "float64-with-nan"
+"""The option `numbers`: fractions; doubles; doubles, and whoever fails on one that is no number is refuted."""
+
+SPECIAL = {"-0": "-0x0.0p+0", "NaN": "nan", "infinity": "inf", "-infinity": "-inf"}
+"""In words, and as Python reads them (`float.fromhex`)."""
+
+
+def rounded(value: Value) -> Value:
+    """Every REAL in it as the nearest double."""
+    match value:
+        case Fraction():
+            try:
+                return Fraction(float(value))
+            except OverflowError:
+                return Fraction(sys.float_info.max) * (1 if value > 0 else -1)
+        case Data(constructor=constructor, arguments=arguments):
+            return Data(constructor, tuple(map(rounded, arguments)))
+        case SequenceValue(items=items):
+            return SequenceValue(tuple(map(rounded, items)))
+        case FunctionValue(table=table, default=default):
+            other = rounded(default)
+            points = {tuple(map(rounded, point)): rounded(v) for point, v in table.items()}
+            return FunctionValue({point: v for point, v in points.items() if v != other}, other)
+        case tuple():
+            return tuple(map(rounded, value))
+        case _:  # no number, or a whole one
+            return value
+
+
+def as_double(data: Any) -> Any:
+    """What `sent` made of a rounded value, with doubles in it."""
+    match data:
+        case {"q": [numerator, denominator]}:
+            return {"r": float(Fraction(numerator, denominator)).hex()}
+        case dict():
+            return {key: as_double(part) for key, part in data.items()}
+        case list():
+            return [as_double(part) for part in data]
+        case _:  # no number
+            return data

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 from avow.base.codec import LATER
+from avow.base.diagnostics import Span
 from avow.base.verdict import Isolation
 from avow.isolation.observed import Observed
+from avow.language import sorts, terms
+from avow.language.sorts import Sort
+from avow.language.terms import Past, Quantifier, Role, Term
+
+from .tuning import WIRE_DEPTH
 
 Pairs = tuple[tuple[str, str], ...]
 """Qualified names and values, as they are shown."""
@@ -22,7 +31,7 @@ class Typed:
     type: str
     """As RCL says it."""
     sort: Any
-    """Of this and of `Stated.formula`, `wire` has the form."""
+    """Of this and of `Stated.formula`, `encode` has the form."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,3 +123,64 @@ class Answer:
     """Drawn runs, where the contract remembers: then they are what is counted."""
     guarantees: Mapping[str, Tried]
     fault: str = ""
+
+
+# -- sorts and terms: dataclasses by name and fields -------------------------------------------------------------------
+
+
+_CLASSES: dict[str, Any] = {
+    c.__name__: c
+    for module in (sorts, terms)
+    for c in vars(module).values()
+    if isinstance(c, type) and dataclasses.is_dataclass(c)
+}
+
+
+class TooDeep(Exception):  # noqa: N818 - it names what happened
+    """A formula is nested beyond `WIRE_DEPTH`."""
+
+
+def encode(value: Term | Sort) -> Any:
+    """A term or sort as JSON data. Raises TooDeep."""
+    return _encode(value, 0)
+
+
+def _encode(value: Any, depth: int) -> Any:
+    if depth > WIRE_DEPTH:
+        raise TooDeep
+    if isinstance(value, tuple):
+        return [_encode(item, depth + 1) for item in value]
+    if isinstance(value, Fraction):
+        return {"fraction": [str(value.numerator), str(value.denominator)]}
+    if isinstance(value, int) and not isinstance(value, bool):
+        return {"integer": str(value)}
+    if isinstance(value, StrEnum | str | bool):
+        return value if isinstance(value, bool) else str(value)
+    made: dict[str, Any] = {"is": type(value).__name__}
+    for name in (one.name for one in dataclasses.fields(value)):
+        part = getattr(value, name)
+        if part is not None and not isinstance(part, Span):
+            made[name] = _encode(part, depth + 1)
+    return made
+
+
+def decode(data: Any) -> Any:
+    """What `encode` wrote."""
+    match data:
+        case list():
+            return tuple(decode(item) for item in data)
+        case {"fraction": [numerator, denominator]}:
+            return Fraction(int(numerator), int(denominator))
+        case {"integer": digits}:
+            return int(digits)
+        case {"is": name}:
+            parts = {key: decode(value) for key, value in data.items() if key != "is"}
+            if "role" in parts:
+                parts["role"] = Role(parts["role"])
+            if "quantifier" in parts:
+                parts["quantifier"] = Quantifier(parts["quantifier"])
+            if name == "History":
+                parts["operator"] = Past(parts["operator"])
+            return _CLASSES[name](**parts)
+        case _:  # a value that is its own JSON
+            return data

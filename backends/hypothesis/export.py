@@ -12,9 +12,8 @@ from avow.formulas.temporal.cells import remembers
 from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
 
-from . import wire
-from .exchange import Question, Stated, Subject, Typed
-from .machine import EXACT
+from .convention import EXACT
+from .exchange import Question, Stated, Subject, Typed, encode
 from .subject import SubjectFile
 
 DATA = "contract.json"
@@ -89,7 +88,7 @@ def test_name(job: Job) -> str:
 
 
 def files(job: Job, subject: SubjectFile) -> Mapping[str, str]:
-    """Relative path → text. Pure. Raises `wire.TooDeep`."""
+    """Relative path → text. Pure. Raises `TooDeep`."""
     return {DATA: _data(job, subject), test_name(job): _module(job, subject)}
 
 
@@ -132,12 +131,12 @@ def _data(job: Job, subject: SubjectFile) -> str:
 
 
 def _port(port: Port) -> Typed:
-    return Typed(port.name, show_sort(port.sort), wire.encode(port.sort))
+    return Typed(port.name, show_sort(port.sort), encode(port.sort))
 
 
 def _clause(clause: Clause) -> Stated:
     text = show_term(clause.formula, "unicode").replace("\n", " ")
-    return Stated(clause.name, text, wire.encode(clause.formula))
+    return Stated(clause.name, text, encode(clause.formula))
 
 
 def _scenario(job: Job) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:

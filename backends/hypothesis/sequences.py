@@ -23,15 +23,13 @@ from avow.isolation.scout import Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
-from . import seek
+from . import steer
 from .bench import Bench, _Enough
 from .beside import kept_runs
-from .cases import Case, asked_with, pairs, told, valuation
-from .convention import Malformed, outputs, received
+from .convention import SPECIAL, Case, Malformed, asked_with, outputs, pairs, received, told, valuation
 from .exchange import Answer, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Impossible, Inputs, Source
-from .machine import SPECIAL
 from .shrink import OutOfTime
 from .tuning import (
     AFTER_COUNTING,
@@ -189,14 +187,14 @@ class SequenceBench(Bench):
                 self._replayed_run(steps)
             for each in self.guarantees.values():
                 each.edge_hits = [0] * len(each.triggers)
-            seek.learn(self)
+            steer.learn(self)
             self._edges_left = iter([*map(self.as_given, self.generator.edges(self.blamed))])
             while self.valid < self.cases:
                 self._run(chance)
                 if self.rejected > REJECTED_CASES * max(self.valid, 50):
                     return "assumptions"
             self.tried_at([], [*itertools.islice(self._edges_left, EDGES // 3)])
-            seek.steer(self)
+            steer.steer(self)
         except OutOfTime:
             return "time"
         except _Enough:

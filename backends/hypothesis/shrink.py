@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hypothesis import HealthCheck, Phase, assume, given, seed, settings
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 
-from .cases import Case, told
+from .convention import Case, told
 from .generate import Inputs, Source
 from .tuning import SHRINKING_SECONDS
 

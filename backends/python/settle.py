@@ -33,7 +33,7 @@ from avow.solving.limits import from_seconds, until
 from avow.solving.settling import Settler
 
 from .conditions import Conditions, Found
-from .machine import fraction, run
+from .program import fraction, run
 from .reading import Reading, load
 from .translate import kind_of
 from .tuning import APART, RUN_SECONDS, VALIDATED

@@ -30,13 +30,13 @@ from avow.language.sorts import (
 )
 
 from .expressions import Expressions
-from .machine import Failed, run_block
 from .program import (
     Assign,
     Binary,
     Const,
     Expr,
     Extreme,
+    Failed,
     For,
     Give,
     If,
@@ -51,6 +51,7 @@ from .program import (
     Step,
     View,
     assigned,
+    run_block,
 )
 from .tuning import INLINED_DEPTH
 from .whole_file import Parts, Refusal, bound_names, plain_arguments

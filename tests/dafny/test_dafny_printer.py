@@ -16,8 +16,7 @@ from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.dafny_tool import dafny
 from avow.backends.dafny.modules import Generated, generate
-from avow.backends.dafny.names import RESERVED, Names, identifier
-from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
+from avow.backends.dafny.printer import RESERVED, Names, NotExpressible, Vocabulary, identifier, print_clause
 from avow.backends.dafny.runner import verify
 from avow.base.verdict import Verdict
 from avow.isolation.outside import Outside

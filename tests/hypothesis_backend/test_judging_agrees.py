@@ -16,7 +16,7 @@ from oracle.values import plain
 from rosmonitoring.conftest import make_system
 from rosmonitoring.test_agreement import MAPPING, MEANING, RCL, formula
 
-from avow.backends.hypothesis import wire
+from avow.backends.hypothesis import exchange
 from avow.backends.hypothesis.judging import judged
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import Records
@@ -57,9 +57,9 @@ def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> No
     for _ in range(12):
         system = make_system(RCL.format(formula=formula(rng, rng.choice((1, 2, 3)))), MAPPING)
         clause = system.contract.node("n").guarantees[0]
-        sent = json.loads(json.dumps(wire.encode(clause.formula)))
-        judge = judged(clause.name, wire.decode(sent), clause.text, Records())
-        assert wire.decode(sent) == clause.formula
+        sent = json.loads(json.dumps(exchange.encode(clause.formula)))
+        judge = judged(clause.name, exchange.decode(sent), clause.text, Records())
+        assert exchange.decode(sent) == clause.formula
         for _ in range(4):
             values = {v: value(rng, v) for v in sorted(free_variables(clause.formula), key=lambda v: v.qualified)}
             snapshot = {v.qualified: plain(found) for v, found in values.items()}

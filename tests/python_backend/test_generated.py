@@ -16,8 +16,7 @@ from typing import Any
 import pytest
 
 from avow.backend_kit.programs.samples import Drawing, pool
-from avow.backends.python.machine import run
-from avow.backends.python.program import Step
+from avow.backends.python.program import Step, run
 from avow.backends.python.symbolic import Run
 from avow.backends.python.translate import Translator
 from avow.backends.python.whole_file import read
