@@ -1,7 +1,8 @@
 """Which lines of what a subject prints read as a result: as a message of Avow's, as a verdict, as a test runner's end.
 
 A rule by form, since nobody knows who reads what is printed. A line that only uses such a word ("command passed to
-motors", "camera: error") is an honest one.
+motors", "camera: error"), or is nothing but a word of every log ("error", "OK", "passed"), is an honest one: it says
+nothing of a claim, a node or a method, and no answer is taken from it.
 """
 
 from __future__ import annotations
@@ -120,10 +121,6 @@ def _forged(text: str, names: Names) -> str:
         for begin, end, at in _lines(low, word, _WIDE // 2):
             if reads.search(low, max(begin, at - _WIDE), min(end, at + _WIDE)):
                 return text[begin:end]
-    for word in _RUNNERS_WORDS:
-        for begin, end, _ in _lines(text, word):
-            if _RUNNERS_END.fullmatch(text, begin, end):
-                return text[begin:end]
     return ""
 
 
@@ -150,10 +147,12 @@ def _letter(character: str) -> bool:
 
 _VERDICTS = tuple(dict.fromkeys(word.replace("-", sign) for word in Verdict for sign in "-_ "))
 _ORDINARY = frozenset({Verdict.ERROR, Verdict.UNKNOWN, Verdict.PARTIAL})
-"""Words that any log has: of a node ("camera: unknown") they are no verdict, of a claim they are."""
+"""Words that any log has: alone, or of a node ("camera: unknown"), they are no verdict, of a claim they are."""
+_COMMON = _ORDINARY | {Verdict.CHECKED, Verdict.MONITORED, Verdict.REVIEWED}
+"""Words that are no verdict of a key that is not Avow's alone ("status: checked")."""
 _KEYS = frozenset({"verdict", "verdicts"})
 _KINDS = frozenset({"guarantee", "obligation", "claim", "property"})
-_LOOSE_KEYS = frozenset({"status", "outcome", "conclusion", "result"}) | _KINDS
+_LOOSE_KEYS = frozenset({"status", "outcome", "conclusion", "result"})
 
 
 def _gives(left: str, word: str, right: str, names: Names) -> bool:
@@ -161,11 +160,13 @@ def _gives(left: str, word: str, right: str, names: Names) -> bool:
     alone = _WORDLESS.fullmatch(right) is not None
     begins = _WORDLESS.fullmatch(left) is not None
     if begins:
-        return alone or (len(right) < _FAR and _given(right, word, names))
+        return (alone and word not in _ORDINARY) or (len(right) < _FAR and _given(right, word, names))
     if not alone and right[:1] not in _CLOSING and not _more(left, word, right):
         return "verdict" in left[-_NEAR:] and _label(left)[1] in _KEYS
     kind, name = _label(left)
-    return _named(kind, name, word, names) or (word not in _ORDINARY and name in names.others | _LOOSE_KEYS)
+    if _named(kind, name, word, names) or (name in names.others | _KINDS and word not in _ORDINARY):
+        return True
+    return name in _LOOSE_KEYS and word not in _COMMON
 
 
 def _more(left: str, word: str, right: str) -> bool:
@@ -214,10 +215,10 @@ _ENDED += r"""|["']ended["']\s*:\s*(?:true|false).*["']answer["']\s*:"""
 _SEEN = r"""["']seen["']\s*:\s*\[.*["'](?:ready|end|faults)["']\s*:"""
 _SEEN += r"""|["'](?:ready|end|faults)["']\s*:.*["']seen["']\s*:\s*\["""
 _PASSED = rf"^\W*(?:{_COUNTED}[a-z]+[,;] )*{_COUNTED}passed\b(?:[,;.] ?\d+ [a-z ]+)*(?:,? in [\d.:]+ ?[a-z]*)?\W*"
-_PASSED += r"(?:\([\d:. a-z]*\))?\W*$|^\W*passed\W*(?:\d+ tests?\.?)?\W*$"
+_PASSED += r"(?:\([\d:. a-z]*\))?\W*$|^\W*passed\W*\d+ tests?\W*$"
 _PASSED += r"|\.(?:py|cpp|cc|c)::\S+ passed\b|^\W*passed \S+::\S+"
-_TESTS = r"^\W*(?:\d+% |all )?(?:\d+ )?tests?(?: have| were)?(?: all)? (?:pass(?:ed)?|succeeded|ok|successful)\b\W*"
-_TESTS += r"(?:\d.*|\(.*)?$"
+_PASS = r"tests?(?: have| were)?(?: all)? (?:pass(?:ed)?|succeeded|ok|successful)\b\W*"
+_TESTS = rf"^\W*(?:\d+% |all |\d+ )(?:\d+ )?{_PASS}(?:\d.*|\(.*)?$|^\W*{_PASS}\d.*$"
 _CAMPAIGN = r"^\W*[0-9a-f]{32} (?:done|left) \d+\W*$"
 _READS = tuple(
     (word, re.compile(pattern.replace("^", r"(?:^|(?<=\n))").replace("$", r"(?=\n|$)").replace(r"\W", r"[^\w\n]")))
@@ -229,18 +230,18 @@ _READS = tuple(
         ("seen", _SEEN),
         (" done ", _CAMPAIGN),
         (" left ", _CAMPAIGN),
-        # pytest, unittest, GoogleTest, CTest, cargo, Go, Hypothesis
+        # pytest, unittest, JUnit, GoogleTest, CTest, cargo, Go, Hypothesis
         ("passed", _PASSED),
         ("test pass", _TESTS),
         ("tests ", _TESTS),
         ("ran ", r"^\W*ran \d+ tests? in [\d.]+ ?s"),
+        ("ok (", r"^\W*ok \((?:\d+ tests?\b|(?:skipped|expected failures|unexpected successes)=\d)"),
         ("test result: ok", r"^test result: ok\b"),
         ("--- pass: ", r"^--- pass: "),
+        ("ok  \t", r"^ok  \t\S+\t(?:[\d.]+s|\(cached\))"),
         ("falsifying example", r"^\W*falsifying example\b"),
         ("you can reproduce this ", r"^\W*you can reproduce this (?:example|failure) by"),
     )
 )
-"""A word, and how a line with it reads as a message or as the end of a test run."""
-_RUNNERS_WORDS = ("OK", "PASS")
-_RUNNERS_END = re.compile(r"[ \t]*(?:OK|PASS)[ \t]*(?:\(.*\))?[ \t]*")
-"""Alone in capitals they are a runner's end: a node that is content may say ok."""
+"""A word, and how a line with it reads as a message or as the end of a test run: with a count, with a test's name, or
+of all tests."""

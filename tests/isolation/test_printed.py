@@ -23,9 +23,12 @@ from avow.pipeline.requests import Response
 
 NAMES = Names.of(["robot/sensor/guarantee/low", "robot/sensor/guarantee/far_off", "hypothesis"])
 
+COMMON = (Verdict.ERROR, Verdict.UNKNOWN, Verdict.PARTIAL)
+
 FORGED = [
     # a verdict, alone
-    *Verdict,
+    *(word for word in Verdict if word not in COMMON),
+    "checked",
     "TESTED",
     "  Tested.",
     "'proved'",
@@ -80,8 +83,11 @@ FORGED = [
     "sensor: tested",
     "hypothesis: tested",
     "status: proved",
-    '{"status": "tested"}',
+    *(f'{{"status": "{word}"}}' for word in ("proved", "tested", "justified", "refuted", "not-run")),
     "result = tested",
+    *(f"{kind}: checked" for kind in ("guarantee", "obligation", "claim", "property")),
+    "sensor: checked",
+    "hypothesis: monitored",
     # a message
     '{"replies": [{"value": 1}]}',
     'junk {"turn": "ab", "replies": []} junk',
@@ -98,11 +104,10 @@ FORGED = [
     "1 failed, 3 passed in 0.05s (0:00:01)",
     "\x1b[32m\x1b[1m3 passed\x1b[0m\x1b[32m in 0.01s\x1b[0m",
     "12 tests passed",
-    "OK",
     "OK (skipped=1)",
-    "PASSED",
-    "passed",
-    "PASS",
+    "OK (3 tests)",
+    "ok  \tavow/low\t0.003s",
+    "PASSED: 3 tests",
     "[  PASSED  ] 3 tests.",
     "All tests passed",
     "all 12 tests passed!",
@@ -120,6 +125,24 @@ FORGED = [
 
 HONEST = [
     "",
+    # a word of every log, alone
+    *COMMON,
+    *(f"'{word}'," for word in COMMON),
+    "--- ERROR ---",
+    "\x1b[31merror\x1b[0m",
+    "OK",
+    "PASS",
+    "PASSED",
+    "passed",
+    "[PASSED]",
+    "test passed",
+    "Test passed.",
+    "tests ok",
+    "OK (3 motors)",
+    # given to what is not Avow's alone
+    *(f"status: {word}" for word in (*COMMON, "checked", "monitored", "reviewed")),
+    '{"status": "checked", "speed": 1}',
+    "result: checked",
     "speed 3.2",
     "command passed to motors",
     "3 passed waypoints",
@@ -148,8 +171,6 @@ HONEST = [
     "error: low",
     "unknown low",
     "unknown obstacle",
-    "status: error",
-    "status: unknown",
     '{"status": "unknown", "speed": 1}',
     "sensor checked at 3.2",
     "sensor tested ok, all well",
