@@ -25,12 +25,14 @@ def instead(call: Callable[..., Any], inner: Any) -> Callable[..., Any]:
 _OF_MODULES = {
     "_lsprof": ("the clock", ""),
     "_signal": ("the clock", "alarm getitimer setitimer"),
-    "_socket": ("the network", "if_nameindex if_nametoindex if_indextoname"),
+    "_socket": ("the network", "if_nameindex if_nametoindex if_indextoname socketpair"),
     "_ssl": ("random numbers", "RAND_bytes RAND_pseudo_bytes"),
     "_thread": ("the numbers of a process", "get_native_id"),
     "_uuid": ("random numbers", "generate_time_safe"),
 }
 """Modules in C: what their functions ask for that no record can hold; of one without functions, what it is for."""
+_SOCKETS = ("getsockopt", "setsockopt", "recvmsg", "recvmsg_into")
+"""What asks a socket, even one of a pair, for the user, the numbers of a process or the clock; no audit event tells."""
 
 
 def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
@@ -54,6 +56,17 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
                 setattr(module, name, outer(getattr(module, name), "outside", what))
         if module.__name__ == "_signal":
             module.signal = _frameless(module.signal)
+        elif module.__name__ == "_socket":
+            module.socket = module.SocketType = told_of(module.socket)
+
+    def told_of(kind: Any) -> Any:
+        class Watched(kind):  # type: ignore[misc]
+            __slots__ = ()
+
+        for name in _SOCKETS:
+            setattr(Watched, name, outer(getattr(kind, name), "outside", "the network"))
+        Watched.__name__, Watched.__qualname__, Watched.__module__ = "socket", "socket", "_socket"
+        return Watched
 
     for name in _OF_MODULES.keys() & sys.modules.keys():
         loaded(sys.modules[name])

@@ -25,8 +25,11 @@ from avow.isolation.watching import way
 _SIGNALS = frozenset({"kill", "tkill", "pidfd_send_signal", "rt_sigqueueinfo"})
 _PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
 _NETWORK = frozenset({"socket", "connect"})
+_OF_SOCKETS = frozenset({"getsockopt", "setsockopt", "recvmsg", "recvmmsg"})
+"""What asks a socket, even one of a pair, for the user, the numbers of a process or the clock."""
 _MACHINE_CALLS = frozenset({"uname", "sysinfo"})
 """What a program asks of the machine by a call. The clock is read without one (`symbols`)."""
+_TOLD = _SIGNALS | _PROBES | _NETWORK | _OF_SOCKETS | _MACHINE_CALLS
 _STEPS = frozenset({"clone", "clone3", "fork", "vfork", "fchdir"})
 """Calls that say in which folder a process is."""
 _OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
@@ -93,7 +96,7 @@ def remedy() -> str:
 
 
 def _strace(place: str) -> list[str]:
-    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE | _MACHINE_CALLS | _STEPS)])
+    calls = ",".join(["%file", *sorted(_TOLD | _BY_HANDLE | _STEPS)])
     program = shutil.which("strace") or "strace"
     return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
@@ -331,6 +334,9 @@ def _read(lines: Sequence[tuple[int, bytes]], mark: str, folder: str, scratch: s
             faults["looks at another process"] = None
         elif call in _NETWORK:
             if (call == "socket" and b"AF_UNIX" not in line) or (call == "connect" and rest.rstrip().endswith(b"= 0")):
+                events["outside", "the network"] = None
+        elif call in _OF_SOCKETS:
+            if process == host:
                 events["outside", "the network"] = None
         elif call in _MACHINE_CALLS:
             if process != host:  # the host's own: `senses`

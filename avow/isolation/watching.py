@@ -177,7 +177,8 @@ def watch(
             told("program", f"the program {str(arguments[0])[:200]}")
             told("variable", "PATH")  # it is looked for there, and what it starts
         elif event.startswith(_NETWORK):
-            told("outside", "the network")
+            if event != "socket.__new__" or not _wakes_a_loop():
+                told("outside", "the network")
         elif event == "fcntl.ioctl":
             told("outside", "the state of a device")
         elif event in _TRACES:
@@ -234,6 +235,14 @@ def _looks_around(event: str) -> bool:
     if frame is None:
         return False
     return not _is_library(frame.f_code.co_filename)
+
+
+def _wakes_a_loop() -> bool:
+    """Whether a socket is made that is of the pair by which a loop of `asyncio` wakes itself: it is as a pipe that
+    stays in the process, as long as nobody connects it or asks for its options, which is told."""
+    frame: Any = sys._getframe(3)  # of who called what makes the socket
+    places = [(_STDLIB + "socket.py", "socketpair"), (_STDLIB + "asyncio/selector_events.py", "_make_self_pipe")]
+    return [(f.f_code.co_filename, f.f_code.co_name) for f in (frame, frame and frame.f_back) if f] == places
 
 
 def _is_library(file: str) -> bool:

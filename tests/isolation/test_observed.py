@@ -274,6 +274,8 @@ UNRECORDABLE = {
     "chance in a name": "import uuid\ntop = 10 if uuid.uuid4() else 1000\n",
     "a device of chance": "top = 10 if open('/dev/urandom', 'rb').read(1) else 1000\n",
     "the network": "import socket\nsocket.socket(socket.AF_UNIX).close()\ntop = 10\n",
+    "a pair of sockets of one's own": "import socket\nsocket.socketpair()\ntop = 10\n",
+    "a pair of sockets, from C": "import _socket\n_socket.socketpair()\ntop = 10\n",
     "a library": "import ctypes\nctypes.CDLL(None).getpid()\ntop = 10\n",
     "a device": "open('/dev/full', 'rb').close()\nopen('/proc/self/stat').close()\ntop = 10\n",
     "SQLite's clock": "import sqlite3\n"
@@ -398,6 +400,9 @@ SEEN_THROUGH = {
     "d = tempfile.mkdtemp()\nshutil.copy2(__file__, d)\nassert os.path.samefile(d, d)\n"
     "assert [n for _, _, n in os.walk(d)] and list(pathlib.Path(d).rglob('*.py')) and os.path.ismount('/')\n"
     "linecache.checkcache()\nlinecache.getlines(__file__)\nassert platform.system()\ntop = 10\n",
+    "a loop": "import asyncio\nasync def f():\n    await asyncio.sleep(0.01)\n    return 10\n"
+    "async def g():\n    return max(await asyncio.gather(f(), asyncio.to_thread(int, 3), asyncio.wait_for(f(), 5)))\n"
+    "top = asyncio.run(g())\n",
     "what the library does for itself": "import logging, tempfile, threading, queue, uuid, random\n"
     "logging.getLogger().warning('x')\ntempfile.TemporaryFile().close()\n"
     "t = threading.Thread(target=queue.Queue().put, args=(1,))\nt.start()\nt.join(5)\ntop = 10\n",
