@@ -119,7 +119,7 @@ def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]
 def _left_out(place: Workspace, cases: Sequence[Case], name: str) -> Iterator[tuple[str, str, list[str]]]:
     """As `_others`, of records that stand in the ledger alone."""
     from avow.evidence.ledger import Ledger
-    from avow.report.identified import left_out
+    from avow.report.explained import left_out
 
     for case in cases:
         with contextlib.suppress(OSError):  # what cannot be read has no record to show: `avow audit` says so

@@ -8,8 +8,7 @@ from pathlib import Path
 import click
 
 from avow.base.codec import document
-from avow.cli.options import json_option
-from avow.cli.paths import PathArgument
+from avow.cli.options import PathArgument, json_option
 
 _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from avow.base.codec import document
-from avow.cli.options import json_option, node_option, planned_seconds_option
+from avow.cli.options import json_option, node_option, seconds_option
 
 if TYPE_CHECKING:
     from avow.pipeline.mutation import Score
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option("--method", help="Only methods of this id.")
 @node_option()
 @json_option("every score; what is told on the way goes to standard error")
-@planned_seconds_option()
+@seconds_option()
 @click.option("--limit", type=click.IntRange(1), default=4, show_default=True, help="Mutants for each guarantee.")
 @click.option("-n", "jobs", type=click.IntRange(1), default=2, show_default=True, help="How many at once.")
 def command(

@@ -2,22 +2,47 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from avow.base.tuning.sizes import LONGEST_TIMEOUT
-from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterable
 
     from avow.language.contract import Contract
     from avow.system.plan import System
 
 Command = TypeVar("Command", bound="Callable[..., object]")
+
+
+class PathArgument(click.Path):
+    """As `click.Path`, giving `Path`; an empty path (an unset variable in a script), or one that no file can have, is a
+    usage error, and never the current folder."""
+
+    name = "path"
+
+    def __init__(self, **more: Any) -> None:
+        super().__init__(path_type=Path, **more)
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        text = os.fspath(value)
+        if not text:
+            self.fail("the path is empty; the current folder is written `.`", param, ctx)
+        try:
+            os.stat(text)  # noqa: PTH116 - a text that may be no path at all
+        except ValueError as error:
+            self.fail(f"{text[:60]!r}… is no path: {error}", param, ctx)
+        except OSError as error:
+            if error.errno == errno.ENAMETOOLONG:
+                self.fail(f"{text[:60]!r}… is no path: {error.strerror}", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 class ContractArgument(PathArgument):
@@ -68,25 +93,14 @@ class _Seconds(click.ParamType[float]):
         return seconds
 
 
-def seconds_option(default: float) -> Callable[[Command], Command]:
-    """``--seconds``: the effort for one question to the solver, as the time that it usually takes."""
+def seconds_option(default: float | None = None) -> Callable[[Command], Command]:
+    """``--seconds``: the effort for one question to the solver, as the time that it usually takes. Without a default
+    the plan has times of its own: given, it stands in place of them."""
+    text = "Effort for one question to the solver, as the time that it usually takes; what is counted is steps."
+    if default is None:
+        text = "Effort for one question to the solver, and time for one run of a tool, whatever the plan says."
     return click.option(
-        "--seconds",
-        type=_Seconds(),
-        metavar="SECONDS",
-        default=default,
-        show_default=True,
-        help="Effort for one question to the solver, as the time that it usually takes; what is counted is steps.",
-    )
-
-
-def planned_seconds_option() -> Callable[[Command], Command]:
-    """``--seconds`` where the plan has times of its own: given, it stands in place of them."""
-    return click.option(
-        "--seconds",
-        type=_Seconds(),
-        metavar="SECONDS",
-        help="Effort for one question to the solver, and time for one run of a tool, whatever the plan says.",
+        "--seconds", type=_Seconds(), metavar="SECONDS", default=default, show_default=default is not None, help=text
     )
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import click
 
 from avow.base.codec import document
-from avow.cli.options import json_option
-from avow.cli.paths import PathArgument
+from avow.cli.options import PathArgument, json_option
 
 
 @click.command()

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
-from avow.cli.options import ContractArgument, has_nodes, json_option, node_option
-from avow.cli.paths import PathArgument
+from avow.cli.options import ContractArgument, PathArgument, has_nodes, json_option, node_option
 
 if TYPE_CHECKING:
     from avow.base.diagnostics import Diagnostic

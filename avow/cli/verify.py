@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.diagnostics import Rejected
-from avow.cli.options import json_option, planned_seconds_option
-from avow.cli.paths import PathArgument
+from avow.cli.options import PathArgument, json_option, seconds_option
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Cluster
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
 @json_option("what came of each system; what is told on the way goes to standard error")
-@planned_seconds_option()
+@seconds_option()
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
 @click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
 @click.option("--on", "address", help="Send works to a cluster: dask+tls://HOST:PORT (docs/scale.md).")

@@ -32,7 +32,6 @@ PRELOADED = (
     "avow.sanity.claims",
     "avow.sanity.analysis",
     "avow.solving.questions",
-    "avow.pipeline.engines",
     "avow.system.formulas",
 )
 """What nearly every work needs, directly or not."""

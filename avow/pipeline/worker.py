@@ -13,16 +13,16 @@ import platform
 import sys
 import tempfile
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit import one_step
-from avow.backend_kit.protocol import Report
+from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.registry import trust_plugins
 from avow.base import process
 from avow.base.codec import from_json, to_json
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import compose
@@ -30,14 +30,12 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.kept_answers import keeping
 from avow.calculus.obligations import settle_each
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import RETRY
+from avow.evidence.record import REMARKS, RETRY
 from avow.pipeline import recheck
 from avow.pipeline.answers_file import ANSWERS, read_answers, write_answers
 from avow.pipeline.asking import CHANGED
 from avow.pipeline.blobs import Garbled, decode
-from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.mutant_systems import alter
-from avow.pipeline.remarks import remarked
 from avow.pipeline.requests import Request, Response, Tools, lay_out, read_request, request_digest, response_bytes
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
 from avow.pipeline.work import (
@@ -53,7 +51,7 @@ from avow.pipeline.work import (
     tool_identities,
 )
 from avow.solving.checking import z3_version
-from avow.solving.limits import from_seconds
+from avow.solving.limits import effort_told, from_seconds
 from avow.system.plan import System
 
 
@@ -187,6 +185,44 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
         again = _method_work(system, work.node, work.method)
         _claims(request, again.obligations, again.keys)
     return report if request.altered else remarked(report, one_step.check(tool, job), job)
+
+
+def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits: Limits) -> Report:
+    """Settle sanity claims of one node by the solver."""
+    from avow.calculus import providers
+    from avow.sanity import results
+    from avow.sanity.analysis import outcomes
+
+    bounds = results.Bounds(seed=limits.seed)
+    if limits.asked:
+        bounds = replace(bounds, effort=from_seconds(limits.seconds))
+    linked = {asked.claim.name: asked for asked in cut.linked}
+    own = {o.id: o.name for o in obligations if o.name not in linked}
+    found = outcomes(cut.node, own, scenario=cut.given, ranges=cut.ranges, bounds=bounds)
+    found += providers.outcomes(cut.node, {o.id: linked[o.name] for o in obligations if o.name in linked}, bounds)
+    found = tuple(replace(o, details={**o.details, **effort_told(bounds.effort)}) for o in found)
+    return Report(found, "z3", z3_version())
+
+
+def remarked(report: Report, found: Iterable[Diagnostic], job: Job) -> Report:
+    """The report with the warnings among `found`, but for those that the plan switches off: an assessor reads what a
+    method's check remarks of plan and files beside its answers."""
+    told = [
+        {"code": d.code, "place": _place(d.span, job.root), "message": d.message}
+        for d in dict.fromkeys(found)
+        if d.severity is Severity.WARNING and d.code not in job.system.plan.lints_off
+    ]
+    if not told:
+        return report
+    return replace(report, outcomes=tuple(replace(o, details={**o.details, REMARKS: told}) for o in report.outcomes))
+
+
+def _place(span: Span | None, root: Path) -> str:
+    """``models/p.imp:2``: the same on any machine."""
+    if span is None:
+        return ""
+    path = Path(span.file)
+    return f"{path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name}:{span.line}"
 
 
 if __name__ == "__main__":

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import base64
+import io
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, __version__
+from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import Tone
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView, OpenItem
-from avow.assurance.naming import short
+from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.backend_kit.timeline import in_words, picture, timelines
+from avow.base.files import sha256, write
+from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
+from avow.base.tuning.bounds import SUPPORT_STEPS
 from avow.base.tuning.shown import (
     ARGUMENT_ELEMENTS,
     FINDING_CHARACTERS,
@@ -33,16 +39,39 @@ from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
-from avow.report.compiled import Compiled
 from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
-from avow.report.support_counts import resting
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
 
 
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
+
+
+class Compiled(BytecodeCache):
+    """Templates as compiled before, kept in this user's cache: to compile them costs more than to fill them.
+
+    What is kept is code. So it is bound to the template's text by Jinja, and to its place by a seal: what was edited,
+    made up or made by another version of Jinja is none, and is made again.
+    """
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        kept = unsealed(_compiled(bucket))
+        if kept is not None:
+            bucket.load_bytecode(io.BytesIO(kept))
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        made = io.BytesIO()
+        bucket.write_bytecode(made)
+        try:
+            write(_compiled(bucket), sealed(_compiled(bucket), made.getvalue()))
+        except OSError:  # a read-only home: it is compiled in each run
+            return
+
+
+def _compiled(bucket: Bucket) -> Path:
+    return cache_folder() / "templates" / sha256(f"{__version__} {bucket.key}")
 
 
 @cache
@@ -372,3 +401,26 @@ def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
         for record in view.records
         if weigh(record).support is Status.JUSTIFIED
     ]
+
+
+def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
+    """How many claims of which status each supported requirement rests on, through derivations and all: one word for
+    the weakest of them does not tell that five others were only tested. Empty where that would take too long."""
+    if len(case.requirements) * len(case.obligations) > SUPPORT_STEPS:
+        return {}
+    below = {view.id: view.rests_on for view in case.obligations}
+    below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}
+    below |= {requirement_claim(r.id): (*r.rests_on, *r.obligations) for r in case.requirements}
+    statuses = {view.id: view.status for view in case.obligations}
+    told = {}
+    for requirement in case.requirements:
+        seen: set[str] = set()
+        stack = [requirement_claim(requirement.id)]
+        while stack:
+            name = stack.pop()
+            if name not in seen:
+                seen.add(name)
+                stack += below.get(name, ())
+        found = Counter(statuses[name] for name in seen if name in statuses)
+        told[requirement.id] = [(status, found[status]) for status in Status if found[status]]
+    return told

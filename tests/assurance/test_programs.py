@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from assurance.sample import chain, evidence, guarantee, obligation
-from avow.assurance.programs import shown_by_programs
+from avow.assurance.case import shown_by_programs
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, Evidence

@@ -23,8 +23,8 @@ from avow.calculus.notation import as_html, write_goal
 from avow.calculus.obligations import composition_obligations
 from avow.cli import main
 from avow.cli.compose import command as compose_command
+from avow.cli.compose import progress
 from avow.cli.graph import command as graph_command
-from avow.cli.progress import progress
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow

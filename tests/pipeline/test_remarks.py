@@ -12,8 +12,8 @@ from avow.base.tuning.shown import WARNINGS
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.pipeline.check import _tell
-from avow.pipeline.remarks import remarked
 from avow.pipeline.work import method_job
+from avow.pipeline.worker import remarked
 from avow.system.load import load_system
 
 CONTRACT = "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"

@@ -22,10 +22,10 @@ from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
 from avow.calculus.variables import frame
-from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.slices import compose_slice, sanity_slice
 from avow.pipeline.work import catalogue, method_job, planned_method
+from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
 from avow.system.plan import Scenario, System

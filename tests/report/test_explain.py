@@ -22,8 +22,7 @@ from avow.cli.ledgers import find_claim
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Kind
 from avow.report import formats
-from avow.report.explained import explained
-from avow.report.identified import left_out
+from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
 from report.test_answers_page import REPORTS
