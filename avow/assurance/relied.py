@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
+from avow.assurance.answers import Tone
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
 from avow.base.records import dataclass
@@ -93,6 +94,12 @@ def stands(view: ObligationView) -> str:
     if view.standing.supports:
         return word(view.standing)
     return "refuted" if view.status in (Status.REFUTED, Status.CONTRADICTORY) else "open"
+
+
+def shade(view: ObligationView) -> Tone:
+    """A claim's colour: green is for proofs and exhaustive checks."""
+    good = Tone.GREEN if view.standing in EXHAUSTIVE else Tone.AMBER
+    return good if view.standing.supports else Tone.RED
 
 
 _APART: Mapping[str, str] = {

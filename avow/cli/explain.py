@@ -26,8 +26,8 @@ def command(name: str, as_json: bool) -> int:
 
     ID is an obligation's id, whole (system/node/kind/name) or in part, a guarantee as node.name, or the name of a
     requirement, a supposition (S1, or its key), a node, a gate, a weakening, a derivation, a method, an element of the
-    argument (G4), a digest, a file, a diagnostic's code, or a word such as argued. It is told as the report has it, and
-    where that is not what the ledger says: exit code 1, or 2 where the ledger cannot be read.
+    argument (G4 of gsn.yaml), a digest, a file, a diagnostic's code, or a word such as argued. It is told as the report
+    has it, and where that is not what the ledger says: exit code 1, or 2 where the ledger cannot be read.
     """
     from avow.assurance.codec import to_json
     from avow.base.workspace import workspace

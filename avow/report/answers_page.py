@@ -14,7 +14,7 @@ from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
-from avow.assurance.relied import EXHAUSTIVE, kept_apart, stands, word
+from avow.assurance.relied import kept_apart, shade, stands, word
 from avow.base.plain import count, listed
 from avow.base.tuning.shown import NODE_BOXES, SHEET_LETTERS
 from avow.evidence.record import Evidence
@@ -117,11 +117,10 @@ def _node(case: Case, module: NodeModule) -> dict[str, Any]:
 
 def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
     said = case.said(view.id)
-    good, sure = view.standing.supports, view.standing in EXHAUSTIVE
     return {
         "view": view,
         "word": stands(view),
-        "tone": Tone.GREEN if sure else Tone.AMBER if good else Tone.RED,
+        "tone": shade(view),
         "where": wording.where(view),
         "reason": said.reason if said else "",
         "records": view.records,

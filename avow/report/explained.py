@@ -7,7 +7,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from avow.assurance.argument import build_argument
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
 from avow.assurance.modules import requirement_modules
@@ -19,6 +18,7 @@ from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.report.answers_page import WORDS, full_reason
 from avow.report.exchange import render_json
+from avow.report.gsn import gsn
 from avow.report.wording import MEANINGS
 
 
@@ -69,6 +69,8 @@ Told = tuple[str, list[str]]
 
 _DIGEST = re.compile(r"[0-9a-f]{12,64}\Z")
 _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
+_SHAPES = {"G": "goal", "S": "strategy", "Sn": "solution", "C": "context", "A": "assumption", "J": "justification"}
+"""GSN's kinds of element, by the letters before their numbers."""
 _PLACE = re.compile(r"(?P<path>[^:]+):(?P<line>[0-9]+)\Z")
 
 
@@ -153,9 +155,10 @@ def _of_code(name: str) -> Iterator[Told]:
 
 
 def _of_argument(case: Case, name: str) -> Iterator[Told]:
-    for element in build_argument(case).elements if re.fullmatch(r"(G|S|Sn|C|A|J)[0-9]+", name) else ():
-        if element.id == name:
-            yield f"{element.shape.value} {name} of the argument", [f"{element.title}. {element.text}"]
+    kind = _SHAPES.get(name.rstrip("0123456789"))
+    for module in gsn(case) if kind is not None else ():
+        if name in module:
+            yield f"{kind} {name} of the argument, {module['module']['name']}", module[name]["text"].splitlines()
 
 
 def _of_files(case: Case, name: str) -> Iterator[Told]:

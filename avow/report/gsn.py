@@ -8,7 +8,7 @@ from typing import Any
 from avow.assurance.answers import How
 from avow.assurance.model import Case
 from avow.assurance.modules import node_modules, requirement_modules
-from avow.assurance.relied import word
+from avow.assurance.relied import stands
 from avow.base.verdict import said
 from avow.evidence.status import weigh
 from avow.report.layout import yaml_text
@@ -17,8 +17,13 @@ _Elements = dict[str, dict[str, Any]]
 
 
 def render_gsn(case: Case) -> str:
-    """A YAML document for each module: the system with all suppositions, each requirement, each node. Elements have one
-    name in all of them, so that a goal of another module (an away goal) is named by its own."""
+    """`gsn` as YAML, a document for each module."""
+    return "---\n".join(map(yaml_text, gsn(case)))
+
+
+def gsn(case: Case) -> tuple[_Elements, ...]:
+    """The modules: the system with all suppositions, each requirement, each node. Elements have one name in all of
+    them, so that a goal of another module (an away goal) is named by its own."""
     suppositions = {s.number: f"A{at}" for at, s in enumerate(case.suppositions, 1)}
     goal_of_node = {node.name: f"G{at}" for at, node in enumerate(case.nodes, 1 + len(case.requirements) + 1)}
     whole: _Elements = {
@@ -64,8 +69,7 @@ def render_gsn(case: Case) -> str:
         for view in node.guarantees:
             one = counter.next("G")
             below.append(one)
-            standing = word(view.standing) if view.standing.supports else view.status.value
-            elements[one] = {"text": f"{view.obligation.name} [{standing}]\n{view.obligation.claim}"}
+            elements[one] = {"text": f"{view.obligation.name} [{stands(view)}]\n{view.obligation.claim}"}
             solutions = []
             for record in view.records:
                 solution = counter.next("Sn")
@@ -80,7 +84,7 @@ def render_gsn(case: Case) -> str:
     whole["G1"] |= {"supportedBy": ["S1"]} if names else {"undeveloped": True}
     if names:
         whole["S1"] = {"text": "Argument over each requirement", "supportedBy": list(names.values())}
-    return "---\n".join(yaml_text(elements) for elements in (whole, *documents))
+    return whole, *documents
 
 
 def render_cae(case: Case) -> str:

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
-from avow.assurance.answers import Tone
 from avow.assurance.model import Case
 from avow.assurance.modules import node_modules, requirement_modules
-from avow.assurance.relied import word
+from avow.assurance.relied import shade, stands
 from avow.base.records import dataclass
 from avow.report.wording import anchor, clean
 
@@ -83,10 +82,9 @@ def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
             continue
         below = []
         for view in node.guarantees:
-            good = view.standing.supports
-            said = word(view.standing) if good else "open"
-            tone = Tone.RED if not good else Tone.GREEN if said in ("proved", "checked") else Tone.AMBER
-            below.append(Box(said, view.obligation.claim, f"goal {tone}", f"index.html#{anchor(view.id)}"))
+            below.append(
+                Box(stands(view), view.obligation.claim, f"goal {shade(view)}", f"index.html#{anchor(view.id)}")
+            )
         yield root, "", below
 
 

@@ -17,7 +17,7 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import Tone
-from avow.assurance.argument import Argument, Element, build_argument
+from avow.assurance.argument import Arguments, Element
 from avow.assurance.model import Case, ObligationView, OpenItem
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import techniques
@@ -126,7 +126,6 @@ def environment() -> Environment:
 def render_page(case: Case, json_digest: str = "") -> str:
     """The whole page. Deterministic: same case, same bytes. `json_digest` is of the report.json that stands beside it:
     with it no part of that file can be edited unseen, not even what no other format shows."""
-    argument = build_argument(case)
     known, single = {view.id for view in case.obligations}, set(case.single_method)
     matrix, places = _matrix(case), source.places(case)
     rows = sum(len(found) for _, _, found in matrix)
@@ -146,7 +145,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             counts=_counts(case.obligations),
             matrix=matrix if rows <= GUARANTEE_ROWS else [],
             condensed=_condensed(matrix) if rows > GUARANTEE_ROWS else [],
-            outline_of=_outlines(argument),
+            outline_of=_outlines(case),
             graph=_graph(case),
             places=places,
             failed=[gate for gate in case.gates if not gate.passed],
@@ -363,27 +362,14 @@ def _cell(view: ObligationView, method: str) -> Status | None:
     return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
 
 
-def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
+def _outlines(case: Case) -> dict[str, list[tuple[int, Element]]]:
     """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
-    known = {element.id: element for element in argument.elements}
+    arguments, room = Arguments(case), ARGUMENT_ELEMENTS
     found: dict[str, list[tuple[int, Element]]] = {}
-    room = ARGUMENT_ELEMENTS
-    for requirement, start in argument.goals:
-        if room <= 0:
-            break
-        rows: list[tuple[int, Element]] = []
-        seen: set[str] = set()
-        stack = [(0, start)]
-        while stack and len(rows) < room:
-            depth, name = stack.pop()
-            if name in seen:
-                continue
-            seen.add(name)
-            element = known[name]
-            rows.append((min(depth, 12), element))
-            stack += [(depth + 1, child) for child in reversed((*element.in_context_of, *element.supported_by))]
-        found[requirement] = rows
-        room -= len(rows)
+    for r in case.requirements:
+        if room > 0:
+            found[r.id] = arguments.rows(r.id, room)
+            room -= len(found[r.id])
     return found
 
 

@@ -98,20 +98,20 @@ def test_every_name_that_the_first_page_shows_is_known() -> None:
 
 
 def marks(made: dict[str, str]) -> set[str]:
-    """The identifiers on the pages: digests, elements of the argument, codes, claims, status words, files read."""
+    """The identifiers on the pages: digests, elements of gsn.yaml, codes, claims, status words, files read."""
     found: set[str] = set()
     for page in PAGES:
         text = made[page]
         body = text[text.index("<main") :]
         found |= set(re.findall(r'<code class="digest" title="([0-9a-f]{64})"', body))
         found |= {code for code in re.findall(r"<code>([^<\s]+)</code>", body) if re.match(r"[0-9a-f]{12,64}$", code)}
-        found |= set(re.findall(r"<code>((?:G|Sn|S|C|A|J)\d+)</code>", body))
         found |= set(re.findall(r"\b(?:RCL|PLAN|MON|HOARE|AJPF|DFY|HYP|REV|EXP)\d{3}\b", body))
         found |= set(
             re.findall(r'class="chip (?:good|fair|open|bad)" title="[^"]*"><span[^>]*>[^<]*</span> ([^<]+)<', body)
         )
         found |= set(re.findall(r"<li>(?:read|left) <code>([^<]+)</code>", body))
         found |= set(re.findall(r'<details class="ob" id="([^"]+)"', body))
+    found |= set(re.findall(r"^((?:G|Sn|S|C|A|J)\d+):$", made.get("gsn.yaml", ""), re.MULTILINE))
     return {html.unescape(mark) for mark in found}
 
 

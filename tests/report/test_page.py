@@ -10,12 +10,14 @@ from html.parser import HTMLParser
 
 import pytest
 from assurance.sample import case as make_case
-from assurance.sample import evidence, guarantee, rover_case, system
+from assurance.sample import evidence, guarantee, obligation, rover_case, system
 from helpers import some
 
-from avow.assurance.argument import Shape, build_argument
+from avow.assurance.argument import Arguments
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
+from avow.base.verdict import Verdict
+from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import formats, gsn_svg, wording
 from avow.report.answers_page import render_index
@@ -205,14 +207,28 @@ def test_boxes_do_not_overlap_and_texts_fit() -> None:
 
 
 def test_the_argument_shows_what_nothing_supports_and_what_is_assumed() -> None:
-    argument = build_argument(rover_case())
-    by_title = {e.title: e for e in argument.elements}
-    assert not by_title["localisation.one_position"].supported_by
+    case = rover_case()
+    told = [row for r in case.requirements for row in Arguments(case).rows(r.id, 1000)]
+    by_title = {element.title: element for _, element in told}
+    assert Arguments(case).claim("rover/localisation/guarantee/one_position").below == ()
     assert by_title["REQ3"].status is Status.CHECKED
-    assert {e.shape for e in argument.elements} == set(Shape)
-    assert (
-        sum(e.claim == "rover/agent/guarantee/exit_on_danger" and e.shape is Shape.GOAL for e in argument.elements) == 1
-    )
+    assert {e.kind for _, e in told} == {"goal", "strategy", "solution", "context", "assumption", "justification"}
+    rows = Arguments(case).rows("REQ3", 1000)
+    assert sum(element.title == "agent.exit_on_danger" for _, element in rows) == 1
+    assert Arguments(case).rows("REQ3", 3) == rows[:3]
+
+
+def test_a_goal_says_how_its_claim_stands_all_things_considered() -> None:
+    """A refuted claim is no open one, and one whose node's contract fails is not proved."""
+    good, bad = guarantee("n", "kept"), guarantee("m", "broken")
+    fails = obligation("n", Kind.SANITY, "consistent")
+    records = [evidence(good), evidence(bad, Verdict.REFUTED), evidence(fails, Verdict.REFUTED, "sanity")]
+    made = dict(formats(make_case(system({"n": ["kept"], "m": ["broken"]}), [good, bad, fails], records)))
+    drawn, told = made["gsn.svg"], made["gsn.yaml"]
+    assert isinstance(drawn, str)
+    assert isinstance(told, str)
+    assert re.findall(r'class="h"[^>]*>(\w+)</text><text[^>]*>(\w) meets', drawn) == [("open", "n"), ("refuted", "m")]
+    assert re.findall(r"(kept|broken) \[(\w+)\]", told) == [("kept", "open"), ("broken", "refuted")]
 
 
 def test_circles_in_the_support_do_not_hang_the_picture() -> None:
