@@ -103,7 +103,7 @@ READERS = [
 ]
 
 
-@pytest.mark.parametrize("words", some(READERS, 2), ids=" ".join)
+@pytest.mark.parametrize("words", some(READERS, 1, slow=1), ids=" ".join)
 def test_a_command_that_reads(place: Path, words: list[str]) -> None:
     run(place, *words)
 

@@ -150,17 +150,27 @@ def test_memories_that_say_the_same_in_other_words(tmp_path: Path) -> None:
     assert required(tmp_path / "no", (a, ""), "historically(not a.x) or a.e").verdict is Verdict.REFUTED
 
 
-def certified(folder: Path) -> Certificates:
+def requiring(folder: Path, formula: str) -> Certificates:
     text, plan = adding("0")
-    system = make(folder, text, plan + "requirements: {R: {text: t, formula: 'c.x >= 0'}}\n")
+    return compose(make(folder, text, f"{plan}requirements: {{R: {{text: t, formula: '{formula}'}}}}\n")).certificates
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
+    """With the certificate of a requirement that an invariant shows."""
+    made = requiring(tmp_path_factory.mktemp("found"), "c.x >= 0")
     lemma = ("v0 >= 0 and v1 >= 0", "out.c.x", "out.c.y")
-    found = compose(system).certificates
-    assert found.requirement("R", Hint(()), Bounds(), (lemma,)) is not None
-    return found
+    assert made.requirement("R", Hint(()), Bounds(), (lemma,)) is not None
+    return made
 
 
-def test_a_certificate_has_the_invariant_as_a_claim_of_its_own(tmp_path: Path) -> None:
-    found = certified(tmp_path)
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
+    """Of a requirement that no invariant shows."""
+    return requiring(tmp_path_factory.mktemp("other"), "c.x != 7")
+
+
+def test_a_certificate_has_the_invariant_as_a_claim_of_its_own(found: Certificates) -> None:
     scope = requirement_scope("R")
     kept = from_json(Certificate, to_json(found.made[scope]))
     assert kept == found.made[scope]
@@ -180,14 +190,13 @@ def test_a_certificate_has_the_invariant_as_a_claim_of_its_own(tmp_path: Path) -
         ("FALSE",),
     ],
 )
-def test_another_formula_in_its_place_shows_nothing(tmp_path: Path, lemma: tuple[str, ...]) -> None:
-    found = certified(tmp_path)
+def test_another_formula_in_its_place_shows_nothing(
+    found: Certificates, other: Certificates, lemma: tuple[str, ...]
+) -> None:
     scope = requirement_scope("R")
     forged = Certificates(found.composition, {scope: replace(found.made[scope], lemmas=(lemma,))})
     assert forged.kept_for(scope, Claimed.REQUIREMENT, "R") is None
-    text, plan = adding("0")
-    system = make(tmp_path / "new", text, plan + "requirements: {R: {text: t, formula: 'c.x != 7'}}\n")
-    assert compose(system).certificates.requirement("R", Hint(()), Bounds(), (lemma,)) is None, "no false help"
+    assert other.requirement("R", Hint(()), Bounds(), (lemma,)) is None, "no false help"
 
 
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ requirements: {R: {text: t, formula: 'once(latch.e) -> echo.heard'}}
 """
 
 
-@pytest.mark.parametrize("grouped", [True, False])
+@pytest.mark.parametrize("grouped", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("claim", "verdict"),
     [("in.heard or not in.heard", Verdict.PROVED), ("previous(in.heard, TRUE) -> in.heard", Verdict.REFUTED)],

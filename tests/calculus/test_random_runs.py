@@ -256,11 +256,18 @@ def compare(tmp_path: Path, seed: int, told: Counter[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(SYSTEMS), pytest.param(range(SYSTEMS, 5 * SYSTEMS), marks=pytest.mark.nightly)], ids=["few", "many"]
+    "seeds",
+    [
+        range(1),
+        pytest.param(range(1, SYSTEMS), marks=pytest.mark.slow),
+        pytest.param(range(SYSTEMS, 5 * SYSTEMS), marks=pytest.mark.nightly),
+    ],
+    ids=["one", "few", "many"],
 )
 def test_runs_are_what_an_enumeration_finds(tmp_path: Path, seeds: range) -> None:
     told: Counter[str] = Counter()
     for seed in seeds:
         compare(tmp_path, seed, told)
-    assert told["ALWAYS checked"] >= 1
-    assert told["ALWAYS refuted"] >= 1
+    assert told["ALWAYS checked"] + told["ALWAYS refuted"] >= 1
+    if len(seeds) > 1:
+        assert min(told["ALWAYS checked"], told["ALWAYS refuted"]) >= 1

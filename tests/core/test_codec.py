@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avow.assurance import codec as cases
@@ -101,8 +101,12 @@ def test_the_schema_is_one() -> None:
     SCHEMA.check_schema(WHOLE)
 
 
-@given(outer)
-def test_there_and_back(value: Outer) -> None:
+@pytest.mark.parametrize("examples", [25, pytest.param(300, marks=pytest.mark.slow)])
+def test_there_and_back(examples: int) -> None:
+    settings(max_examples=examples)(given(outer)(_comes_back))()
+
+
+def _comes_back(value: Outer) -> None:
     text = canonical(to_json(value))
     assert from_json(Outer, json.loads(text)) == value
     assert canonical(to_json(from_json(Outer, json.loads(text)))) == text

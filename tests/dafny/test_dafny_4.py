@@ -206,7 +206,7 @@ NOT_PROVED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("name", some(NOT_PROVED, 4, slow=4))
+@pytest.mark.parametrize("name", some(NOT_PROVED, 2, slow=6))
 def test_anything_less_than_a_whole_and_clean_answer_is_no_proof(
     make_job: MakeJob, tmp_path: Path, dafny4: Any, name: str
 ) -> None:

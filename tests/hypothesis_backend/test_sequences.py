@@ -81,6 +81,7 @@ def test_what_a_class_does_wrong_is_found(ports: str, clauses: str, step: str, t
     assert (found.of, found.numbers) == (Object.SOURCE, "float64")
 
 
+@pytest.mark.slow
 def test_a_right_class_is_tested(tmp_path: Path) -> None:
     found = outcome(tmp_path, REAL, "guarantee g ( out.u <= 250 )", "r):\n        return min(r, self.limit)\n")
     assert found.verdict is Verdict.TESTED, found.summary

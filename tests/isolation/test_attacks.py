@@ -198,7 +198,9 @@ def test_no_attack_is_believed(tmp_path: Path, name: str, level: str, monkeypatc
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_nothing_of_a_subject_is_left(tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_of_a_subject_is_left_and_the_level_is_recorded(
+    tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(SANDBOX, level)
     token = f"avow-left-{os.getpid()}-{time.monotonic_ns()}"
     text = (
@@ -206,7 +208,7 @@ def test_nothing_of_a_subject_is_left(tmp_path: Path, level: str, monkeypatch: p
         f"        os.execvp('sh', ['sh', '-c', 'sleep 60; : {token}'])\n    os._exit(0)\ntime.sleep(0.3)\n"
         f"def step(**inputs):\n    {WRONG}"
     )
-    settle(tmp_path, text)
+    assert settle(tmp_path, text).isolation is (Isolation.PROCESSES if level == "off" else Isolation.SEALED)
     assert not any(token in _command(pid) for pid in Path("/proc").glob("[0-9]*"))
 
 
@@ -228,11 +230,6 @@ def test_a_subject_that_looks_at_nothing_was_seen_to_look_at_nothing(
     pythons = (sys.prefix, sys.base_prefix)  # what it imports by itself, and where it looks first
     assert [o.path for o in files if not o.path.startswith(pythons)] == [str(tmp_path / "s.py")]
     assert [o.kind for o in (modules, tracer, sandbox)] == [Seen.MODULES, Seen.TRACER, Seen.SANDBOX]
-
-
-def test_the_level_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(SANDBOX, "off")
-    assert settle(tmp_path, f"def step(**inputs):\n    {WRONG}").isolation is Isolation.PROCESSES
 
 
 def test_a_required_sandbox_that_is_missing_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

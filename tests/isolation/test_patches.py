@@ -219,7 +219,7 @@ DEEDS = {
 }
 
 
-@pytest.mark.parametrize("name", some(DEEDS, 2))
+@pytest.mark.parametrize("name", some(DEEDS, 1, slow=1))
 def test_what_it_leaves_is_an_error(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, "off")
     monkeypatch.setattr("avow.isolation.subject.SCRATCH_BYTES", 1_000_000)

@@ -97,7 +97,7 @@ def asked(about: Node, effort: int) -> Realizability:
     )
 
 
-@pytest.mark.parametrize(("name", "assumption", "guarantees", "good"), some(KNOWN, 2, slow=4))
+@pytest.mark.parametrize(("name", "assumption", "guarantees", "good"), some(KNOWN, 1, slow=5))
 def test_it_is_said_of_a_scan(name: str, assumption: str, guarantees: tuple[str, ...], good: bool) -> None:
     answer = asked(scan(assumption, guarantees), 4_000)
     assert answer.verdict is (Verdict.PROVED if good else Verdict.REFUTED), name

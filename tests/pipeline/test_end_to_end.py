@@ -267,7 +267,7 @@ def test_bad_input_is_located_and_ends_with_2(
     assert what in text, text
 
 
-@pytest.mark.parametrize("how", ["a copy", "a link"])
+@pytest.mark.parametrize("how", ["a copy", pytest.param("a link", marks=pytest.mark.slow)])
 def test_two_systems_of_one_name_are_mixed_up_by_nobody(begun: Path, tmp_path: Path, how: str) -> None:
     robot = Path(shutil.copytree(begun, tmp_path / "robot"))
     contracts, name = robot / "contracts", "thermostat"

@@ -99,7 +99,7 @@ class Restoring:
         monkeypatch.setattr(os, "fstat", lambda *a: restored(fstat(*a)))
 
 
-@pytest.mark.parametrize("times", ["set back", "whole seconds"])
+@pytest.mark.parametrize("times", ["set back", pytest.param("whole seconds", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("what", ["contract", "ledger", "report", "observed", "tool", "package", "code"])
 def test_where_times_of_change_can_be_set_back_the_bytes_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, times: str

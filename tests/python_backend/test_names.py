@@ -115,7 +115,7 @@ def test_what_a_name_means_is_what_python_takes_it_for(name: str, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    "decoy", some(["enum.py", "enum.pyc", "enum.cpython-311-x86_64-linux-gnu.so", "enum"], 2, slow=2)
+    "decoy", some(["enum.py", "enum.pyc", "enum.cpython-311-x86_64-linux-gnu.so", "enum"], 1, slow=3)
 )
 def test_what_stands_beside_a_file_may_be_what_it_imports(decoy: str, tmp_path: Path) -> None:
     place = tmp_path / decoy

@@ -166,7 +166,7 @@ node n {
 """
 
 
-@pytest.mark.parametrize("answers", ANSWERS)
+@pytest.mark.parametrize("answers", some(ANSWERS, 2, slow=2))
 def test_of_paired_answers_hardly_any_is_judged_anew(
     answers: dict[str, Any], make_system: Callable[..., System], tmp_path: Path
 ) -> None:

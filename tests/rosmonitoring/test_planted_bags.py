@@ -162,7 +162,7 @@ def expected(fault: str, at: int, said: list[Said]) -> Iterator[tuple[Fault, str
 
 @pytest.mark.parametrize(
     ("form", "fault", "seed"),
-    some([(f, fault, s) for f in ("ros1", "SQLITE3", "MCAP") for s in range(3) for fault in FAULTS], 6, slow=23),
+    some([(f, fault, s) for f in ("ros1", "SQLITE3", "MCAP") for s in range(3) for fault in FAULTS], 4, slow=25),
 )
 def test_a_fault_is_found_and_blamed_on_whose_it_is(tmp_path: Path, form: str, fault: str, seed: int) -> None:
     system = make(tmp_path, form)

@@ -110,7 +110,7 @@ def test_what_holds_here_too_stays_on_record_and_goes_stale_here(place: Workspac
     assert open_obligations(place, work, Run("b", False))
 
 
-@pytest.mark.parametrize("kind", [Seen.READ, Seen.MISSING, Seen.OUTSIDE])
+@pytest.mark.parametrize("kind", some([Seen.READ, Seen.MISSING, Seen.OUTSIDE], 1, slow=2))
 def test_what_is_otherwise_on_a_worker_never_counts_unseen(
     place: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kind: Seen
 ) -> None:

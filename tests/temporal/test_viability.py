@@ -69,7 +69,7 @@ AHEAD = {
 }
 
 
-@pytest.mark.parametrize("name", AHEAD)
+@pytest.mark.parametrize("name", some(AHEAD, 1, slow=2))
 def test_inputs_of_a_refutation_are_shown_where_there_are_numbers(name: str) -> None:
     text, clauses, length = AHEAD[name]
     contract, found = check_text(f"node n {{ {text} }}", "n.rcl")
@@ -235,7 +235,7 @@ def test_what_no_run_lasts_for_is_refuted_though_there_are_numbers(
     ("name", "verdict"),
     [
         ("not-tautological-g1", Verdict.PROVED),
-        ("not-tautological-never", Verdict.REFUTED),
+        pytest.param("not-tautological-never", Verdict.REFUTED, marks=pytest.mark.slow),
         pytest.param("constrained-y", Verdict.UNKNOWN, marks=pytest.mark.slow),
     ],
 )
