@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from socketserver import BaseServer
 from types import SimpleNamespace
 from typing import Any
 from xmlrpc.server import SimpleXMLRPCServer
@@ -53,6 +54,12 @@ class Master:
 
     def unregisterSubscriber(self, caller: str, topic: str, uri: str) -> Any:  # noqa: N802
         return 1, "", 1
+
+
+@pytest.fixture(autouse=True)
+def _soon_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What ends a server waits until it looks, which is each half second."""
+    monkeypatch.setattr(BaseServer.serve_forever, "__defaults__", (0.01,))
 
 
 @pytest.fixture
