@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, told
@@ -14,8 +15,7 @@ from avow.evidence.record import CASE
 
 from .codes import CODES
 from .figures import Figures, read_figures
-from .judge import Judgement, exceeds, judge_figures, judge_runs
-from .kept import failing, held_against
+from .judge import exceeds, failing, held_against, judge_figures, judge_runs
 from .options import SCHEMA, Experiment, read
 from .quantity import show
 from .runs import Run, Runs, read_runs
@@ -81,31 +81,20 @@ class ExperimentBackend(Backend):
         for o in job.obligations:
             kept = job.kept.get(o.id, ())
             judged = held_against(found, runs, experiment, kept) if experiment is not None else found
-            outcomes.append(
-                Outcome(
-                    o.id,
-                    judged.verdict,
-                    judged.summary,
-                    judged.counterexample,
-                    judged.hypotheses,
-                    dict(judged.bound),
-                    dict(judged.details),
-                    Link.GUIDED,
-                )
-            )
+            outcomes.append(replace(judged, obligation=o.id, link=self.link))
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)
 
 
 def _settle(
     job: Job, experiment: Experiment | None, problems: tuple[Diagnostic, ...]
-) -> tuple[Judgement, tuple[Run, ...], dict[str, str]]:
+) -> tuple[Outcome, tuple[Run, ...], dict[str, str]]:
     try:
         if experiment is None:
             raise Rejected(*problems)
         material = _material(experiment)
     except Rejected as error:
         why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
-        return Judgement(Verdict.ERROR, why, {}, {}), (), {}
+        return Outcome("", Verdict.ERROR, why), (), {}
     if isinstance(material, Figures):
         return judge_figures(material, experiment), (), {}
     judgement = judge_runs(material.runs, experiment)

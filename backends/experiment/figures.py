@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.records import dataclass
 from avow.system.strict_yaml import Piece, read_yaml
 
-from .quantity import Figure, conversion, figure, show
+from .quantity import conversion, figure, show
 from .statistics import Range, greatest_deviation, least_deviation, root
 
 _KEYS = ("n", "unit", "mean", "min", "max", "sd", "source", "note")
@@ -63,7 +63,11 @@ def read_figures(path: Path, unit: str) -> Figures:
         if key in piece.entries:
             entry = piece.entries[key]
             printed[key] = entry.text
-            _figure(key, entry, own, unit, ranges, found)
+            made = _figure(key, entry, own, unit)
+            if isinstance(made, Range):
+                ranges[key] = made
+            else:
+                found.append(made)
     if not ranges and not found:
         found.append(Diagnostic("EXP121", "no figure at all: expected mean, min, max or sd", piece.span))
     if found:
@@ -133,25 +137,19 @@ def failures(figures: Figures, within: Fraction, strict: bool) -> tuple[int, int
     return fewest, max(most, fewest)
 
 
-def _figure(
-    key: str, entry: Piece, own: str, unit: str, ranges: dict[str, Range], found: list[Diagnostic]
-) -> Figure | None:
+def _figure(key: str, entry: Piece, own: str, unit: str) -> Range | Diagnostic:
+    """What it may stand for, or what is wrong with it."""
     if entry.items is not None or entry.entries is not None:
-        found.append(Diagnostic("EXP122", f"'{key}' must be one figure, such as '21.4 cm'", entry.span))
-        return None
+        return Diagnostic("EXP122", f"'{key}' must be one figure, such as '21.4 cm'", entry.span)
     read = figure(entry.text, own)
     if read is None:
-        found.append(Diagnostic("EXP122", f"'{entry.text}' is not a figure such as '21.4 cm'", entry.span))
-        return None
+        return Diagnostic("EXP122", f"'{entry.text}' is not a figure such as '21.4 cm'", entry.span)
     span = read.within(unit)
     if span is None:
-        found.append(Diagnostic("EXP104", f"cannot convert '{entry.text}' into '{unit}'", entry.span))
-        return None
+        return Diagnostic("EXP104", f"cannot convert '{entry.text}' into '{unit}'", entry.span)
     if read.value < 0:
-        found.append(Diagnostic("EXP122", f"'{key}' of a distance cannot be negative", entry.span))
-        return None
-    ranges[key] = Range(max(span.low, Fraction(0)), span.high)
-    return read
+        return Diagnostic("EXP122", f"'{key}' of a distance cannot be negative", entry.span)
+    return Range(max(span.low, Fraction(0)), span.high)
 
 
 def _scalar(piece: Piece, key: str) -> str:
