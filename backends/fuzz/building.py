@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from enum import StrEnum
 from pathlib import Path
 
 from avow.base.files import read_text
@@ -49,6 +50,27 @@ _FILLED = ("-ftrivial-auto-var-init=pattern", "-DAVOW_FILLED")
 _FUZZED = ("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-coverage=trace-cmp")
 
 
+class Build(StrEnum):
+    """What is built, by the name of the program."""
+
+    FUZZED = "fuzz"
+    """The harness."""
+    SANITIZED = "sanitized"
+    """The plain program with sanitizers: what tells where a fault is."""
+    PLAIN = "replay"
+    """The program whose answers are judged."""
+    FILLED = "filled"
+    """The plain program, in which variables and memory that nothing was written to hold other bytes."""
+
+
+_FLAGS = {
+    Build.FUZZED: (*_SANITIZED, *_FUZZED),
+    Build.SANITIZED: _SANITIZED,
+    Build.PLAIN: _PLAIN,
+    Build.FILLED: (*_PLAIN, *_FILLED),
+}
+
+
 class NotBuilt(Exception):  # noqa: N818 - it names what happened
     """Clang refuses the source; the message is its first error."""
 
@@ -70,31 +92,10 @@ def write(reading: Reading, made: Drawable, folder: Path) -> None:
     (folder / LINK).symlink_to(reading.adapter)
 
 
-def fuzzed(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
-    """The harness. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, outside, "harness.cpp", (*_SANITIZED, *_FUZZED), "fuzz", seconds)
-
-
-def sanitized(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
-    """The plain program with sanitizers: what tells where a fault is. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, outside, "replay.cpp", _SANITIZED, "sanitized", seconds)
-
-
-def plain(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
-    """The program whose answers are judged. Raises NotBuilt and ToolMissing."""
-    return _build(reading, folder, outside, "replay.cpp", _PLAIN, "replay", seconds)
-
-
-def filled(reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
-    """The plain program, in which variables and memory that nothing was written to hold other bytes. Raises NotBuilt
-    and ToolMissing."""
-    return _build(reading, folder, outside, "replay.cpp", (*_PLAIN, *_FILLED), "filled", seconds)
-
-
 def looked_into(reading: Reading, folder: Path, outside: Outside, linked: str, seconds: float) -> Unseen:
     """What no run shows of the source; `linked` as the plain build has it. Raises NotBuilt and ToolMissing."""
     alone = _preprocessed(reading, folder, outside, _PLAIN, seconds)
-    fuzzing = _preprocessed(reading, folder, outside, (*_SANITIZED, *_FUZZED), seconds)
+    fuzzing = _preprocessed(reading, folder, outside, _FLAGS[Build.FUZZED], seconds)
     found = unseen(alone, fuzzing, linked)
     return Unseen(*(plainly(said, reading, folder) for said in (found.undeclared, found.faults)))
 
@@ -124,16 +125,10 @@ def _includes(reading: Reading, folder: Path) -> list[str]:
     return [*around, f'-DADAPTER="{LINK}"']
 
 
-def _build(
-    reading: Reading,
-    folder: Path,
-    outside: Outside,
-    main: str,
-    flags: tuple[str, ...],
-    name: str,
-    seconds: float,
-) -> Built:
-    tool = _there()
+def build(name: Build, reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
+    """Raises NotBuilt and ToolMissing."""
+    tool, flags = _there(), _FLAGS[name]
+    main = "harness.cpp" if name is Build.FUZZED else "replay.cpp"
     objects: list[str] = []
     read: list[Path] = []
     for k, source in enumerate((folder / main, *reading.sources)):
@@ -146,7 +141,7 @@ def _build(
         objects.append(str(object_file))
         read += _listed(listed, folder)
     program = folder / name
-    watched = [f"-Wl,-y,{name}" for name in WATCHED]
+    watched = [f"-Wl,-y,{function}" for function in WATCHED]
     done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
     if done.code != 0 or not program.is_file():
         if _RUN_TIME.search(done.stderr):

@@ -169,6 +169,3 @@ def texts(reading: Reading) -> str:
         except OSError:
             continue
     return "\n".join(found)
-
-
-__all__ = ["Reading", "files", "load", "texts"]

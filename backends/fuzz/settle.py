@@ -31,7 +31,7 @@ from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside
 
 from . import building
-from .building import NotBuilt
+from .building import Build, NotBuilt
 from .clang_tool import clang
 from .drawn import Drawn, Step, command
 from .reading import Reading, load
@@ -117,8 +117,8 @@ class Work:
         building.write(reading, made, self.folder)
         built: list[building.Built] = []
         try:
-            for build in (building.fuzzed, building.plain, building.filled):
-                built.append(build(reading, self.folder, self._outside, self._left()))
+            for wanted in (Build.FUZZED, Build.PLAIN, Build.FILLED):
+                built.append(building.build(wanted, reading, self.folder, self._outside, self._left()))
             unseen = building.looked_into(reading, self.folder, self._outside, built[1].linked, self._left())
         finally:  # also of what cannot be built: it may be once a library is there
             self.observed.update(dict.fromkeys(building.observed(reading, tuple(built), self._outside)))
@@ -258,9 +258,9 @@ class Work:
         assumptions allow."""
         if not runs:
             return None
-        program = building.sanitized(self.reading, self.folder, self._outside, self._left()).program
+        built = building.build(Build.SANITIZED, self.reading, self.folder, self._outside, self._left())
         for run in runs:
-            answer = self._ask(Shown, Show(str(program), self._words(run)))
+            answer = self._ask(Shown, Show(str(built.program), self._words(run)))
             self.logs["fault.log"] = answer.log.replace(str(self.folder), ".")
             found = Bench(self.reading).stopped(run, answer.replies)
             if found is not None and answer.code not in (0, None):

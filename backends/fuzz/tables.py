@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, assert_never
@@ -12,6 +13,7 @@ from typing import Any, assert_never
 from avow.backend_kit.programs.samples import around, as_single, leaves, numbers_of
 from avow.base.records import dataclass
 from avow.language.contract import Port
+from avow.language.operators import definition
 from avow.language.sorts import (
     BoolSort,
     DataSort,
@@ -27,8 +29,29 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.language.terms import (
+    And,
+    Arithmetic,
+    Compare,
+    Conditional,
+    EnumValue,
+    Iff,
+    Implies,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Operation,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    Widen,
+)
 
-from .guide import Guide
 from .reading import Reading, item_of, texts
 from .tuning import WRITTEN
 
@@ -81,7 +104,7 @@ def drawable(reading: Reading) -> Drawable:
 def tables(reading: Reading, made: Drawable) -> str:
     """`contract.inc`."""
     node, job = reading.node, reading.job
-    guide = Guide({p.name: k for k, p in enumerate(node.inputs)}, {p.name: k for k, p in enumerate(node.outputs)})
+    guide = _Guide({p.name: k for k, p in enumerate(node.inputs)}, {p.name: k for k, p in enumerate(node.outputs)})
     assumed = [guide.root(c.formula) for c in node.assumptions]
     promised = [guide.root(job.clause(o).formula) for o in job.obligations]
     parts = [f"{{Op::{p.op}, {p.a}, {p.b}, {p.c}, {_real(p.value)}}}" for p in guide.parts]
@@ -193,4 +216,118 @@ def _literals(text: str) -> set[Fraction]:
     return found
 
 
-__all__ = ["ENDS", "TABLES", "Drawable", "drawable", "native", "sort_name", "tables"]
+_WRITTEN = {
+    "<": "less",
+    "<=": "at_most",
+    ">": "greater",
+    ">=": "at_least",
+    "==": "equal",
+    "!=": "other",
+    "+": "plus",
+    "-": "minus",
+    "*": "times",
+    "/": "divide",
+}
+_FORMS: Mapping[type[Term], str] = {
+    Widen: "widen",
+    Negative: "negate",
+    Not: "no",
+    Implies: "implies",
+    Iff: "same",
+    Conditional: "choose",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    op: str
+    a: int = -1
+    b: int = -1
+    c: int = -1
+    value: float = 0.0
+
+
+@dataclass(slots=True)
+class _Guide:
+    """Formulas as trees in an array, for the harness to look at in machine numbers: what it cannot say is unknown, and
+    nothing is judged by it. `inputs` and `outputs`: name → place among the ports."""
+
+    inputs: Mapping[str, int]
+    outputs: Mapping[str, int]
+    parts: list[_Part] = field(default_factory=list)
+    _bound: list[Variable] = field(default_factory=list)
+
+    def root(self, term: Term) -> int:
+        """The place of a formula's tree."""
+        try:
+            return self._of(term)
+        except RecursionError:
+            return self._put(_Part("unknown"))
+
+    def _put(self, part: _Part) -> int:
+        self.parts.append(part)
+        return len(self.parts) - 1
+
+    def _joined(self, op: str, items: tuple[Term, ...]) -> int:
+        at = self._of(items[-1])
+        for item in reversed(items[:-1]):
+            at = self._put(_Part(op, self._of(item), at))
+        return at
+
+    def _of(self, term: Term) -> int:
+        match term:
+            case Literal(value=bool() | int() | Fraction() as value):
+                return self._number(Fraction(value))
+            case EnumValue(name=name, sort=EnumSort(members=members)):
+                return self._number(Fraction(members.index(name)))
+            case Variable():
+                return self._variable(term)
+            case Arithmetic(operator=operator) | Compare(operator=operator) if operator in _WRITTEN:
+                return self._put(_Part(_WRITTEN[operator], *map(self._of, term.children)))
+            case Widen() | Negative() | Not() | Implies() | Iff() | Conditional():
+                return self._put(_Part(_FORMS[type(term)], *map(self._of, term.children)))
+            case And(items=items) | Or(items=items) if items:
+                return self._joined("both" if isinstance(term, And) else "either", items)
+            case Length(sequence=Variable(role=role, name=name)) if self._port(role, name) is not None:
+                return self._put(_Part(f"length_{_side(role)}", self._port(role, name) or 0))
+            case Index(sequence=Variable(role=role, name=name), index=index) if self._port(role, name) is not None:
+                return self._put(_Part(f"index_{_side(role)}", self._port(role, name) or 0, self._of(index)))
+            case Operation() if (same := definition(term)) is not None:
+                return self._of(same)
+            case Quantified(quantifier=quantifier, variables=variables, body=body):
+                return self._quantified(quantifier, variables, body)
+            case _:  # what the harness does not look at
+                return self._put(_Part("unknown"))
+
+    def _number(self, value: Fraction) -> int:
+        try:
+            return self._put(_Part("number", value=float(value)))
+        except OverflowError:
+            return self._put(_Part("unknown"))
+
+    def _port(self, role: Role, name: str) -> int | None:
+        return {Role.INPUT: self.inputs, Role.OUTPUT: self.outputs}.get(role, {}).get(name)
+
+    def _variable(self, term: Variable) -> int:
+        at = self._port(term.role, term.name)
+        if at is not None:
+            return self._put(_Part(_side(term.role), at))
+        if term in self._bound:
+            return self._put(_Part("bound", len(self._bound) - 1 - self._bound[::-1].index(term)))
+        return self._put(_Part("unknown"))
+
+    def _quantified(self, quantifier: Quantifier, variables: tuple[Variable, ...], body: Term) -> int:
+        whole = all(isinstance(v.sort, NaturalSort | IntegerSort) for v in variables)
+        if quantifier not in (Quantifier.FORALL, Quantifier.EXISTS) or not whole or len(self._bound) > 6:
+            return self._put(_Part("unknown"))
+        self._bound += variables
+        at = self._of(body)
+        op = "every" if quantifier is Quantifier.FORALL else "some"
+        for _ in variables:
+            self._bound.pop()
+            at = self._put(_Part(op, at, len(self._bound)))
+        return at
+
+
+def _side(role: Role) -> str:
+    return "input" if role is Role.INPUT else "output"

@@ -113,6 +113,3 @@ def _short(name: str) -> str:
     """The readable part of a mangled name."""
     found = re.findall(r"\d([a-z_]{3,})", name)
     return "::".join(found[-2:]) if name.startswith("_Z") and found else name
-
-
-__all__ = ["WATCHED", "Line", "Unseen", "own", "unseen"]
