@@ -19,8 +19,7 @@ from avow.evidence.signing import signature_path
 from avow.system.paths import inside
 
 from .codes import CODES
-from .freshness import current_meaning, stale_clause, stale_files
-from .record import CONCLUSIONS, Judged, Record, read_record
+from .record import CONCLUSIONS, Judged, Record, current_meaning, read_record, stale_clause, stale_files
 from .signature import signed
 
 _KEY = {

@@ -21,8 +21,7 @@ from avow.system.paths import inside
 from avow.system.strict_yaml import Piece, read_yaml
 
 from .backend import record_name
-from .freshness import current_file, current_meaning
-from .record import load, record_in
+from .record import current_file, current_meaning, load, record_in
 
 _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _PLAIN = re.compile(r"[\w./-]+", re.ASCII)
@@ -58,31 +57,21 @@ def stamp_record(
     if problems or piece.entries is None:
         raise Rejected(*(problems or [Diagnostic("REV111", "expected keys and values", piece.span)]))
     editor = _Editor(read_regular(path).decode("utf-8-sig"))
-    said: list[str] = []
-    changed: list[tuple[str, Span]] = []
     for item in (piece.entries.get("read") or piece).items or ():
-        _stamp_file(item, root, editor, said, changed)
-    _stamp_clauses(piece, node, tuple(guarantees), editor, said, changed)
-    if changed and renewed is None:
-        raise Rejected(
-            *(
-                Diagnostic(
-                    "REV121",
-                    f"{what} has changed since it was reviewed",
-                    span,
-                    hint="read it again, then stamp with the date of the renewed review",
-                )
-                for what, span in changed
-            )
-        )
+        _stamp_file(item, root, editor)
+    _stamp_clauses(piece, node, tuple(guarantees), editor)
+    if editor.changed and renewed is None:
+        hint = "read it again, then stamp with the date of the renewed review"
+        changed = [(f"{what} has changed since it was reviewed", span) for what, span in editor.changed]
+        raise Rejected(*(Diagnostic("REV121", message, span, hint=hint) for message, span in changed))
     date = piece.entries.get("date")
-    if changed and renewed is not None and date is not None:
+    if editor.changed and renewed is not None and date is not None:
         if renewed < date.text:
             message = f"the review of {date.text} cannot have been renewed on {renewed}"
             raise Rejected(Diagnostic("REV112", message, date.span))
         editor.replace(date.span, renewed)
-        said.append(f"date: {renewed}")
-    if not said:
+        editor.said.append(f"date: {renewed}")
+    if not editor.said:
         return ()
     stamped = editor.result()
     again, problems = read_yaml(stamped.encode(), str(path))
@@ -94,7 +83,7 @@ def stamp_record(
         message = f"with its digests filled in, the record would say something else under '{differing}'"
         raise Rejected(Diagnostic("REV122", message, place))
     write(path, stamped)
-    return tuple(said)
+    return tuple(editor.said)
 
 
 def _besides(record: Piece) -> dict[str, object]:
@@ -118,29 +107,21 @@ def _without(piece: Piece, key: str) -> object:
     return piece.data if piece.entries is None else {k: v.data for k, v in piece.entries.items() if k != key}
 
 
-def _stamp_file(item: Piece, root: Path, editor: _Editor, said: list[str], changed: list[tuple[str, Span]]) -> None:
+def _stamp_file(item: Piece, root: Path, editor: _Editor) -> None:
     entry = item if item.entries is None else item.entries.get("file")
     if entry is None or entry.items is not None or entry.entries is not None:
         return
     now = current_file(root, entry.text)
     if now is None:
         raise Rejected(Diagnostic("REV102", f"there is no file '{entry.text}' in the system's folder", entry.span))
-    line = f"{entry.text}: {now}"
     if item.entries is None:
         editor.replace(item.span, f"{{file: {_quoted(entry.text)}, sha256: {now}}}")
-        said.append(line)
+        editor.said.append(f"{entry.text}: {now}")
         return
-    _fill(item, "sha256", now, entry.text, editor, said, changed)
+    _fill(item, "sha256", now, entry.text, editor)
 
 
-def _stamp_clauses(
-    piece: Piece,
-    node: Node,
-    guarantees: tuple[str, ...],
-    editor: _Editor,
-    said: list[str],
-    changed: list[tuple[str, Span]],
-) -> None:
+def _stamp_clauses(piece: Piece, node: Node, guarantees: tuple[str, ...], editor: _Editor) -> None:
     assert piece.entries is not None
     clauses = piece.entries.get("clauses")
     fresh = {name: current_meaning(node, name) for name in guarantees}
@@ -152,29 +133,27 @@ def _stamp_clauses(
             editor.replace(clauses.span, "\n" + "\n".join(lines))
         else:
             raise Rejected(Diagnostic("REV115", "'clauses' must be keys and values", clauses.span))
-        said.extend(f"{name}: {meaning}" for name, meaning in fresh.items())
+        editor.said.extend(f"{name}: {meaning}" for name, meaning in fresh.items())
         return
     for name, meaning in fresh.items():
         entry = clauses.entries.get(name)
         if entry is not None and entry.entries is not None:
-            _fill(entry, "meaning", meaning, name, editor, said, changed)
+            _fill(entry, "meaning", meaning, name, editor)
         else:
-            _fill(clauses, name, meaning, name, editor, said, changed)
+            _fill(clauses, name, meaning, name, editor)
 
 
-def _fill(
-    mapping: Piece, key: str, value: str, what: str, editor: _Editor, said: list[str], changed: list[tuple[str, Span]]
-) -> None:
+def _fill(mapping: Piece, key: str, value: str, what: str, editor: _Editor) -> None:
     assert mapping.entries is not None
     entry = mapping.entries.get(key)
     if entry is not None and entry.text == value:
         return
-    said.append(f"{what}: {value}")
+    editor.said.append(f"{what}: {value}")
     if entry is None:
         editor.insert(mapping, f"{_quoted(key)}: {value}")
         return
     if entry.text.strip() not in ("", "?", "~"):
-        changed.append((what, entry.span))
+        editor.changed.append((what, entry.span))
     editor.replace(entry.span, value)
 
 
@@ -190,12 +169,15 @@ class _Edit:
 
 
 class _Editor:
-    """Changes stretches of a text; places are those of the text before any change."""
+    """Changes stretches of a text, and knows what was filled in, and what had another digest; places are those of the
+    text before any change."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.starts = [0, *(match.end() for match in _BREAK.finditer(text))]
         self.edits: list[_Edit] = []
+        self.said: list[str] = []
+        self.changed: list[tuple[str, Span]] = []
 
     def replace(self, span: Span, text: str) -> None:
         start, end = self.offset(span.line, span.column), self.offset(span.end_line, span.end_column)
