@@ -38,6 +38,7 @@ from .sentence import (
     is_assumption,
     parse,
     parse_expression,
+    parts,
 )
 
 
@@ -319,21 +320,8 @@ class _Node:
                 assert_never(part)
 
     def _number(self, part: Expression) -> None:
-        match part:
-            case Name(text=name):
-                self.types.setdefault(name, "REAL")
-            case Sign(left=left, right=right):
-                self._number(left)
-                self._number(right)
-            case Minus(body=body) | Denied(body=body):
-                self._number(body)
-            case Call(arguments=arguments):
-                for each in arguments:
-                    self._number(each)
-            case Number() | Truth():
-                pass
-            case _:
-                assert_never(part)
+        for name in _names(part):
+            self.types.setdefault(name, "REAL")
 
     def _spread(self) -> None:
         """Names that are compared are of one type."""
@@ -446,21 +434,10 @@ def _answered(response: Expression) -> Expression:
 
 
 def _names(part: Expression) -> Iterable[str]:
-    match part:
-        case Name(text=name):
-            yield name
-        case Denied(body=body) | Minus(body=body):
-            yield from _names(body)
-        case Sign(left=left, right=right):
-            yield from _names(left)
-            yield from _names(right)
-        case Call(arguments=arguments):
-            for each in arguments:
-                yield from _names(each)
-        case Number() | Truth():
-            return
-        case _:
-            assert_never(part)
+    if isinstance(part, Name):
+        yield part.text
+    for each in parts(part):
+        yield from _names(each)
 
 
 def _clash(one: str, other: str, word: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, assert_never
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput, UnexpectedToken
@@ -56,6 +56,21 @@ class Call:
 
 
 Expression = Name | Number | Truth | Denied | Minus | Sign | Call
+
+
+def parts(expression: Expression) -> tuple[Expression, ...]:
+    """What an expression is directly made of."""
+    match expression:
+        case Denied(body=body) | Minus(body=body):
+            return (body,)
+        case Sign(left=left, right=right):
+            return (left, right)
+        case Call(arguments=arguments):
+            return arguments
+        case Name() | Number() | Truth():
+            return ()
+        case _:
+            assert_never(expression)
 
 
 class Scope(StrEnum):

@@ -3,26 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.language.contract import Contract
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language.sorts import DataSort, EnumSort, Sort, parts
 from avow.language.terms import Term
 
 
@@ -45,36 +30,21 @@ class Environment:
         return self.types.get(name) or self.anonymous.get(name)
 
     def add_elements(self, sort: Sort) -> None:
-        match sort:
-            case EnumSort(members=members):
-                self.elements.update(dict.fromkeys(members, sort))
-            case DataSort(constructors=constructors):
-                for constructor in constructors:
-                    self.elements[constructor.name] = sort
-                    for parameter in constructor.parameters:
-                        self._inner(parameter)
-            case _:  # a sort without elements of its own
-                self._inner(sort)
+        """Make known what a declared sort, and those written in place in it, are made of."""
+        if isinstance(sort, EnumSort):
+            self.elements.update(dict.fromkeys(sort.members, sort))
+        elif isinstance(sort, DataSort):
+            self.elements.update((constructor.name, sort) for constructor in sort.constructors)
+        for part in parts(sort):
+            self.add_inner(part)
 
-    def _inner(self, sort: Sort) -> None:
-        match sort:
-            case EnumSort() | DataSort():
-                if self.sort(sort.name) is None:
-                    self.anonymous[sort.name] = sort
-                    self.add_elements(sort)
-            case FunctionSort(parameters=parameters, result=result):
-                for parameter in (*parameters, result):
-                    self._inner(parameter)
-            case TupleSort(items=items):
-                for item in items:
-                    self._inner(item)
-            case SequenceSort(item=item):
-                self._inner(item)
-            case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort() | OpaqueSort() | SetSort():
-                # a sort without parts
-                pass
-            case _:
-                assert_never(sort)
+    def add_inner(self, sort: Sort) -> None:
+        """As `add_elements`, of a sort that is part of another: an enumeration there may be one that has no name."""
+        if not isinstance(sort, EnumSort | DataSort):
+            self.add_elements(sort)
+        elif self.sort(sort.name) is None:
+            self.anonymous[sort.name] = sort
+            self.add_elements(sort)
 
 
 def of_contract(contract: Contract) -> Environment:
@@ -84,5 +54,5 @@ def of_contract(contract: Contract) -> Environment:
         environment.add_elements(sort)
     for node in contract.nodes:
         for port in (*node.inputs, *node.outputs):
-            environment._inner(port.sort)
+            environment.add_inner(port.sort)
     return environment
