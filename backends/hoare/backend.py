@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -153,7 +153,7 @@ def settle(job: Job, limits: Limits) -> Report:
     if open_:
         # where nothing is proved that would rest on it, it is worth a look but not the time of another guarantee
         seconds = limits.seconds if open_ & GIVEN else min(limits.seconds, BRIEFLY_SECONDS)
-        running = _every_run(work, replace(limits, seconds=seconds))
+        running = _settled(_every_run, work.every_run, work, until(from_seconds(seconds)))
         logs["every-run.log"] = f"{running.verdict} - {running.why}\n"
         if running.verdict is Verdict.REFUTED:  # it settles also what the guarantee's own triples leave open
             worse = {*GIVEN, Verdict.UNKNOWN}
@@ -175,6 +175,7 @@ def _remembered(
     told = [one_line(each.formula) for each in found.invariants]
     logs["invariants.log"] = "\n".join((*(f"holds: {text}" for text in told), *found.lacking)) + "\n"
     known = replace(work, job=knowing(work.job, steps, found.invariants), lacking=found.lacking)
+    known.settler.seed = work.settler.seed
     link = Link.MAPPED if work.checked.reading.mapped else Link.GENERATED
     refuted: dict[str, Outcome] = {}
     for obligation in work.job.obligations:
@@ -203,7 +204,7 @@ def _obligation(
     obligation: Obligation, found: Sequence[Triple], work: Work, limits: Limits, logs: dict[str, str]
 ) -> Outcome:
     deadline = until(from_seconds(limits.seconds))
-    settled = [_guarded(triple, work, limits, deadline) for triple in found]
+    settled = [_settled(_triple, triple, work, deadline) for triple in found]
     log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
     logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
     worst = next(
@@ -252,26 +253,15 @@ def _obligation(
     )
 
 
-def _every_run(work: Work, limits: Limits) -> Settled:
+def _every_run(triple: Triple, work: Work, deadline: float) -> Settled:
     """Whether the program runs to its end on every input that is allowed. Where a loop has no variant, or one that is
     not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
-    triple, deadline = work.every_run, until(from_seconds(limits.seconds))
     program = work.checked.program
-    unfaithful = _unfaithful(triple, work.settler, deadline)
-    if unfaithful is Verdict.REFUTED:
-        return Settled(triple, Verdict.ERROR, UNFAITHFUL)
-    if unfaithful is not None:
-        triple = triple.as_stated
-    try:
-        wanted = run_conditions(triple, program)
-        failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
-        shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed and not work.steps else None
-        if shown is None and not work.steps and (_termination(work) or (failed and has_loops(program))):
-            shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_EFFORT)))
-    except TooLarge as error:
-        return Settled(triple, Verdict.UNKNOWN, str(error))
-    except RecursionError:
-        return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
+    wanted = run_conditions(triple, program)
+    failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
+    shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed and not work.steps else None
+    if shown is None and not work.steps and (_termination(work) or (failed and has_loops(program))):
+        shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_EFFORT)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, f"{shown.why}: on this input there is no output", shown)
     if failed:
@@ -337,9 +327,15 @@ def _termination(work: Work) -> tuple[str, ...]:
     )
 
 
-def _guarded(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
+def _settled(how: Callable[[Triple, Work, float], Settled], triple: Triple, work: Work, deadline: float) -> Settled:
+    """What is found of a triple; of the stated one, where the simplified one is not shown to claim the same."""
     try:
-        return _triple(triple, work, limits, deadline)
+        unfaithful = _unfaithful(triple, work.settler, deadline)
+        if unfaithful is Verdict.REFUTED:
+            return Settled(triple, Verdict.ERROR, UNFAITHFUL)
+        return how(triple if unfaithful is None else triple.as_stated, work, deadline)
+    except TooLarge as error:
+        return Settled(triple, Verdict.UNKNOWN, str(error))
     except RecursionError:
         return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
 
@@ -355,22 +351,14 @@ def _unfaithful(triple: Triple, settler: Settler, deadline: float) -> Verdict | 
     return None if answer.verdict is Verdict.PROVED else answer.verdict
 
 
-def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
+def _triple(triple: Triple, work: Work, deadline: float) -> Settled:
     program = work.checked.program
-    unfaithful = _unfaithful(triple, work.settler, deadline)
-    if unfaithful is Verdict.REFUTED:
-        return Settled(triple, Verdict.ERROR, UNFAITHFUL)
-    if unfaithful is not None:
-        triple = triple.as_stated
-    try:
-        wanted = conditions(triple, program.body)
-    except TooLarge as error:
-        return Settled(triple, Verdict.UNKNOWN, str(error))
+    wanted = conditions(triple, program.body)
     failed: list[tuple[Condition, Entailment]] = []
     for condition in wanted:
         if work.settler.settles(condition.hypotheses, condition.goal, effort=_left(deadline)) == "unsat":
             continue
-        answer = entails(condition.hypotheses, condition.goal, effort=_left(deadline), seed=limits.seed)
+        answer = entails(condition.hypotheses, condition.goal, effort=_left(deadline), seed=work.settler.seed)
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:

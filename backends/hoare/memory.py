@@ -29,11 +29,9 @@ from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_sort
 from avow.language.terms import Role, Term, Variable
-from avow.solving.models import default_value
-from avow.solving.translation import Unsupported
 
 from .checker import Checked
-from .guesses import Draw, expressions, numbers, strings
+from .guesses import Draw, expressions, filled, numbers, strings
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .names import Names, vocabulary
 from .syntax import Memory, Source
@@ -283,12 +281,7 @@ class Runner:
         return self._read(self.inputs, self._start(given))
 
     def _start(self, given: Mapping[Variable, Value]) -> State:
-        start: State = {v.name: value for v, value in given.items()} | self.memory
-        for v in self.locals:
-            try:
-                start.setdefault(v.name, default_value(v.sort))
-            except Unsupported:
-                continue
+        start: State = {v.name: value for v, value in filled(given, self.locals).items()} | self.memory
         for v, ghost in self.checked.program.ghosts.items():
             if v.name in start:
                 start[ghost.name] = start[v.name]

@@ -114,24 +114,10 @@ def _explain(error: UnexpectedToken, file: str, before: Token | None) -> Diagnos
     return Diagnostic("HOARE100", f"did not expect {text} here", span, hint=hint)
 
 
-_KEYWORDS = frozenset(
-    (
-        "IF",
-        "THEN",
-        "ELSE",
-        "ENDIF",
-        "MATCH",
-        "WITH",
-        "WHILE",
-        "INVARIANT",
-        "VARIANT",
-        "DO",
-        "SKIP",
-        "VAR",
-        "GIVEN",
-        "MEMORY",
-    )
-)
+_KEYWORDS = frozenset((
+    "IF", "THEN", "ELSE", "ENDIF", "MATCH", "WITH", "WHILE", "INVARIANT", "VARIANT", "DO", "SKIP", "VAR", "GIVEN",
+    "MEMORY",
+))  # fmt: skip
 
 
 def _lark() -> Any:

@@ -11,6 +11,7 @@ from fractions import Fraction
 
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite
 from avow.formulas.traversal import transform
+from avow.language.bounds import constant
 from avow.language.sorts import BOOL
 from avow.language.subterms import subterms
 from avow.language.terms import (
@@ -23,14 +24,12 @@ from avow.language.terms import (
     Iff,
     Implies,
     In,
-    Literal,
     Not,
     Or,
     Quantified,
     Quantifier,
     SetTerm,
     Term,
-    Widen,
 )
 
 
@@ -153,7 +152,7 @@ def _bound(item: Term) -> tuple[Term, bool, Fraction, bool] | None:
     """(term, is it a lower bound, the number, is it strict)."""
     if not isinstance(item, Compare) or item.operator not in {"<", "<=", ">", ">="}:
         return None
-    one, other = _number(item.left), _number(item.right)
+    one, other = constant(item.left), constant(item.right)
     if (one is None) == (other is None):
         return None
     strict = item.operator in {"<", ">"}
@@ -188,7 +187,7 @@ def _compare(term: Compare) -> Term:
         return FALSE if term.operator == "==" else TRUE
     if isinstance(left, Construct) and isinstance(right, Construct):
         return _constructs(term.operator, left, right)
-    one, other = _number(left), _number(right)
+    one, other = constant(left), constant(right)
     if one is not None and other is not None:
         holds = {
             "==": one == other,
@@ -209,11 +208,3 @@ def _constructs(operator: str, left: Construct, right: Construct) -> Term:
     pairs = zip(left.arguments, right.arguments, strict=True)
     same = _and(tuple(_compare(Compare("==", a, b)) for a, b in pairs))
     return same if operator == "==" else opposite(same)
-
-
-def _number(term: Term) -> Fraction | None:
-    if isinstance(term, Widen):
-        return _number(term.term)
-    if isinstance(term, Literal) and isinstance(term.value, int | Fraction) and not isinstance(term.value, bool):
-        return Fraction(term.value)
-    return None

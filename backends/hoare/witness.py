@@ -14,15 +14,15 @@ from avow.base.records import dataclass
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import conjunction, equation, free_variables, negation
-from avow.formulas.values import Element, Value, show
-from avow.language.sorts import INTEGER, REAL, EnumSort, Sort
+from avow.formulas.values import Value, show
+from avow.formulas.written import value_term
+from avow.language.sorts import REAL, BoolSort, EnumSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
     Apply,
     Arithmetic,
     Compare,
-    EnumValue,
     Literal,
     Negative,
     Not,
@@ -303,9 +303,9 @@ def _common(heads: Sequence[State], program: Program) -> Iterator[Term]:
     numbers: list[tuple[Term, list[Fraction]]] = []
     for v in (v for v in program.state if all(v.name in state for state in heads)):
         seen = [state[v.name] for state in heads]
-        fixed = _term(seen[0], v.sort)
-        if fixed is not None and all(value == seen[0] for value in seen):
-            yield equation(v, fixed)
+        plain = v.sort in NUMERIC or isinstance(v.sort, BoolSort | EnumSort)
+        if plain and all(value == seen[0] for value in seen):
+            yield equation(v, value_term(seen[0], v.sort))
         if v.sort in NUMERIC:
             numbers.append((v, [Fraction(value) for value in seen if isinstance(value, int | Fraction)]))
     pairs: list[tuple[Term, list[Fraction]]] = [
@@ -323,14 +323,3 @@ def _common(heads: Sequence[State], program: Program) -> Iterator[Term]:
 
 def _real(term: Term) -> Term:
     return term if term.sort == REAL else Widen(term, REAL)
-
-
-def _term(value: Value, sort: Sort) -> Term | None:
-    match value:
-        case bool():
-            return Literal(value, sort)
-        case int() | Fraction() if sort in NUMERIC:
-            return Literal(value if sort == REAL else int(value), INTEGER if value < 0 and sort != REAL else sort)
-        case Element(name=name) if isinstance(sort, EnumSort):
-            return EnumValue(name, sort)
-    return None

@@ -10,22 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.given import existing_file
+from avow.backend_kit.programs.samples import numbers_of
 from avow.backend_kit.protocol import Job, NoModel
 from avow.backend_kit.stepping import Stepping
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_text
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Value
-from avow.language.bounds import bounds, constant
+from avow.language.bounds import bounds
 from avow.language.contract import Clause
 from avow.language.printer import show_number
-from avow.language.subterms import subterms
 from avow.language.terms import TRUE, Role, Term, Variable
-from avow.solving.models import default_value
 from avow.solving.settling import Settler
-from avow.solving.translation import Unsupported
 
 from .checker import Checked, check
+from .guesses import filled
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .memory import kept, knowing, steps_of
 from .parser import parse_program
@@ -163,13 +162,9 @@ def answering(job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
             own = next((v for v, ghost in ghosts.items() if ghost == variable), variable)
             if name in given:  # one that a program is not given is anything
                 start[own.name] = start[variable.name] = given[name]
-        for variable in checked.program.state:
-            try:
-                start.setdefault(variable.name, default_value(variable.sort))
-            except Unsupported:
-                continue
+        simplest = {v.name: value for v, value in filled({}, checked.program.state).items()}
         try:
-            end = machine.run(checked.program.body, start)
+            end = machine.run(checked.program.body, {**simplest, **start})
             return {name: evaluate(term, end) for name, term in outputs.items()}
         except (Fault, NoEnd, Endless, NotEvaluable, KeyError) as error:
             raise NoModel(str(error)) from error
@@ -191,8 +186,8 @@ def other_numbers(program: Program, clauses: Iterable[Clause]) -> Iterator[Diagn
     formulas = [clause.formula for clause in clauses]
     conditions = [s for s in statements(program.body) if isinstance(s, If | While)]
     assigned = [s.value for s in statements(program.body) if isinstance(s, Assign | Update)]
-    in_program = _numbers([*(s.condition for s in conditions), *assigned])
-    foreign = _thresholds(s.condition for s in conditions) - _numbers(formulas)
+    in_program = numbers_of([*(s.condition for s in conditions), *assigned])
+    foreign = _thresholds(s.condition for s in conditions) - numbers_of(formulas)
     missing = _thresholds(formulas) - in_program
     if not foreign or not missing:
         return
@@ -209,10 +204,6 @@ def other_numbers(program: Program, clauses: Iterable[Clause]) -> Iterator[Diagn
 
 def _thresholds(formulas: Iterable[Term]) -> frozenset[Fraction]:
     return frozenset(b.number for formula in formulas for b in bounds(formula)) - _COMMON
-
-
-def _numbers(terms: Iterable[Term]) -> frozenset[Fraction]:
-    return frozenset(n for term in terms for part in subterms(term) if (n := constant(part)) is not None)
 
 
 def _shown(numbers: Iterable[Fraction]) -> str:

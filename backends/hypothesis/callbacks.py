@@ -27,7 +27,6 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY
 from avow.formulas.temporal.cells import longest_limits
 from avow.formulas.values import show
-from avow.isolation.level import Unavailable, available
 from avow.isolation.observed import Observed
 from avow.ros.sources import message_files
 from avow.system.plan import Driving
@@ -83,14 +82,9 @@ def files(job: Job) -> tuple[Path, ...]:
 
 
 def settle(job: Job, limits: Limits, version: str) -> Report:
-    """One outcome for each obligation."""
-    try:
-        available()
-    except Unavailable as missing:
-        return Report.unsealed(job, missing, "hypothesis", version)
+    """One outcome for each obligation. `problems` has found nothing, so that there is a judge."""
     backend = judge_of_runs()
-    if backend is None:
-        return Report.alike(job, Verdict.NOT_RUN, "no installed method judges runs of messages", "hypothesis", version)
+    assert backend is not None
     try:
         work = _work(job, backend, limits)
         outcomes = work.outcomes()

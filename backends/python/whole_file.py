@@ -18,25 +18,13 @@ BUILTINS = frozenset({"min", "max", "abs", "len", "range", "enumerate", "float",
 MODULES: Mapping[str, frozenset[str]] = {
     "__future__": frozenset({"annotations"}),
     "math": frozenset(name for name in dir(math) if not name.startswith("_")),
-    "typing": frozenset(
-        {
-            "Any",
-            "ClassVar",
-            "Dict",
-            "Final",
-            "Iterable",
-            "List",
-            "Literal",
-            "Mapping",
-            "Optional",
-            "Sequence",
-            "Tuple",
-            "Union",
-        }
-    ),
+    "typing": frozenset({
+        "Any", "ClassVar", "Dict", "Final", "Iterable", "List", "Literal", "Mapping", "Optional", "Sequence", "Tuple",
+        "Union",
+    }),
     "collections.abc": frozenset({"Collection", "Iterable", "Iterator", "Mapping", "Sequence", "Sized"}),
     "enum": frozenset({"Enum", "auto"}),
-}
+}  # fmt: skip
 """What may be imported, and what of it may be used: none of it changes what other code does, or leads to what does."""
 
 _LIBRARIES = frozenset({".py", ".pyc", ".pyd", ".pyw", ".so"})
