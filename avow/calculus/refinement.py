@@ -8,31 +8,41 @@ Of clauses that speak of other steps it is asked of every run: as long as B's as
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
+from avow.calculus.certificates import requirement_scope
+from avow.calculus.composition import Composition, composed_over
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
+from avow.calculus.finder import Finder, Hint
 from avow.calculus.questions import Answer
-from avow.calculus.refinement_certificate import established
-from avow.calculus.refinement_runs import answered
+from avow.calculus.requirements import formula_question
+from avow.calculus.variables import framed
 from avow.formulas.formula import sort_digest, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.temporal.clock import one_step
 from avow.formulas.traversal import transform
-from avow.kernel.certificate import Certificate
-from avow.kernel.statements import Claimed
-from avow.language.contract import Clause, Node, Port
+from avow.formulas.written import show_values
+from avow.kernel.certificate import Certificate, How
+from avow.kernel.check import Established, Kernel, Refused
+from avow.kernel.statements import Claimed, Place, Statement, Wiring, statements
+from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.printer import show_type
 from avow.language.sorts import INTEGER, NATURAL, DataSort, Sort, parts, rebuilt
-from avow.language.terms import Compare, Literal, Quantified, Term, Variable
-from avow.solving.counterexample import show_values
+from avow.language.subterms import ports_of
+from avow.language.terms import Compare, Literal, Quantified, Role, Term, Variable
+from avow.sanity.realizability import realizable
+from avow.sanity.viability import viable
 from avow.solving.limits import NO_ANSWER
-from avow.system.graph import fits
+from avow.system.formulas import Assumed
+from avow.system.graph import dataflow, fits
+from avow.system.plan import System
+from avow.system.plan_file import bare_plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +144,7 @@ def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callab
     if found.verdict is not Verdict.PROVED:
         return found
 
-    certificate, shown = established(_recast(concrete, recast), abstract)
+    certificate, shown = _established(_recast(concrete, recast), abstract)
     demands = []
     for at, demand in enumerate(found.demands):
         kind = Claimed.ASSUMPTION if at < len(concrete.assumptions) else Claimed.REQUIREMENT
@@ -162,9 +172,7 @@ def _recast(concrete: Node, recast: Callable[[Term], Term]) -> Node:
 
 def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
     """Where clauses speak of other steps, of every run; `concrete` in the types of `abstract`."""
-    from avow.sanity.viability import viable
-
-    answers, certificates = answered(concrete, abstract, bounds)
+    answers, certificates = _answered(concrete, abstract, bounds)
 
     def demand(node: str, clause: Clause, answer: Answer) -> Demand:
         needed = tuple(map(str, answer.details.get("needed", ())))  # type: ignore[call-overload]
@@ -195,8 +203,6 @@ def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
 def _kept_by_something(
     found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term], bounds: Bounds
 ) -> Refinement:
-    from avow.sanity.realizability import realizable
-
     def mine(ports: tuple[Port, ...]) -> tuple[Variable, ...]:
         return tuple(cast(Variable, recast(port.variable)) for port in ports)
 
@@ -328,3 +334,122 @@ def _match(one: Sort, other: Sort, mapping: dict[Sort, Sort]) -> None:
 
 def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
     return mapping[sort] if sort in mapping else rebuilt(sort, (_mapped(part, mapping) for part in parts(sort)))
+
+
+# -- what the kernel says ----------------------------------------------------------------------------------------------
+
+
+def _established(concrete: Node, abstract: Node) -> tuple[Certificate, dict[tuple[Claimed, str], Established]]:
+    """The certificate that was found, and by kind and name what the kernel establishes of the assumptions of the first
+    node, and (as requirements) of the guarantees of the second. Types have to be the same in both.
+
+    It is `Refined` in proofs/instances.dfy: the refining node stands alone, all inputs are the environment's, of which
+    the refined node's assumptions are assumed; the refined node's guarantees are what has to be shown.
+    """
+    at = concrete.name
+    known = statements(
+        Wiring(
+            (concrete,),
+            {(Role.OUTPUT, at, p.name): Place(f"{at}.{p.name}", at, 0, p.sort) for p in concrete.outputs}
+            | {(Role.INPUT, at, p.name): Place(f"in.{p.name}", None, 0, p.sort) for p in abstract.inputs},
+            (
+                *((Claimed.ENVIRONMENT, at, a.name, a.formula) for a in abstract.assumptions),
+                *((Claimed.REQUIREMENT, at, g.name, g.formula) for g in abstract.guarantees),
+            ),
+        )
+    )
+    given = tuple((f"environment {a.name}", 0) for a in abstract.assumptions)
+    hints = {f"{at}.{a.name}": Hint(given) for a in concrete.assumptions}
+    goals = tuple(claim for claim in known.every if claim.kind is Claimed.REQUIREMENT)
+    finder = Finder(known, "refinement", (at,), lambda _: frozenset(), False, frozenset(), hints, goals=goals)
+    certificate = finder.find()
+    kernel = Kernel(known, certificate, finder.solvers)
+    wanted = [claim for claim in known.every if claim.kind in (Claimed.ASSUMPTION, Claimed.REQUIREMENT)]
+    assumed = {claim.digest for claim in known.every if claim.kind is Claimed.ENVIRONMENT}
+    found = {(claim.kind, claim.name): _shown(kernel, claim, assumed) for claim in wanted}
+    return certificate, {name: one for name, one in found.items() if one is not None}
+
+
+def _shown(kernel: Kernel, claim: Statement, assumed: set[str]) -> Established | None:
+    """Up to the node's own evidence, and what the refined node assumes."""
+    for i, entry in enumerate(kernel.certificate.entries):
+        if (entry.how, entry.node, entry.digest) == (How.SHOWN, claim.node, claim.digest):
+            try:
+                found = kernel.establish(i)
+            except Refused:
+                continue
+            if all(need.kind is How.GUARANTEE or need.digest in assumed for need in found.hypotheses):
+                return found
+    return None
+
+
+# -- over runs ---------------------------------------------------------------------------------------------------------
+
+
+def _answered(concrete: Node, abstract: Node, bounds: Bounds) -> tuple[tuple[Answer, ...], tuple[Certificate, ...]]:
+    """For each assumption of the first node, then each guarantee of the second, whether it follows in every run, by
+    induction over steps; and what the kernel established it from. The types of both are the same.
+
+    The refining node stands alone in a system, of whose environment the refined node's assumptions are assumed. First
+    its assumptions are required, of whatever it puts out: its guarantees hold only where these do, and may not be used.
+    Then the refined node's guarantees are required of what it guarantees, where all assumptions of both hold.
+    """
+    alone = replace(concrete, inputs=abstract.inputs, topics=(), assumptions=())
+    given = abstract.assumptions
+    certificates: list[Certificate] = []
+    first = [
+        _of_inputs(clause, answer)
+        for clause, answer in zip(
+            concrete.assumptions,
+            _required(replace(alone, guarantees=()), given, concrete.assumptions, bounds, certificates),
+            strict=True,
+        )
+    ]
+    then = _required(alone, (*given, *concrete.assumptions), abstract.guarantees, bounds, certificates)
+    return (*first, *then), tuple(certificates)
+
+
+def _required(
+    node: Node, assumed: Sequence[Clause], wanted: Sequence[Clause], bounds: Bounds, certificates: list[Certificate]
+) -> list[Answer]:
+    """Whether the node has what is wanted where something is assumed."""
+    if not wanted:
+        return []
+    system = System(bare_plan(node.name, ()), Contract((), (), (), (node,)))
+    supposed = [Assumed(f"{k} {clause.name}", node.name, clause.formula, "", "") for k, clause in enumerate(assumed)]
+    required = {clause.name: _placed(node.name, clause.formula) for clause in wanted}
+    composition = composed_over(framed(system, dataflow(system), supposed, required))
+    support = tuple(f"{node.name}.{clause.name}" for clause in node.guarantees)
+    answers = []
+    for clause in wanted:
+        answer = formula_question(composition.frame, clause.name, support)(composition, bounds)
+        answers.append(_alone(composition, answer))
+        kept = composition.certificates.made.get(requirement_scope(clause.name))
+        if answers[-1].verdict is Verdict.PROVED and kept is not None:
+            certificates.append(kept)
+    return answers
+
+
+def _of_inputs(clause: Clause, answer: Answer) -> Answer:
+    """An assumption of what the node itself has put out may hold of what it guarantees: no run without that refutes."""
+    if answer.verdict is not Verdict.REFUTED or all(v.role is Role.INPUT for v in ports_of(clause.formula)):
+        return answer
+    return Answer(Verdict.UNKNOWN, "it speaks of what the node has put out, of which its guarantees were not used")
+
+
+def _placed(node: str, formula: Term) -> Term:
+    """A clause's formula over ``node.port``, as a requirement's is."""
+    ports: Mapping[Variable, Variable] = {v: replace(v, name=f"{node}.{v.name}") for v in ports_of(formula)}
+    return substitute(formula, ports)
+
+
+def _alone(composition: Composition, answer: Answer) -> Answer:
+    """A proof that rests on what the node guarantees and on what is assumed, and on nothing else."""
+    if answer.verdict is not Verdict.PROVED:
+        return answer
+    assumed = {claim.digest for claim in composition.certificates.known.every if claim.kind is Claimed.ENVIRONMENT}
+    hypotheses = answer.established.hypotheses if answer.established is not None else ()
+    others = [need for need in hypotheses if need.kind is not How.GUARANTEE and need.digest not in assumed]
+    if answer.established is not None and not others:
+        return answer
+    return replace(answer, verdict=Verdict.UNKNOWN, summary="the proof rests on more than the contracts say")

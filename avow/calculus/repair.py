@@ -11,20 +11,24 @@ nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from itertools import product
 
 from avow.base.records import dataclass
-from avow.base.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
+from avow.base.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS, VALUES_TRIED
 from avow.base.tuning.effort import OFFER_STEP_EFFORT, OFFER_WRITING_STEPS, OFFERS_EFFORT
 from avow.base.verdict import Verdict
-from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
+from avow.evaluation.evaluate import finite_values
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
+from avow.formulas.written import value_term
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
+from avow.language.sorts import SetSort
 from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
@@ -32,12 +36,14 @@ from avow.language.terms import (
     Compare,
     Iff,
     Implies,
+    In,
     Literal,
     Not,
     Or,
     Quantified,
     Quantifier,
     Role,
+    SetTerm,
     Term,
     Variable,
     Widen,
@@ -116,7 +122,7 @@ def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) ->
     found = _eliminated(known, goal, place)
     if found is None or not found[1]:
         # What elimination cannot do, or only without some hypothesis, trying every value can, if they are few.
-        tried = enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
+        tried = _enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
         found = tried if tried is not None and (tried[1] or found is None) else found
     if found is None:
         rewritten = _rewritten(known, goal, place)
@@ -206,6 +212,49 @@ def _may_be_kept(frame: Frame, name: str, further: Term) -> bool:
     possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), substitute(meets, bound)) if bound else meets
     accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else TRUE
     return entails({}, Implies(accepted, possible), effort=OFFER_STEP_EFFORT).verdict is not Verdict.REFUTED
+
+
+def _enumerated(
+    known: Mapping[str, Term], goal: Term, ports: Sequence[Variable], effort: int
+) -> tuple[Term, bool] | None:
+    """A condition on some of the ports with which the goal follows, and whether it is the weakest. None where there is
+    none, or where they have too many values."""
+    spoken = free_variables(goal).union(*map(free_variables, known.values()))
+    finite = [(v, values) for v in ports if v in spoken and (values := finite_values(v.sort))]
+    # A relation's values are as finite as its points, and a question each: only what can be written as a set is tried.
+    if not finite or math.prod(len(values) for _, values in finite) > VALUES_TRIED:
+        return None
+    good: list[tuple[Term, ...]] = []
+    bad: list[tuple[Term, ...]] = []
+    possible = sure = True
+    for choice in product(*(values for _, values in finite)):
+        terms = tuple(value_term(value, v.sort) for (v, _), value in zip(finite, choice, strict=True))
+        given = {v: term for (v, _), term in zip(finite, terms, strict=True)}
+        facts = {label: substitute(term, given) for label, term in known.items()}
+        verdict = entails(facts, substitute(goal, given), effort=effort).verdict
+        (good if verdict is Verdict.PROVED else bad).append(terms)
+        sure = sure and verdict is not Verdict.UNKNOWN
+    variables = [v for v, _ in finite]
+    if not good or not bad:
+        return None
+    found = Not(_one_of(variables, bad)) if len(bad) < len(good) else _one_of(variables, good)
+    together = {**known, "the condition": found}
+    possible = solve(together, effort=effort).status == "sat"
+    if not possible or entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
+        return None
+    return found, sure and frozenset(variables) >= spoken & frozenset(ports)
+
+
+def _one_of(variables: Sequence[Variable], choices: Sequence[tuple[Term, ...]]) -> Term:
+    if len(variables) == 1:
+        [variable] = variables
+        options = [option for (option,) in choices]
+        if len(options) == 1:
+            return Compare("==", variable, options[0])
+        return In(variable, SetTerm(tuple(options), SetSort(variable.sort)))
+    return disjunction(
+        conjunction(Compare("==", v, term) for v, term in zip(variables, choice, strict=True)) for choice in choices
+    )
 
 
 # -- places ------------------------------------------------------------------------------------------------------------

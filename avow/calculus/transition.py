@@ -17,9 +17,8 @@ from avow.base.records import dataclass
 from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.tuning.effort import SEARCH_STEPS
 from avow.calculus.choices import Values, by_variable, search
-from avow.calculus.cuts import another_first, first_cut
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
-from avow.calculus.node_outputs import Answerer, Doubts, Stuck, is_restricted, judge, possible
+from avow.calculus.node_outputs import Answerer, Doubts, Stuck, another_first, first_cut, is_restricted, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 NOTATIONS = {
     **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
-    "smtlib": "avow.solving.contract_smtlib",
+    "smtlib": "avow.solving.smtlib",
     "fretish": "avow.fretish.writing",
 }
 """Notation → the module with its function ``to_<notation>(contract)``, imported when it is asked for: it gives a text,

@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import assert_never
 
-from avow.base.tuning.bounds import INSTANCES
-from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.evaluation.tables import compile_table
+from avow.base.tuning.bounds import INSTANCES, TABLE_ROUNDS
+from avow.evaluation.compiler import Compiler, NotEvaluable, finite_values
+from avow.evaluation.evaluate import SEARCHES, Evaluator, compile_term, filler, guarded
+from avow.evaluation.quantifier_search import Search
+from avow.formulas.formula import conjunction, disjunction, equation, negation, opposite
+from avow.formulas.renaming import rename_apart
 from avow.formulas.temporal.cell import Cell
-from avow.formulas.values import FunctionValue, Value
+from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import Apply, Conditional, Role, Term, Variable
 
 
 class Keeper:
@@ -18,7 +39,7 @@ class Keeper:
 
     def __init__(self, cells: Sequence[Cell], instances: int = INSTANCES) -> None:
         self._cells = {
-            cell.before.qualified: compile_table(cell.now, cell.parameters, instances)
+            cell.before.qualified: _compile_table(cell.now, cell.parameters, instances)
             if cell.parameters
             else _plain(compile_term(cell.now))
             for cell in cells
@@ -56,3 +77,77 @@ class Keeper:
 
 def _plain(now: Evaluator) -> Callable[[Mapping[str, Value], Value | None], Value]:
     return lambda valuation, before: now(valuation)
+
+
+Table = Callable[[Mapping[str, Value], Value | None], FunctionValue]
+"""From a valuation, and the function's value before (a guess at its points), to its value."""
+
+
+def _compile_table(term: Term, parameters: Sequence[Variable], instances: int) -> Table:
+    """The function from the parameters to the term, of at most so many points. A guess (the term at the points before,
+    and at values that nothing names) is held against the term, exactly, until no argument tells them apart. The result
+    raises NotEvaluable: where there are more points, or infinitely many."""
+    kept = Variable(Role.INPUT, "kept#", FunctionSort(tuple(v.sort for v in parameters), term.sort))
+    now = compile_term(term)
+    body = rename_apart(_differ(term, Apply(kept, tuple(parameters), term.sort)), [v.name for v in parameters])
+    compiler = Compiler({}, SEARCHES)
+    search = guarded(lambda: Search(compiler, tuple(parameters), body, True))
+    fill = filler(compiler)
+    names = tuple(v.name for v in parameters)
+    strange = tuple(unnamed(v.sort) for v in parameters)
+
+    def build(valuation: Mapping[str, Value], before: Value | None) -> FunctionValue:
+        def at(point: tuple[Value, ...]) -> Value:
+            return now({**valuation, **dict(zip(names, point, strict=True))})
+
+        elsewhere = at(strange)
+        points = before.table if isinstance(before, FunctionValue) else {}
+        found = {point: value for point in points if (value := at(point)) != elsewhere}
+        for _ in range(TABLE_ROUNDS):
+            if len(found) > instances:
+                raise NotEvaluable(f"more than {instances} values of {', '.join(names)} are remembered")
+            guess = FunctionValue(found, elsewhere)
+            missed = guarded(lambda: search.all(fill({**valuation, kept.qualified: guess})))  # noqa: B023
+            if not missed:
+                return guess
+            found = {**found, **{point: at(point) for point in missed}}
+        raise NotEvaluable(f"something else is remembered for each of infinitely many values of {', '.join(names)}")
+
+    return build
+
+
+def _differ(term: Term, kept: Term) -> Term:
+    """That two terms are not the same; a conditional's branches apart, so that its condition restricts them."""
+    if isinstance(term, Conditional):
+        met = conjunction((term.condition, _differ(term.then, kept)))
+        return disjunction((met, conjunction((negation(term.condition), _differ(term.otherwise, kept)))))
+    return opposite(equation(term, kept))
+
+
+def unnamed(sort: Sort) -> Value:
+    """A value that nothing names, as far as one can guess; of a finite sort, any: all are looked at."""
+    finite = finite_values(sort)
+    if finite:
+        return finite[0]
+    match sort:
+        case NaturalSort() | IntegerSort():
+            return 10**60
+        case RealSort():
+            return Fraction(10**61 + 1, 10)
+        case StringSort():
+            return "\0" * 60
+        case TupleSort(items=items):
+            return tuple(map(unnamed, items))
+        case SequenceSort(item=item):
+            return SequenceValue((unnamed(item),))
+        case OpaqueSort(name=name):
+            return Opaque(name, 10**60)
+        case DataSort(constructors=constructors):
+            made = max(constructors, key=lambda each: len(each.parameters))
+            if not any(isinstance(part, DataSort) for part in made.parameters):
+                return Data(made.name, tuple(map(unnamed, made.parameters)))
+            raise NotEvaluable(f"something is remembered for each value of {sort}")
+        case BoolSort() | EnumSort() | FunctionSort() | SetSort():  # one value of many, or none of its own
+            raise NotEvaluable(f"something is remembered for each value of {sort}")
+        case _:
+            assert_never(sort)

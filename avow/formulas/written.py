@@ -1,10 +1,11 @@
-"""Values as terms."""
+"""Values as terms, and in the contract's own words: ``in.status = red, in.at = {(0, 0)}``."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 
-from avow.formulas.values import Data, Element, Value
+from avow.formulas.values import Data, Element, Value, show
 from avow.language.sorts import (
     BoolSort,
     DataSort,
@@ -16,7 +17,7 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.language.terms import Construct, EnumValue, Literal, Term, TupleTerm
+from avow.language.terms import Construct, EnumValue, Literal, Role, Term, TupleTerm, Variable
 
 
 def value_term(value: Value, sort: Sort) -> Term:
@@ -38,3 +39,12 @@ def value_term(value: Value, sort: Sort) -> Term:
         case StringSort(), str():
             return Literal(value, sort)
     raise AssertionError(f"{value} of {sort}")
+
+
+_ORDER = {Role.INPUT: 0, Role.OUTPUT: 1, Role.BOUND: 2}
+
+
+def show_values(values: Mapping[Variable, Value]) -> tuple[tuple[str, str], ...]:
+    """(name, value) pairs, inputs first, then outputs, by name."""
+    ordered = sorted(values.items(), key=lambda pair: (_ORDER[pair[0].role], pair[0].name))
+    return tuple((variable.qualified, show(value)) for variable, value in ordered)

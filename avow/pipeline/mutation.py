@@ -6,7 +6,7 @@ longer proves. A mutant that could not be judged (no row of a table speaks of it
 failed) is neither killed nor a survivor: not to understand a question is not to see through it. Evidence that no judged
 mutant disturbs supports nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that
 it is about; methods that a person's judgement guides (reviews, measurements) do not read the formula and have no score.
-Of each survivor it is said at which input and answer it differs from the contract (`avow.sanity.survivors`).
+Of each survivor it is said at which input and answer it differs from the contract (`avow.sanity.mutants`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from avow.pipeline import asking
 from avow.pipeline.mutant_systems import Altered, chosen
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method
-from avow.sanity.mutants import Mutant
-from avow.sanity.survivors import Difference, difference
+from avow.sanity.mutants import Difference, Mutant, difference
 
 _Task = tuple[Work, Obligation, Evidence]
 

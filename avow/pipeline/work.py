@@ -340,7 +340,7 @@ def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = Non
     """`offered`: as `method_work` has it. `shelf`: where it is kept what follows from the nodes' texts. Raises Rejected
     for an unknown backend, and where the plan's formulas are wrong."""
     from avow.calculus.composition import composed
-    from avow.sanity.node_facts import recall
+    from avow.sanity.claims import recall
 
     if shelf is not None:
         recall(system.contract, shelf)

@@ -11,27 +11,32 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, assert_never
+from typing import assert_never
 
 from avow.base.diagnostics import Severity
+from avow.base.remembered import by_identity
 from avow.base.tuning.effort import CONSISTENT_EFFORT
 from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.finite import Ranges
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cells import remembers
 from avow.formulas.values import Value
+from avow.formulas.written import show_values
 from avow.language.contract import ClauseKind, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, triggers
-from avow.sanity.examples import meets
+from avow.sanity.conflicts import conflicts, contradictions
+from avow.sanity.over_runs import OverRuns
+from avow.sanity.realizability import possible, realizable
 from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
+from avow.sanity.witness_search import Group, Realizability, groups
 from avow.solving.limits import spent
-
-if TYPE_CHECKING:
-    from avow.sanity.over_runs import OverRuns
-    from avow.sanity.witness_search import Realizability
-
+from avow.solving.questions import solve
+from avow.solving.second import CONTRADICTED, doubted
+from avow.solving.sizes import in_every_size
+from avow.solving.translation import translating_once
 
 Given = Mapping[Variable, Value]
 
@@ -49,9 +54,10 @@ def analyse(
     what is wanted. `scenario` fixes some inputs, `ranges` says which few values others (and quantified variables) have,
     where no answer for all is found.
     """
-    from avow.solving.translation import translating_once
-
-    analysis = _analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
+    bounds = bounds or Bounds()
+    analysis = (
+        OverRuns(node, bounds) if remembers(node) else _Analysis(node, scenario or {}, ranges or Ranges(), bounds)
+    )
     results = []
     asked = claims(node)
     told = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
@@ -76,14 +82,6 @@ def outcomes(
     found = analyse(node, scenario=scenario, ranges=ranges, bounds=bounds, wanted=wanted)
     results = {result.name: result for result in found}
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
-
-
-def _analysis(node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> _Analysis | OverRuns:
-    if not remembers(node):
-        return _Analysis(node, scenario, ranges, bounds)
-    from avow.sanity.over_runs import OverRuns
-
-    return OverRuns(node, bounds)
 
 
 class _Analysis:
@@ -147,8 +145,6 @@ class _Analysis:
 
     def _in_every_size(self, finding: Finding, because: str = "") -> Finding:
         """What was not refuted is, if it fails for some number of elements of the unspecified types."""
-        from avow.solving.sizes import in_every_size
-
         if finding.verdict in (Verdict.REFUTED, Verdict.ERROR):
             return finding
         verdict, reason = in_every_size(
@@ -175,8 +171,6 @@ class _Analysis:
 
     def _with_all_sets(self, finding: Finding, formulas: Mapping[str, Term]) -> Finding:
         """Where formulas contradict each other, every smallest set of them that does."""
-        from avow.sanity.conflicts import contradictions
-
         if finding.verdict is not Verdict.REFUTED or not finding.clauses:
             return finding
         sets, complete = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
@@ -190,8 +184,6 @@ class _Analysis:
 
     def _realizability(self) -> tuple[Realizability, bool]:
         """The answer, and whether it is about the scenario only."""
-        from avow.sanity.realizability import realizable
-
         if self.answer is not None:
             return self.answer
         start = spent()
@@ -232,8 +224,6 @@ class _Analysis:
         return self.answer
 
     def _realizable(self) -> Finding:
-        from avow.sanity.conflicts import conflicts
-
         answer, bounded = self._realizability()
         if answer.verdict is Verdict.PROVED:
             allowed = self._other("assumptions-satisfiable")
@@ -257,8 +247,6 @@ class _Analysis:
         )
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
         if not listed:
-            from avow.solving.counterexample import show_values
-
             shown = Counterexample(show_values(answer.inputs), "no output meets the guarantees here")
             return Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
         # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
@@ -288,7 +276,7 @@ class _Analysis:
         undecided: Finding | None = None
         broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only where it is demanded
         for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
-            if meets(broken, (*self.assumptions.values(), trigger)):
+            if _meets(broken, (*self.assumptions.values(), trigger)):
                 continue
             finding = self._possible(
                 {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
@@ -316,7 +304,7 @@ class _Analysis:
         formula = self.node.clause(name).formula
         whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
         broken = self._example(f"not-tautological-{name}")
-        if broken and meets({**self._example(whole), **broken}, (*others.values(), negation(formula))):
+        if broken and _meets({**self._example(whole), **broken}, (*others.values(), negation(formula))):
             return Finding(Verdict.PROVED)
         finding = self._fails_somewhere(others, formula, "it is true by itself", "it follows from {}")
         if finding.verdict is not Verdict.REFUTED:
@@ -324,8 +312,6 @@ class _Analysis:
         return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"not-tautological-{name}"))
 
     def _needed(self, name: str) -> Finding:
-        from avow.sanity.realizability import realizable
-
         if weaker := self._if_refuted(f"not-tautological-{name}") or self._if_refuted(f"not-redundant-{name}"):
             return Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
         because = self._if_refuted("assumptions-satisfiable")
@@ -371,11 +357,6 @@ class _Analysis:
         return replace(finding, explanation=text, clauses=(), because=because)
 
     def _determined(self, name: str) -> Finding:
-        from avow.sanity.witness_search import Group, groups
-        from avow.solving.counterexample import show_values
-        from avow.solving.questions import solve
-        from avow.solving.second import CONTRADICTED, doubted
-
         output = self.node.output(name).variable
         alone = Group({}, (output,))
         # Outputs that hang together with this one by shared guarantees may differ too; all others stay the same.
@@ -412,8 +393,6 @@ class _Analysis:
 
     def _some(self, assumed: Mapping[str, Term]) -> bool:
         """Whether any input of the scenario meets these: without one, nothing has been checked."""
-        from avow.solving.questions import solve
-
         return solve(assumed, effort=self.limit, given=self.scenario, values="unused").status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
@@ -425,9 +404,6 @@ class _Analysis:
 
     def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> Finding:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
-        from avow.solving.questions import solve
-        from avow.solving.second import CONTRADICTED, doubted
-
         limit = min(limit or self.limit, self.limit)
         answer = solve(formulas, effort=limit, seed=self.seed, values="unused")
         if answer.status == "unknown" and self.scenario:
@@ -451,8 +427,6 @@ class _Analysis:
 
     def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
         """Whether these hold together, for functions that have no finite table."""
-        from avow.sanity.realizability import possible
-
         return _are_endless(formulas.values()) and possible(formulas, effort=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> Finding:
@@ -470,3 +444,18 @@ def _are_endless(formulas: Iterable[Term]) -> bool:
     sorts = {v.sort for formula in formulas for v in free_variables(formula)}
     parameters = {p for sort in sorts if isinstance(sort, FunctionSort) for p in sort.parameters}
     return any(isinstance(p, RealSort | IntegerSort | NaturalSort) for p in parameters)
+
+
+def _meets(values: Mapping[Variable, Value], formulas: Iterable[Term]) -> bool:
+    """Whether formulas hold of values that were found for another claim: then there is nothing to ask."""
+    named = {variable.qualified: value for variable, value in values.items()}
+    try:
+        return len(named) == len(values) > 0 and all(_compiled(formula)(named) is True for formula in formulas)
+    except NotEvaluable:
+        return False
+
+
+@by_identity(500)
+def _compiled(formula: Term) -> Evaluator:
+    """Raises NotEvaluable."""
+    return compile_term(formula)

@@ -28,10 +28,10 @@ from enum import StrEnum
 from avow.base.diagnostics import Severity, Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
-from avow.base.remembered import by_identity
+from avow.base.remembered import Shelf, by_identity
 from avow.formulas.conditions import conditions
-from avow.formulas.formula import conjunction, digest, sort_digest
-from avow.language.contract import Clause, ClauseKind, Node, Port
+from avow.formulas.formula import conjunction, digest, meaning, node_digest, sort_digest
+from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.language.subterms import subterms
@@ -90,37 +90,33 @@ def claims(node: Node) -> tuple[Claim, ...]:
     a = show_term(conjunction(c.formula for c in node.assumptions))
     g = show_term(conjunction(c.formula for c in node.guarantees))
     ins, outs = (", ".join(p.variable.qualified for p in ports) for ports in (node.inputs, node.outputs))
-    found = [
-        Claim(
-            Property.ASSUMPTIONS_SATISFIABLE,
-            None,
-            f"The assumptions of {node.name} can hold together.",
-            f"∃ {ins} · {a}" if ins else a,
-            assumed,
-            span=node.span,
-        ),
-        Claim(
-            Property.CONSISTENT,
-            None,
-            f"Some allowed inputs of {node.name} and some outputs meet every guarantee.",
-            f"∃ {', '.join(filter(None, (ins, outs)))} · ({a}) ∧ ({g})",
-            assumed + guaranteed,
-            span=node.span,
-        ),
-        Claim(
-            Property.REALIZABLE,
-            None,
-            f"For all inputs that {node.name} assumes, some output meets every guarantee.",
-            f"∀ {ins} · ({a}) → ∃ {outs} · {g}" if ins and outs else f"({a}) → {g}",
-            assumed + guaranteed,
-            span=node.span,
-        ),
-    ]
-    for clause in node.guarantees:
-        found += _of_guarantee(node, clause) if clause.pace is None else []
-    found += [claim for port in node.outputs for claim in _of_output(node, port, g, guaranteed)]
-    for clause in node.assumptions:
-        found += _of_assumption(node, clause)
+    found: list[Claim] = []
+
+    def ask(about: Property, of: Clause | Port | None, sentence: str, formula: str, names: tuple[str, ...]) -> None:
+        noted = isinstance(of, Clause) and of.kind is ClauseKind.ASSUMPTION
+        severity = Severity.NOTE if noted else _SEVERITY.get(about, Severity.ERROR)
+        found.append(Claim(about, of.name if of else None, sentence, formula, names, severity, (of or node).span))
+
+    def ask_of(clause: Clause) -> None:
+        for about, sentence in _of_clause(node, clause).items():
+            ask(about, clause, sentence, show_clause(clause, node), _names(node, (clause,)))
+
+    sentence = f"The assumptions of {node.name} can hold together."
+    ask(Property.ASSUMPTIONS_SATISFIABLE, None, sentence, f"∃ {ins} · {a}" if ins else a, assumed)
+    sentence = f"Some allowed inputs of {node.name} and some outputs meet every guarantee."
+    together = f"∃ {', '.join(filter(None, (ins, outs)))} · ({a}) ∧ ({g})"
+    ask(Property.CONSISTENT, None, sentence, together, assumed + guaranteed)
+    sentence = f"For all inputs that {node.name} assumes, some output meets every guarantee."
+    answered = f"∀ {ins} · ({a}) → ∃ {outs} · {g}" if ins and outs else f"({a}) → {g}"
+    ask(Property.REALIZABLE, None, sentence, answered, assumed + guaranteed)
+    for clause in (c for c in node.guarantees if c.pace is None):
+        ask_of(clause)
+    for port in node.outputs:
+        excluded = f"The guarantees of {node.name} exclude some value of out.{port.name}."
+        ask(Property.CONSTRAINED, port, excluded, g, guaranteed)
+        ask(Property.DETERMINED, port, f"The inputs of {node.name} determine out.{port.name}.", g, guaranteed)
+    for clause in (c for c in node.assumptions if c.formula != TRUE):
+        ask_of(clause)
     return tuple(found)
 
 
@@ -144,65 +140,50 @@ def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:
     return tuple(f"{node.name}.{clause.name}" for clause in clauses)
 
 
-def _of_guarantee(node: Node, clause: Clause) -> list[Claim]:
-    common = (show_clause(clause, node), _names(node, (clause,)))
-    found = [
-        _claim(
-            Property.NOT_TAUTOLOGICAL, clause, f"Guarantee {clause.name} of {node.name} rules something out.", *common
-        )
-    ]
-    if triggers(clause.formula):
-        sentence = f"What triggers guarantee {clause.name} of {node.name} can happen."
-        found.append(_claim(Property.NOT_VACUOUS, clause, sentence, *common))
-    if len(node.guarantees) > 1:
-        sentence = f"Guarantee {clause.name} of {node.name} does not follow from the others."
-        found.append(_claim(Property.NOT_REDUNDANT, clause, sentence, *common))
-    return found
-
-
-def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
-    if clause.formula == TRUE:
-        return []
-    common = (show_clause(clause, node), _names(node, (clause,)))
-    found = [
-        _claim(
-            Property.NOT_TAUTOLOGICAL, clause, f"Assumption {clause.name} of {node.name} rules some input out.", *common
-        )
-    ]
-    if len(node.assumptions) > 1:
-        sentence = f"Assumption {clause.name} of {node.name} does not follow from the others."
-        found.append(_claim(Property.NOT_REDUNDANT, clause, sentence, *common))
-    sentence = f"Assumption {clause.name} of {node.name} rules out inputs for which no output meets the guarantees."
-    found.append(_claim(Property.NEEDED, clause, sentence, *common))
-    return found
-
-
-def _of_output(node: Node, port: Port, formula: str, names: tuple[str, ...]) -> list[Claim]:
-    """`formula` and `names` are those of all guarantees."""
-    return [
-        Claim(
-            Property.CONSTRAINED,
-            port.name,
-            f"The guarantees of {node.name} exclude some value of out.{port.name}.",
-            formula,
-            names,
-            _SEVERITY[Property.CONSTRAINED],
-            port.span,
-        ),
-        Claim(
-            Property.DETERMINED,
-            port.name,
-            f"The inputs of {node.name} determine out.{port.name}.",
-            formula,
-            names,
-            _SEVERITY[Property.DETERMINED],
-            port.span,
-        ),
-    ]
-
-
-def _claim(about: Property, clause: Clause, sentence: str, formula: str, names: tuple[str, ...]) -> Claim:
-    severity = _SEVERITY.get(about, Severity.ERROR)
+def _of_clause(node: Node, clause: Clause) -> dict[Property, str]:
+    """What is asked of a clause, each as a sentence."""
+    if clause.kind is ClauseKind.GUARANTEE:
+        whose, others, out = f"Guarantee {clause.name} of {node.name}", node.guarantees, "something"
+    else:
+        whose, others, out = f"Assumption {clause.name} of {node.name}", node.assumptions, "some input"
+    asked = {Property.NOT_TAUTOLOGICAL: f"{whose} rules {out} out."}
+    if clause.kind is ClauseKind.GUARANTEE and triggers(clause.formula):
+        asked[Property.NOT_VACUOUS] = f"What triggers guarantee {clause.name} of {node.name} can happen."
+    if len(others) > 1:
+        asked[Property.NOT_REDUNDANT] = f"{whose} does not follow from the others."
     if clause.kind is ClauseKind.ASSUMPTION:
-        severity = Severity.NOTE
-    return Claim(about, clause.name, sentence, formula, names, severity, clause.span)
+        asked[Property.NEEDED] = f"{whose} rules out inputs for which no output meets the guarantees."
+    return asked
+
+
+@dataclass(frozen=True, slots=True)
+class _NodeFacts:
+    """What follows from one node alone, whatever the system around it: its sanity claims, its digest, and of each
+    clause: the digest under the assumptions, that of the formula alone, and the formula for people."""
+
+    claims: tuple[Claim, ...]
+    key: str
+    clauses: tuple[tuple[str, str, str], ...]
+
+
+@by_identity(20_000)
+def _facts(node: Node) -> _NodeFacts:
+    return _NodeFacts(
+        claims(node),
+        node_key(node),
+        tuple((node_digest(node, c), meaning(c.formula), show_clause(c, node)) for c in node.clauses),
+    )
+
+
+def recall(contract: Contract, shelf: Shelf) -> None:
+    """Let the functions that ask for these facts know what was found in earlier runs."""
+    for node in contract.nodes:
+        if node.relay or not shelf.recall(_facts, node):
+            continue
+        known = _facts(node)
+        claims.learn(known.claims, node)
+        node_key.learn(known.key, node)
+        for clause, (own, alone, shown) in zip(node.clauses, known.clauses, strict=True):
+            node_digest.learn(own, node, clause)
+            meaning.learn(alone, clause.formula)
+            show_clause.learn(shown, clause, node)

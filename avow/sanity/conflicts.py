@@ -16,6 +16,7 @@ from avow.base.tuning.effort import CONFLICT_EFFORT, CONFLICT_SEARCH_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Data, Value, show
+from avow.formulas.written import show_values
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, DataSort, FunctionSort
@@ -24,7 +25,6 @@ from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, 
 from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import realizable
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
-from avow.solving.counterexample import show_values
 from avow.solving.limits import effort_left, spent, until
 from avow.solving.questions import solve
 from avow.solving.replay import replay

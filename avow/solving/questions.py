@@ -31,12 +31,12 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.sequences import flatten
 from avow.formulas.values import FunctionValue, Value
+from avow.formulas.written import show_values
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort, SequenceSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers
-from avow.solving.counterexample import show_values
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay

@@ -8,14 +8,19 @@ from __future__ import annotations
 import importlib.util
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from itertools import pairwise
 
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 from avow.formulas.formula import free_variables
+from avow.formulas.temporal.cells import compile_node
+from avow.language.contract import Contract
+from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.solving.limits import net
 from avow.solving.question_process import Answering, NoAnswer
-from avow.solving.translation import Translator
+from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Sorts
 
@@ -99,3 +104,26 @@ _cvc5 = Answering("avow.solving.cvc5_process")
 def end_cvc5() -> None:
     """End the process that answers for it; the next question starts another."""
     _cvc5.close()
+
+
+def to_smtlib(contract: Contract) -> str:
+    """One script; between nodes the solver is reset. Raises `Rejected` where SMT-LIB cannot say a formula."""
+    scripts = []
+    for node in contract.nodes:
+        compiled = compile_node(node)
+        for name, unsaid in compiled.unsaid.items():
+            message = f"node `{node.name}` has no SMT-LIB form: {name} speaks of {unsaid.reason}"
+            raise Rejected(Diagnostic("SMT001", message, node.clause(name).span))
+        formulas = {clause.name: clause.formula for clause in compiled.node.clauses}
+        comment = f"node {node.name}: {', '.join(formulas)}"
+        for cell in compiled.cells:
+            formulas[f"next {cell.name}"] = cell.leaves(replace(cell.before, name=f"{cell.name}'"))
+            first = " ".join(show_term(cell.begins(), "rcl").split())
+            comment += f"\nbefore the first step: {first}" if cell.initial is not None else ""
+        try:
+            scripts.append(formulas_script(formulas, comment=comment))
+        except Unsupported as unsupported:
+            raise Rejected(
+                Diagnostic("SMT001", f"node `{node.name}` has no SMT-LIB form: {unsupported}", node.span)
+            ) from None
+    return "(reset)\n".join(scripts)

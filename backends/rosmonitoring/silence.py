@@ -9,7 +9,7 @@ from itertools import product
 
 from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
 from avow.evaluation.evaluate import NotEvaluable, compile_term
-from avow.evaluation.tables import unnamed
+from avow.evaluation.running import unnamed
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.ages import ELAPSED, Side
 from avow.formulas.values import FunctionValue, Value

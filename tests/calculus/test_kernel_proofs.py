@@ -27,7 +27,7 @@ INSTANCES = {
     "induction.py": ("Sound",),
     "subsystem_contracts.py": ("Derived",),
     "export.py": ("Derived",),
-    "refinement_certificate.py": ("Refined",),
+    "refinement.py": ("Refined",),
     "wiring.py": ("SoundWithMemory",),
     "finder.py": ("Nodes", "Derived"),
     "../kernel/check.py": ("SoundFromAnyBeginning", "Apart"),

@@ -30,7 +30,7 @@ from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
-from avow.solving.contract_smtlib import to_smtlib
+from avow.solving.smtlib import to_smtlib
 
 SECONDS = 10.0
 """CPU time for all that is done with one text (of some 10 kB at most)."""

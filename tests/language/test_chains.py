@@ -102,7 +102,7 @@ def test_many_elements_and_many_clauses() -> None:
 def test_smtlib_of_a_chain() -> None:
     import z3
 
-    from avow.solving.contract_smtlib import to_smtlib
+    from avow.solving.smtlib import to_smtlib
 
     for name in ("and", "->", "<=>", "+-"):
         contract = check_text(FRAME.format(names="red", formula=LONG_FORMULAS[name]), "f")[0]

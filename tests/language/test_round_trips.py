@@ -15,7 +15,7 @@ from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
-from avow.solving.contract_smtlib import to_smtlib
+from avow.solving.smtlib import to_smtlib
 
 ROUNDS = max(60, int(os.environ.get("AVOW_FUZZ", "300")) // 4)
 SEED = int(os.environ.get("AVOW_FUZZ_SEED", "20261122"))

@@ -89,7 +89,7 @@ def test_latex_is_escaped(root: Path) -> None:
 def test_smtlib_is_accepted_by_z3(root: Path) -> None:
     import z3
 
-    from avow.solving.contract_smtlib import to_smtlib
+    from avow.solving.smtlib import to_smtlib
 
     for contract in contracts(root)[2:]:
         for script in to_smtlib(contract).split("(reset)"):
@@ -100,7 +100,7 @@ def test_smtlib_is_accepted_by_z3(root: Path) -> None:
 def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
     import cvc5
 
-    from avow.solving.contract_smtlib import to_smtlib
+    from avow.solving.smtlib import to_smtlib
 
     for contract in contracts(root)[2:]:
         solver = cvc5.Solver(cvc5.TermManager())

@@ -10,9 +10,9 @@ import pytest
 
 from avow.base.verdict import Verdict
 from avow.formulas.values import FunctionValue
+from avow.formulas.written import show_values
 from avow.language.sorts import BOOL, STRING, OpaqueSort
 from avow.language.terms import Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.solving.counterexample import show_values
 from avow.solving.questions import Entailment, entails, solve
 from avow.solving.replay import replay
 

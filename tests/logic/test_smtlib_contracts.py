@@ -18,8 +18,7 @@ from avow.language.load import check_text
 from avow.sanity.analysis import analyse
 from avow.sanity.claims import Property
 from avow.sanity.results import Bounds
-from avow.solving.contract_smtlib import to_smtlib
-from avow.solving.smtlib import ask_cvc5, formulas_script
+from avow.solving.smtlib import ask_cvc5, formulas_script, to_smtlib
 
 COUNT = int(os.environ.get("AVOW_SMTLIB", "10"))
 SAYS = {Verdict.PROVED: "sat", Verdict.REFUTED: "unsat"}

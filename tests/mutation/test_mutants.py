@@ -8,8 +8,7 @@ from avow.formulas.formula import normalise
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.terms import Term
-from avow.sanity.mutants import Mutant, mutants, telling
-from avow.sanity.survivors import difference
+from avow.sanity.mutants import Mutant, difference, mutants, telling
 
 
 def guarantee(formula: str) -> Term:

@@ -163,7 +163,7 @@ def test_the_smtlib_script_is_one_step_of_any_run() -> None:
     what the cells have next."""
     import z3
 
-    from avow.solving.contract_smtlib import to_smtlib
+    from avow.solving.smtlib import to_smtlib
 
     rng = random.Random(5)
     for _ in range(20):

@@ -12,7 +12,7 @@ from oracle.runs import longer
 from oracle.values import Step, keeps
 
 from avow.base.verdict import Verdict
-from avow.calculus import refinement_runs
+from avow.calculus import refinement
 from avow.calculus.discharge import Bounds
 from avow.calculus.questions import Answer
 from avow.calculus.refinement import refines
@@ -114,7 +114,7 @@ def test_a_proof_that_rests_on_more_than_the_contracts_say_is_none(
 
         return answer
 
-    monkeypatch.setattr(refinement_runs, "formula_question", asked)
+    monkeypatch.setattr(refinement, "formula_question", asked)
     found = refines(_node("", SOON.format("2 steps")), _node("", SOON.format("3 steps")))
     assert [demand.verdict for demand in found.demands] == [Verdict.UNKNOWN]
     assert not found.certificates
