@@ -8,9 +8,8 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular
+from avow.base.files import inside, read_regular
 from avow.base.suggestions import suggest
-from avow.system.paths import inside
 
 
 def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:

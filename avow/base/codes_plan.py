@@ -2,169 +2,163 @@
 
 from __future__ import annotations
 
-from avow.base.codes import Code
-from avow.base.diagnostics import Severity
+from avow.base.codes import declare, register
 
-PLAN_CODES: dict[str, Code] = {
-    c.code: c
-    for c in (
-        Code(
-            "PLAN100",
-            "no plan",
-            "There is no system here: neither a plan.yaml nor an .rcl file.",
-            remedy="Give the folder that has the `plan.yaml`.",
-        ),
-        Code(
-            "PLAN101",
-            "not YAML",
-            "The file is not one plain YAML document, or too large, too deep, or empty.",
-            remedy="Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
-        ),
-        Code(
-            "PLAN102",
-            "a key",
-            "A key is given twice, is a merge key, or is not plain text.",
-            remedy="Give each key once, as plain text.",
-        ),
-        Code(
-            "PLAN103",
-            "unknown key",
-            "The plan has no such key at this place.",
-            remedy="Use one of the keys in the hint.",
-        ),
-        Code(
-            "PLAN104",
-            "missing key",
-            "A key that is needed here is missing.",
-            remedy="Add the key; `docs/plan.md` says what it means.",
-        ),
-        Code(
-            "PLAN105",
-            "wrong value",
-            "The value has the wrong type or form, or is not one of those allowed.",
-            remedy="Write what the message wants.",
-        ),
-        Code(
-            "PLAN106",
-            "unknown name",
-            "The plan names a node, port or guarantee that the contract does not have.",
-            remedy="Correct the name, or declare it in the contract.",
-        ),
-        Code(
-            "PLAN107",
-            "no such file",
-            "The plan names a file that is not there.",
-            remedy="Correct the path, which is relative to the system's folder, or add the file.",
-        ),
-        Code(
-            "PLAN108",
-            "path outside",
-            "A path leads out of the system's folder.",
-            remedy="Move the file into the folder: evidence covers nothing outside it.",
-        ),
-        Code(
-            "PLAN109",
-            "scenario",
-            "A table, an interpretation or a domain of the scenario cannot be used.",
-            remedy="Correct the place in the `scenario` or its table.",
-        ),
-        Code(
-            "PLAN110",
-            "contradiction",
-            "Two things that the plan says do not go together.",
-            remedy="Decide for one of the two.",
-        ),
-        Code(
-            "PLAN112",
-            "initial value",
-            "An initial value is no value of its output and no formula about it.",
-            remedy="Give a value of the output's type, or a formula about that output only.",
-        ),
-        Code(
-            "PLAN113",
-            "environment",
-            "An environment assumption speaks of more than the environment's inputs.",
-            remedy="Speak only of inputs that no node provides.",
-        ),
-        Code(
-            "PLAN114", "temporal property", "The text is no temporal property.", remedy="Write it as in `docs/plan.md`."
-        ),
-        Code(
-            "PLAN115",
-            "plain words",
-            "What `says` says is for a reader who has never seen the contract: at most 14 words, no names from it.",
-            remedy="Say it shorter, without names such as `agent.at`; `because` may hold all of the reason.",
-        ),
-        Code(
-            "PLAN128",
-            "no plain words yet",
-            "Something is supposed, and the plan has no words for a reader who has never seen the contract.",
-            severity=Severity.WARNING,
-            remedy="Add `says: …` (at most 14 words), and `who` and `until`.",
-        ),
-        Code(
-            "PLAN129",
-            "suspect",
-            "A requirement's sentence, or what supports it, is another than the named person confirmed.",
-            severity=Severity.WARNING,
-            remedy="Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
-        ),
-        Code(
-            "PLAN130",
-            "parameters",
-            "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
-            remedy="Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
-        ),
-        Code(
-            "PLAN121",
-            "types clash",
-            "An output and the input that it would feed have different types.",
-            remedy="Correct one of the types, or connect other ports.",
-        ),
-        Code(
-            "PLAN122",
-            "several providers",
-            "More than one output could feed an input, by name or by topic: none is left out without a word.",
-            remedy="Say under `connections` which output it is, or give both ends their topics.",
-        ),
-        Code(
-            "PLAN123",
-            "start-up deadlock",
-            "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
-            severity=Severity.WARNING,
-            remedy="Give one delayed output of the loop an initial value.",
-        ),
-        Code(
-            "PLAN124",
-            "memory",
-            "A node has an input and an output of one name; it feeds itself only by a connection.",
-            severity=Severity.WARNING,
-            remedy="Connect them if memory is meant; otherwise rename one.",
-        ),
-        Code(
-            "PLAN125",
-            "rule does not fit",
-            "The selected nodes are not connected as the rule wants them.",
-            remedy="Use a rule for this shape, or select other nodes.",
-        ),
-        Code(
-            "PLAN135",
-            "no derived contract with memory",
-            "A derived contract speaks of one step, and a clause of one of its nodes speaks of others.",
-            remedy="Compare or export nodes without such clauses.",
-        ),
-        Code(
-            "PLAN126",
-            "ports do not fit",
-            "A node cannot stand in for another that has other inputs or outputs.",
-            remedy="Give both nodes the same ports.",
-        ),
-        Code(
-            "PLAN127",
-            "ROS graph",
-            "The ROS graph and the plan's account of it do not agree.",
-            remedy="Correct the plan's `model`, or record the graph again.",
-        ),
-    )
-}
+PLAN_CODES = register(
+    declare(
+        "PLAN100",
+        "no plan",
+        "There is no system here: neither a plan.yaml nor an .rcl file.",
+        "Give the folder that has the `plan.yaml`.",
+    ),
+    declare(
+        "PLAN101",
+        "not YAML",
+        "The file is not one plain YAML document, or too large, too deep, or empty.",
+        "Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
+    ),
+    declare(
+        "PLAN102",
+        "a key",
+        "A key is given twice, is a merge key, or is not plain text.",
+        "Give each key once, as plain text.",
+    ),
+    declare(
+        "PLAN103",
+        "unknown key",
+        "The plan has no such key at this place.",
+        "Use one of the keys in the hint.",
+    ),
+    declare(
+        "PLAN104",
+        "missing key",
+        "A key that is needed here is missing.",
+        "Add the key; `docs/plan.md` says what it means.",
+    ),
+    declare(
+        "PLAN105",
+        "wrong value",
+        "The value has the wrong type or form, or is not one of those allowed.",
+        "Write what the message wants.",
+    ),
+    declare(
+        "PLAN106",
+        "unknown name",
+        "The plan names a node, port or guarantee that the contract does not have.",
+        "Correct the name, or declare it in the contract.",
+    ),
+    declare(
+        "PLAN107",
+        "no such file",
+        "The plan names a file that is not there.",
+        "Correct the path, which is relative to the system's folder, or add the file.",
+    ),
+    declare(
+        "PLAN108",
+        "path outside",
+        "A path leads out of the system's folder.",
+        "Move the file into the folder: evidence covers nothing outside it.",
+    ),
+    declare(
+        "PLAN109",
+        "scenario",
+        "A table, an interpretation or a domain of the scenario cannot be used.",
+        "Correct the place in the `scenario` or its table.",
+    ),
+    declare(
+        "PLAN110",
+        "contradiction",
+        "Two things that the plan says do not go together.",
+        "Decide for one of the two.",
+    ),
+    declare(
+        "PLAN112",
+        "initial value",
+        "An initial value is no value of its output and no formula about it.",
+        "Give a value of the output's type, or a formula about that output only.",
+    ),
+    declare(
+        "PLAN113",
+        "environment",
+        "An environment assumption speaks of more than the environment's inputs.",
+        "Speak only of inputs that no node provides.",
+    ),
+    declare("PLAN114", "temporal property", "The text is no temporal property.", "Write it as in `docs/plan.md`."),
+    declare(
+        "PLAN115",
+        "plain words",
+        "What `says` says is for a reader who has never seen the contract: at most 14 words, no names from it.",
+        "Say it shorter, without names such as `agent.at`; `because` may hold all of the reason.",
+    ),
+    declare(
+        "PLAN128",
+        "no plain words yet",
+        "Something is supposed, and the plan has no words for a reader who has never seen the contract.",
+        "Add `says: …` (at most 14 words), and `who` and `until`.",
+        warning=True,
+    ),
+    declare(
+        "PLAN129",
+        "suspect",
+        "A requirement's sentence, or what supports it, is another than the named person confirmed.",
+        "Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
+        warning=True,
+    ),
+    declare(
+        "PLAN130",
+        "parameters",
+        "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
+        "Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
+    ),
+    declare(
+        "PLAN121",
+        "types clash",
+        "An output and the input that it would feed have different types.",
+        "Correct one of the types, or connect other ports.",
+    ),
+    declare(
+        "PLAN122",
+        "several providers",
+        "More than one output could feed an input, by name or by topic: none is left out without a word.",
+        "Say under `connections` which output it is, or give both ends their topics.",
+    ),
+    declare(
+        "PLAN123",
+        "start-up deadlock",
+        "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
+        "Give one delayed output of the loop an initial value.",
+        warning=True,
+    ),
+    declare(
+        "PLAN124",
+        "memory",
+        "A node has an input and an output of one name; it feeds itself only by a connection.",
+        "Connect them if memory is meant; otherwise rename one.",
+        warning=True,
+    ),
+    declare(
+        "PLAN125",
+        "rule does not fit",
+        "The selected nodes are not connected as the rule wants them.",
+        "Use a rule for this shape, or select other nodes.",
+    ),
+    declare(
+        "PLAN135",
+        "no derived contract with memory",
+        "A derived contract speaks of one step, and a clause of one of its nodes speaks of others.",
+        "Compare or export nodes without such clauses.",
+    ),
+    declare(
+        "PLAN126",
+        "ports do not fit",
+        "A node cannot stand in for another that has other inputs or outputs.",
+        "Give both nodes the same ports.",
+    ),
+    declare(
+        "PLAN127",
+        "ROS graph",
+        "The ROS graph and the plan's account of it do not agree.",
+        "Correct the plan's `model`, or record the graph again.",
+    ),
+)
 """Every code of plans and systems, in order."""

@@ -19,10 +19,10 @@ from avow.language.lexer import KEYWORDS
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.launched import started
-from avow.system.links import with_links
+from avow.system.links import completed
 from avow.system.names import check_names
 from avow.system.plan import Plan, System
-from avow.system.plan_file import fill_methods, read_rest
+from avow.system.plan_file import read_rest
 from avow.system.strict_yaml import Piece
 from avow.system.subsystems import check_subsystems, resolved
 from avow.system.topics import heard
@@ -43,6 +43,8 @@ class Rest:
     root: Piece
     told: frozenset[str]
     """Words of which a fault is told already, so that others may follow from it."""
+    found: tuple[Diagnostic, ...]
+    """What is wrong with the plan's own values, and with the contract."""
     doubtful: frozenset[str] = frozenset()
     """Names of the contract that may be missing only for a fault in it."""
 
@@ -56,15 +58,16 @@ def rest_of(folder: Path) -> Rest | None:
     from avow.language.load import check_paths, read_in_part
 
     try:
-        plan, root, _, dropped = read_rest(folder / "plan.yaml")
+        plan, root, faults, dropped = read_rest(folder / "plan.yaml")
     except Rejected:
         return None
     contract, found = check_paths(plan.contract_files)
+    faults += tuple(d for d in found if d.is_error)
     if contract is not None:
-        return Rest(System(plan, contract), True, root, dropped)
+        return Rest(System(plan, contract), True, root, dropped, faults)
     words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
     part = read_in_part(plan.contract_files)
-    return Rest(System(plan, part), False, root, dropped | words, _doubtful(plan, part, found))
+    return Rest(System(plan, part), False, root, dropped | words, faults, _doubtful(plan, part, found))
 
 
 def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -77,10 +80,7 @@ def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, 
         if (folder / "plan.yaml").is_file():
             told += [d for d in check_paths(sorted(folder.resolve().glob("*.rcl")))[1] if d.is_error]
         return in_order(told)
-    told += read_rest(folder / "plan.yaml")[2]
-    told += [d for d in check_paths(rest.system.plan.contract_files)[1] if d.is_error]
-    told += [d for d in _of_names(rest) if not _follows(d, rest.told)]
-    return in_order(told)
+    return in_order([*told, *rest.found, *(d for d in _of_names(rest) if not _follows(d, rest.told))])
 
 
 def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -124,8 +124,7 @@ def _of_names(rest: Rest) -> Iterator[Diagnostic]:
 
 
 def _of_formulas(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
-    guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
-    system = System(with_links(fill_methods(plan, guarantees), contract), contract)
+    system = completed(plan, contract)
     graph = dataflow(system)
     return tuple(d for d in graph.findings if d.is_error) + check_formulas(system, graph)
 

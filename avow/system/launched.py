@@ -11,12 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.files import inside
 from avow.base.suggestions import suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
 from avow.ros.launch import Launched, Started, read_launch
 from avow.ros.names import Placed, Resolver
-from avow.system.paths import inside
 from avow.system.plan import Plan, System
 from avow.system.strict_yaml import Piece
 

@@ -1,4 +1,5 @@
-"""What the names under a requirement's `supported_by` say in the contract: a confirmation covers it."""
+"""A plan with what it leaves to the contract: the guarantees of its methods, and what the names under a requirement's
+`supported_by` say there, which a confirmation covers."""
 
 from __future__ import annotations
 
@@ -9,12 +10,13 @@ from avow.base.files import sha256
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_sort, show_term
 from avow.system.folding import leaves
-from avow.system.plan import Plan
+from avow.system.plan import Method, NodePlan, Plan, System
 
 
-def with_links(plan: Plan, contract: Contract) -> Plan:
-    """The plan, each requirement of which knows what its links say: sentences, formulas (constants by their values) and
-    the types of the ports that they may speak of. White space, comments and the order of clauses say nothing."""
+def completed(plan: Plan, contract: Contract) -> System:
+    """The system of a plan and its contract: each method that names no guarantee takes on all of its node's, and each
+    requirement knows what its links say: sentences, formulas (constants by their values) and the types of the ports
+    that they may speak of. White space, comments and the order of clauses say nothing."""
     known = {node.name: node for node in contract.nodes}
     inside = leaves(plan)
     derived = {goal.name: goal.select for goal in plan.compose}
@@ -33,7 +35,13 @@ def with_links(plan: Plan, contract: Contract) -> Plan:
         replace(r, linked=sha256(repr(sorted({text for name in r.supported_by for text in said(name)}))))
         for r in plan.requirements
     )
-    return replace(plan, requirements=requirements)
+
+    def taken_on(entry: NodePlan, method: Method) -> Method:
+        own = known[entry.node].guarantees if entry.node in known else ()
+        return method if method.guarantees else replace(method, guarantees=tuple(clause.name for clause in own))
+
+    nodes = tuple(replace(e, methods=tuple(taken_on(e, method) for method in e.methods)) for e in plan.nodes)
+    return System(replace(plan, nodes=nodes, requirements=requirements), contract)
 
 
 def _said(node: Node, name: str | None = None) -> Iterator[str]:

@@ -14,10 +14,10 @@ from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.include import include, still_open
 from avow.system.launched import started
-from avow.system.links import with_links
+from avow.system.links import completed
 from avow.system.names import check_names
 from avow.system.plan import Plan, System
-from avow.system.plan_file import bare_plan, fill_methods, read_plan
+from avow.system.plan_file import bare_plan, read_plan
 from avow.system.strict_yaml import Piece
 from avow.system.subsystems import check_subsystems, resolved
 from avow.system.topics import heard
@@ -102,8 +102,7 @@ def _linked(
         faults += more
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
-    guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
-    system = System(with_links(fill_methods(plan, guarantees), contract), contract)
+    system = completed(plan, contract)
     graph = dataflow(system)
     system = still_open(system, graph)
     faults += tuple(fault for fault in graph.findings if fault.is_error) + check_formulas(system, graph)

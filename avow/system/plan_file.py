@@ -1,26 +1,24 @@
 """Reads plan.yaml: from text to `Plan`, with every fault located and all of them told in one go.
 
-Two steps, since the contract's files are named by the plan: `read_plan` needs nothing else; `avow.system.names` then
-holds the plan's names against the contract, and `fill_methods` adds what a plan leaves to it.
+It needs no contract, whose files the plan names: `avow.system.names` then holds the plan's names against that, and
+`avow.system.links` adds what a plan leaves to it.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular, sha256
+from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
 from avow.ros.names import Placed, Resolver, is_name
 from avow.system.launched import read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
-from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
     Confirmation,
@@ -375,21 +373,6 @@ class _PlanReader:
                 piece.texts("matched"),
                 texts.get("found", ""),
             )
-
-
-def fill_methods(plan: Plan, guarantees: Mapping[str, tuple[str, ...]]) -> Plan:
-    """A copy in which each method that names no guarantee takes on all of its node's."""
-    nodes = tuple(
-        replace(
-            entry,
-            methods=tuple(
-                method if method.guarantees else replace(method, guarantees=guarantees.get(entry.node, ()))
-                for method in entry.methods
-            ),
-        )
-        for entry in plan.nodes
-    )
-    return replace(plan, nodes=nodes)
 
 
 def _endpoint(text: str) -> Endpoint:

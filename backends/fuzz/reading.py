@@ -10,14 +10,13 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import read_regular, read_text
+from avow.base.files import inside, read_regular, read_text
 from avow.base.graphs import reached
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.language.contract import Node, Port
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
-from avow.system.parameters import parameters
-from avow.system.paths import inside
+from avow.system.node_plan import parameters
 from avow.system.plan import Numbers, Source
 
 from .tuning import RUNS, STEPS

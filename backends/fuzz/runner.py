@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import resource
 import secrets
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,14 +27,47 @@ from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed
 from avow.isolation.printed import Printed
-from avow.isolation.program import Program
-from avow.isolation.subject import Message, SubjectFailed
+from avow.isolation.subject import Message, SubjectFailed, SubjectProcess
 
 _OPTIONS = {
     "ASAN_OPTIONS": "detect_leaks=0:symbolize=1:handle_abort=0:allocator_may_return_null=0",
     "UBSAN_OPTIONS": "print_stacktrace=0:halt_on_error=1",
 }
 _SCRATCH = "/tmp/avow-scratch"
+
+
+_CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGTRAP))
+"""How a program ends whose own code went wrong."""
+
+
+class _Program(SubjectProcess):
+    """A compiled program of the user's in a process of its own. It reads a line ``TURN|COMMAND|COMMAND…`` and answers
+    with one line of JSON that has the same turn: what its own code writes into the channel is no answer. Nothing of it
+    is seen from within: what it reads is told by strace, and where there is none, by nobody.
+
+    Each case is ``{"command": text}``; the text holds neither ``|`` nor the end of a line."""
+
+    def __init__(self, path: Path, patience: float, root: Path, names: Sequence[str] = ()) -> None:
+        super().__init__(path, "", patience, root, names)
+        self._turn = ""
+        self._events["program", f"the program {path.name}"] = None
+
+    def crashed(self) -> str:
+        """The signal that its own code ended with; empty where it ended otherwise."""
+        code = self.code or 0
+        number = -code if code < 0 else code - 128
+        return signal.Signals(number).name if number in _CRASHES else ""
+
+    def _command(self, there: int, back: int, mark: str) -> tuple[list[str], tuple[Path, ...]]:
+        command = [str(self.path), str(there), str(back), mark or "/avow-unmarked", self.isolation.value]
+        return command, (self.path.parent,)
+
+    def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
+        self._turn = secrets.token_hex(8)
+        return "|".join((self._turn, *(str(case["command"]) for case in cases))).encode() + b"\n"
+
+    def _in_turn(self, message: Message) -> bool:
+        return message.turn == self._turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +230,8 @@ def answered(asked: Runs, question: Question) -> Answered:
 
 def _all(
     path: str, runs: Sequence[tuple[str, ...]], most: int, question: Question, end: float
-) -> tuple[list[Run], str, Program]:
-    program = Program(Path(path), SUBJECT_PATIENCE, Path(question.root), question.names)
+) -> tuple[list[Run], str, _Program]:
+    program = _Program(Path(path), SUBJECT_PATIENCE, Path(question.root), question.names)
     found: list[Run] = []
     crashes = 0
     fault = ""

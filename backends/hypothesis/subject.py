@@ -10,7 +10,7 @@ from pathlib import Path
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular
+from avow.base.files import inside, read_regular
 from avow.base.suggestions import did_you_mean
 from avow.drive.steps import coded
 from avow.formulas.formula import free_variables
@@ -25,8 +25,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.system.parameters import parameters
-from avow.system.paths import inside
+from avow.system.node_plan import parameters
 from avow.system.plan import Driving, Numbers, Source
 
 

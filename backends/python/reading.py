@@ -13,9 +13,8 @@ from typing import Any
 from avow.backend_kit.programs.cpython import Subject
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
-from avow.base.files import read_regular
-from avow.system.parameters import parameters
-from avow.system.paths import inside
+from avow.base.files import inside, read_regular
+from avow.system.node_plan import parameters
 from avow.system.plan import Driving, Numbers, Source
 
 from .program import Step

@@ -276,7 +276,6 @@ class Work:
     def near(self, model: Mapping[Variable, Any]) -> list[dict[str, Any]]:
         """A solver's values as cases of doubles."""
         case: dict[str, Any] = {}
-        sorts = {p.name: p.sort for p in self.job.node.inputs}
         for port in self.job.node.inputs:
             value = model.get(port.variable)
             plain = _plain(value)
@@ -285,7 +284,7 @@ class Work:
             case[port.name] = plain
         if self.reading.exact:
             return [case]
-        return [*list(beside(case, sorts))[:CASES_KEPT], *shifted(case, random.Random(self.limits.seed))]
+        return [*beside(case)[:CASES_KEPT], *shifted(case, random.Random(self.limits.seed))]
 
     # -- outcomes ----------------------------------------------------------------------------------------
 

@@ -10,13 +10,13 @@ from avow.backend_kit.given import existing_file, file, schema, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import inside
 from avow.base.suggestions import suggest
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.envelope import Opened
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import SIGNED_BY
 from avow.evidence.signing import signature_path
-from avow.system.paths import inside
 
 from .codes import CODES
 from .record import CONCLUSIONS, Judged, Record, current_meaning, read_record, stale_clause, stale_files

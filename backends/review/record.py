@@ -13,13 +13,12 @@ from pathlib import Path
 from avow.backend_kit.given import file_bytes
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import digest_file
+from avow.base.files import digest_file, inside
 from avow.base.persons import unreadable
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.formulas.formula import node_digest
 from avow.language.contract import Node
-from avow.system.paths import inside
 from avow.system.strict_yaml import Piece, read_yaml
 
 FORMAT = 1

@@ -15,9 +15,8 @@ from pathlib import Path
 from avow.backend_kit.given import job_for
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import read_regular, write
+from avow.base.files import inside, read_regular, write
 from avow.language.contract import Node
-from avow.system.paths import inside
 from avow.system.strict_yaml import Piece, read_yaml
 
 from .backend import record_name

@@ -12,11 +12,11 @@ from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report, Translated
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import inside
 from avow.base.tools import Tool
 from avow.base.tuning.shown import TIMELINES
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.ros.sources import message_files
-from avow.system.paths import inside
 
 from .codes import CODES
 from .coverage import coverage, old

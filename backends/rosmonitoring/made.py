@@ -8,11 +8,11 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job, Judged, JudgedRun
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import inside
 from avow.base.verdict import Counterexample
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.terms import Role
-from avow.system.paths import inside
 
 from .coverage import Tally
 from .engine import Monitor

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import inside
 from avow.base.suggestions import suggest
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
@@ -22,7 +23,6 @@ from avow.ros.calls import CALL, part_topic
 from avow.ros.definitions import Definitions, Message, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import dataflow
-from avow.system.paths import inside
 from avow.system.plan import Edge, Located, System
 
 from . import observing

@@ -11,7 +11,7 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Span
-from avow.system.paths import inside
+from avow.base.files import inside
 from avow.system.tables import read_csv
 
 NONE, ALL = "none", "all"

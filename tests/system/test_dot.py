@@ -13,8 +13,7 @@ from helpers import some
 
 from avow.base.diagnostics import Rejected
 from avow.base.tuning.sizes import ROS_GRAPH_ARCS
-from avow.system.dot import Malformed, parse
-from avow.system.rosgraph import RosGraph, read_ros_graph
+from avow.system.rosgraph import Malformed, RosGraph, parse_dot, read_ros_graph
 
 IDS = [
     "a",
@@ -82,7 +81,7 @@ def as_graphviz(text: str) -> tuple[dict[str, str], set[tuple[str, str]]] | None
 
 def as_read(text: str) -> tuple[dict[str, str], set[tuple[str, str]]] | None:
     try:
-        found = parse(text)
+        found = parse_dot(text)
     except Malformed:
         return None
     shapes = {name: given.get("shape", "") for name, given in found.nodes.items()}

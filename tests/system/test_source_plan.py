@@ -8,7 +8,7 @@ import pytest
 
 from avow.base.diagnostics import Rejected
 from avow.system.load import load_system
-from avow.system.parameters import parameters
+from avow.system.node_plan import parameters
 from avow.system.plan import Numbers, Source
 
 CONTRACT = """node watchdog { inputs( now : REAL, beat : BOOL, last : REAL, f : REAL --> REAL )

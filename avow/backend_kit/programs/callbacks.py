@@ -15,7 +15,7 @@ from typing import Any
 from avow.backend_kit.programs.cpython import Subject, Told, ask
 from avow.backend_kit.programs.samples import Pool, leaves, numbers_of, pool, written
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.files import read_text
+from avow.base.files import inside, read_text
 from avow.base.process import ToolMissing
 from avow.base.suggestions import suggest
 from avow.base.tuning.running import DRIVEN_CALLBACKS, DRIVEN_MEGABYTES, DRIVEN_SECONDS, LONGEST_GAP, NUMBERS_AGAIN
@@ -26,8 +26,7 @@ from avow.language.terms import Role
 from avow.ros.bags import fields_of
 from avow.ros.definitions import HEADER, INTEGERS, Array, Definitions, Field, Message, Nested, Scalar, Wire, canonical
 from avow.ros.sources import definitions, require
-from avow.system.parameters import parameters
-from avow.system.paths import inside
+from avow.system.node_plan import parameters
 from avow.system.plan import Driving, Source, System
 from avow.system.topics import whole_name
 

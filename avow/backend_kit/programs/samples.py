@@ -171,7 +171,7 @@ class Drawing:
         return found if math.isfinite(found) else base
 
 
-def beside(case: Mapping[str, Any], sorts: Mapping[str, Sort]) -> Iterator[dict[str, Any]]:
+def beside(case: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Cases whose numbers are the doubles around those of an exact case: a solver's numbers need not be doubles."""
 
     def ends(value: Any) -> list[Any]:
@@ -180,18 +180,12 @@ def beside(case: Mapping[str, Any], sorts: Mapping[str, Sort]) -> Iterator[dict[
             return [d for d in dict.fromkeys((low, high)) if math.isfinite(d)] or [0.0]
         return [value]
 
-    names = list(case)
-    choices = [
-        [[ends(item)[0] for item in case[n]], [ends(item)[-1] for item in case[n]]]
-        if isinstance(case[n], list)
-        else ends(case[n])
-        for n in names
-    ]
-    del sorts
     found: list[dict[str, Any]] = [{}]
-    for name, options in zip(names, choices, strict=True):
+    for name, value in case.items():
+        several = isinstance(value, list)
+        options = [[ends(item)[at] for item in value] for at in (0, -1)] if several else ends(value)
         found = [{**one, name: option} for one in found for option in options][:64]
-    yield from found
+    return found
 
 
 def shifted(case: Mapping[str, Any], chance: random.Random) -> Iterator[dict[str, Any]]:

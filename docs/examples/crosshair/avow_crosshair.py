@@ -26,12 +26,12 @@ from avow.backend_kit.programs.judging import Formula, meets, seen
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.codes import declare, register
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import inside
 from avow.base.process import run
 from avow.base.verdict import Counterexample, Isolation, Link, Object, Outcome, Verdict, bound
 from avow.isolation.level import Unavailable, available, sealed
 from avow.isolation.observed import Observed, recorded
-from avow.system.parameters import parameters
-from avow.system.paths import inside
+from avow.system.node_plan import parameters
 from avow.system.plan import Numbers
 
 CODES = register(
