@@ -18,7 +18,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, Phase, Settled
 from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Finder, Hint
-from avow.calculus.invariants import INVARIANT, Written, with_lemmas
+from avow.calculus.induction import INVARIANT, Written, with_lemmas
 from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use

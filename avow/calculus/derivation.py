@@ -176,7 +176,7 @@ class Case:
     depth: int = 1
     """Of how many steps an induction is."""
     invariant: tuple[str, ...] = ()
-    """One that nobody wrote down, by which it is kept (`avow.calculus.invariants`)."""
+    """One that nobody wrote down, by which it is kept (`avow.calculus.induction`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,7 @@ from avow.base.tuning.effort import NARROW_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
-from avow.calculus.induction import Deeper, steps
-from avow.calculus.invariants import INVARIANT, further
+from avow.calculus.induction import INVARIANT, Deeper, further, steps
 from avow.calculus.kept_answers import keep_not_proved, not_proved_before
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Facts, Frame, bearing, closest, indexed

@@ -22,7 +22,7 @@ from avow.base.optional import complete
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
 from avow.base.tuning.effort import CERTIFICATE_NET_MS, CERTIFICATE_STEPS
-from avow.calculus.invariants import label
+from avow.calculus.induction import label
 from avow.calculus.variables import OBSERVED
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused

@@ -15,7 +15,7 @@ from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideConditi
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
 from avow.calculus.existence import start_name
-from avow.calculus.invariants import INVARIANT, in_words
+from avow.calculus.induction import INVARIANT, in_words
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.formulas.formula import negation

@@ -20,8 +20,7 @@ from avow.calculus.derivation import Case, Phase, about_memory
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
-from avow.calculus.induction import steps
-from avow.calculus.invariants import INVARIANT, Written, further, in_words
+from avow.calculus.induction import INVARIANT, Written, further, in_words, steps
 from avow.calculus.model_checking import cannot_run, judge_property, refuting_run
 from avow.calculus.questions import Answer, as_far_as_shown, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers

@@ -61,7 +61,7 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     from avow.base.files import read_regular
     from avow.base.workspace import system_folder
     from avow.calculus.certificates import scope_of
-    from avow.calculus.invariants import with_lemmas
+    from avow.calculus.induction import with_lemmas
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
     from avow.kernel.check import Kernel, Refused

@@ -1,20 +1,20 @@
 """``exists(a, b in REAL | …)`` where a and b occur in linear inequalities only, and everything else has a value.
 
 ``exists(a in REAL | forall(x in REAL | in.p(x) -> a - 1 <= x and x <= a + 1))``: the inner quantifier is restricted to
-the points of a table, so that the formula is a system of inequalities in a, which is decided exactly.
+the points of a table, so that the formula is a system of inequalities in a, which is decided exactly: over rationals,
+by Fourier and Motzkin's elimination. Small systems only: monitors ask so over the few points that a message carries.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 
 from avow.base.optional import complete
 from avow.base.records import dataclass
-from avow.base.tuning.bounds import LINEAR_CASES
+from avow.base.tuning.bounds import CONSTRAINTS, LINEAR_CASES
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
-from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.disjunctions import Part, conjunction
 from avow.formulas.renaming import bound_names, has_variables
 from avow.language.operators import OPPOSITE
@@ -35,7 +35,141 @@ from avow.language.terms import (
     Variable,
 )
 
-Alternatives = Callable[[Env], list[tuple[Constraint, ...]]]
+
+class _TooMany(Exception):  # noqa: N818 - it names what happened
+    """The system grew past the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Linear:
+    """``sum of coefficient * variable + constant``; no coefficient is zero."""
+
+    coefficients: tuple[tuple[str, Fraction], ...]
+    constant: Fraction
+
+    @staticmethod
+    def of(coefficients: Mapping[str, Fraction], constant: Fraction) -> _Linear:
+        return _Linear(tuple(sorted((n, c) for n, c in coefficients.items() if c)), constant)
+
+    def plus(self, other: _Linear, factor: Fraction = Fraction(1)) -> _Linear:
+        """``self + factor * other``."""
+        total = dict(self.coefficients)
+        for name, coefficient in other.coefficients:
+            total[name] = total.get(name, Fraction(0)) + factor * coefficient
+        return _Linear.of(total, self.constant + factor * other.constant)
+
+    def times(self, factor: Fraction) -> _Linear:
+        return _Linear.of({n: c * factor for n, c in self.coefficients}, self.constant * factor)
+
+    def coefficient(self, name: str) -> Fraction:
+        return dict(self.coefficients).get(name, Fraction(0))
+
+    def at(self, values: Mapping[str, Fraction]) -> Fraction:
+        return self.constant + sum((c * values[n] for n, c in self.coefficients), Fraction(0))
+
+
+@dataclass(frozen=True, slots=True)
+class _Constraint:
+    """``left < 0``, ``left <= 0`` or ``left == 0``."""
+
+    left: _Linear
+    operator: str
+
+    def holds(self, values: Mapping[str, Fraction]) -> bool:
+        value = self.left.at(values)
+        match self.operator:
+            case "<":
+                return value < 0
+            case "<=":
+                return value <= 0
+            case _:  # ==
+                return value == 0
+
+
+def _satisfy(constraints: Sequence[_Constraint], names: Sequence[str]) -> dict[str, Fraction] | None:
+    """Values of `names` that meet every constraint, or None if there are none. Raises _TooMany."""
+    if all(len(c.left.coefficients) <= 1 for c in constraints):
+        return _satisfy_box(constraints, names)
+    current = list(dict.fromkeys(constraints))
+    removed: list[tuple[str, list[_Constraint]]] = []
+    for name in names:
+        about = [c for c in current if c.left.coefficient(name)]
+        others = [c for c in current if not c.left.coefficient(name)]
+        removed.append((name, about))
+        current = list(dict.fromkeys([*others, *_eliminate(name, about)]))
+        if len(current) > CONSTRAINTS:
+            raise _TooMany
+    if not all(c.holds({}) for c in current):
+        return None
+    values: dict[str, Fraction] = {}
+    for name, about in reversed(removed):
+        values[name] = _choose(name, about, values)
+    return values
+
+
+def _satisfy_box(constraints: Sequence[_Constraint], names: Sequence[str]) -> dict[str, Fraction] | None:
+    """As `_satisfy`, where no constraint connects two variables: each has a lower and an upper bound of its own."""
+    about: dict[str, list[_Constraint]] = {name: [] for name in names}
+    for constraint in constraints:
+        if constraint.left.coefficients:
+            about[constraint.left.coefficients[0][0]].append(constraint)
+        elif not constraint.holds({}):
+            return None
+    values: dict[str, Fraction] = {}
+    for name, own in about.items():
+        values[name] = _choose(name, own, {})
+        if not all(c.holds(values) for c in own):
+            return None
+    return values
+
+
+def _eliminate(name: str, about: Sequence[_Constraint]) -> list[_Constraint]:
+    """What the constraints on a variable say of the others: every lower bound lies below every upper one."""
+    for equation in about:
+        if equation.operator == "==":
+            unit = equation.left.times(1 / equation.left.coefficient(name))
+            return [
+                _Constraint(c.left.plus(unit, -c.left.coefficient(name)), c.operator)
+                for c in about
+                if c is not equation
+            ]
+    lower = [c for c in about if c.left.coefficient(name) < 0]
+    upper = [c for c in about if c.left.coefficient(name) > 0]
+    if len(lower) * len(upper) > CONSTRAINTS:
+        raise _TooMany
+    found = []
+    for low in lower:
+        for high in upper:
+            left = high.left.times(1 / high.left.coefficient(name)).plus(low.left, -1 / low.left.coefficient(name))
+            found.append(_Constraint(left, "<" if "<" in (low.operator, high.operator) else "<="))
+    return found
+
+
+def _choose(name: str, about: Sequence[_Constraint], values: Mapping[str, Fraction]) -> Fraction:
+    """A value that meets the constraints if any does: what an equation says, else within the bounds."""
+    low: Fraction | None = None
+    high: Fraction | None = None
+    for constraint in about:
+        rest, own = constraint.left.constant, Fraction(1)
+        for other, coefficient in constraint.left.coefficients:
+            if other == name:
+                own = coefficient
+            else:
+                rest += coefficient * values[other]
+        bound = -rest / own
+        if constraint.operator == "==":
+            return bound
+        if own > 0:
+            high = bound if high is None or bound < high else high
+        else:
+            low = bound if low is None or bound > low else low
+    if low is None:
+        return Fraction(0) if high is None else high - 1
+    return low + 1 if high is None else (low + high) / 2
+
+
+_System = tuple[_Constraint, ...]
+_Alternatives = Callable[[Env], list[_System]]
 """The formula as a disjunction of systems, given the other variables' values."""
 
 
@@ -54,8 +188,8 @@ def linear_step(
     def run(env: Env) -> Iterator[None]:
         for system in systems(env):
             try:
-                values = satisfy(system, names)
-            except TooMany:
+                values = _satisfy(system, names)
+            except _TooMany:
                 raise NotEvaluable("the inequalities are too many to solve") from None
             if values is not None:
                 for slot, name in zip(slots, names, strict=True):
@@ -65,7 +199,7 @@ def linear_step(
     return run
 
 
-def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[str]) -> Alternatives | None:
+def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[str]) -> _Alternatives | None:
     if not bound_names(term) & unknown:
         code = compiler.code(term)
         return lambda env: [()] if code(env) is positive else []
@@ -94,7 +228,7 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
             return None
 
 
-def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: frozenset[str]) -> Alternatives | None:
+def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: frozenset[str]) -> _Alternatives | None:
     """No assignment makes the body `positive`: the parts without unknowns say which assignments could."""
     parts, inner = conjunction(term.body, positive)
     variables = (*term.variables, *inner)
@@ -109,8 +243,8 @@ def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: froz
     if any(v.name in p.names and v.name not in plan.bound for v in variables for p in parts):
         return None
 
-    def run(env: Env) -> list[tuple[Constraint, ...]]:
-        found: list[tuple[Constraint, ...]] = [()]
+    def run(env: Env) -> list[_System]:
+        found: list[_System] = [()]
         for doubt in plan.solutions(env):
             if doubt is not None:
                 raise doubt
@@ -120,7 +254,7 @@ def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: froz
     return run
 
 
-def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: frozenset[str]) -> Alternatives | None:
+def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: frozenset[str]) -> _Alternatives | None:
     if not isinstance(term.left.sort, RealSort):
         return None
     left, right = _linear(compiler, term.left, unknown), _linear(compiler, term.right, unknown)
@@ -131,15 +265,15 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
         left, right, operator = right, left, operator.replace(">", "<")
     one, other = left.constant, right.constant
     coefficients = _sum(left.coefficients, right.coefficients, Fraction(-1))
-    straight = Linear.of(coefficients, Fraction(0)).coefficients
-    turned = Linear.of({n: -c for n, c in coefficients.items()}, Fraction(0)).coefficients
+    straight = _Linear.of(coefficients, Fraction(0)).coefficients
+    turned = _Linear.of({n: -c for n, c in coefficients.items()}, Fraction(0)).coefficients
 
-    def run(env: Env) -> list[tuple[Constraint, ...]]:
+    def run(env: Env) -> list[_System]:
         constant = Fraction(one(env) - other(env))
         if operator != "!=":
-            return [(Constraint(Linear(straight, constant), operator),)]
-        below = Constraint(Linear(straight, constant), "<")
-        return [(below,), (Constraint(Linear(turned, -constant), "<"),)]
+            return [(_Constraint(_Linear(straight, constant), operator),)]
+        below = _Constraint(_Linear(straight, constant), "<")
+        return [(below,), (_Constraint(_Linear(turned, -constant), "<"),)]
 
     return run
 
@@ -204,13 +338,13 @@ def _sum(left: dict[str, Fraction], right: dict[str, Fraction], factor: Fraction
     return {n: left.get(n, Fraction(0)) + factor * right.get(n, Fraction(0)) for n in {**left, **right}}
 
 
-def _all(sides: Sequence[Alternatives | None]) -> Alternatives | None:
+def _all(sides: Sequence[_Alternatives | None]) -> _Alternatives | None:
     known = complete(sides)
     if known is None:
         return None
 
-    def run(env: Env) -> list[tuple[Constraint, ...]]:
-        found: list[tuple[Constraint, ...]] = [()]
+    def run(env: Env) -> list[_System]:
+        found: list[_System] = [()]
         for side in known:
             found = _product(found, side(env))
         return found
@@ -218,14 +352,14 @@ def _all(sides: Sequence[Alternatives | None]) -> Alternatives | None:
     return run
 
 
-def _any(sides: Sequence[Alternatives | None]) -> Alternatives | None:
+def _any(sides: Sequence[_Alternatives | None]) -> _Alternatives | None:
     known = complete(sides)
     if known is None:
         return None
     return lambda env: [system for side in known for system in side(env)]
 
 
-def _product(left: list[tuple[Constraint, ...]], right: list[tuple[Constraint, ...]]) -> list[tuple[Constraint, ...]]:
+def _product(left: list[_System], right: list[_System]) -> list[_System]:
     if len(left) * len(right) > LINEAR_CASES:
         raise NotEvaluable("the inequalities fall into too many cases")
     if right == [()]:

@@ -71,7 +71,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """`scope`: the derivation that it was made for, for people. `lemmas`: as `avow.calculus.invariants` writes them."""
+    """`scope`: the derivation that it was made for, for people. `lemmas`: as `avow.calculus.induction` writes them."""
 
     format: Format = field(default=Format.NOW, kw_only=True)
     scope: str

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from avow.assurance.model import Derivation, SideCondition
 from avow.calculus.composition import composed
-from avow.calculus.hypotheses import discharged_by
 from avow.calculus.notation import Written, write_goal
-from avow.calculus.obligations import composition_obligations
+from avow.calculus.obligations import discharged_by
 from avow.system.folding import seen
 from avow.system.graph import dataflow
 from avow.system.graph_svg import sheet
@@ -20,8 +19,7 @@ def derivation_views(system: System) -> tuple[Derivation, ...]:
 
 def discharging(system: System) -> dict[str, tuple[str, ...]]:
     """Of each node the obligations (without the system) that settle its assumptions."""
-    composition = composed(system)
-    found = discharged_by(composition, composition_obligations(system))
+    found = discharged_by(composed(system))
     return {node: tuple(hypothesis.name for hypothesis in behind) for node, behind in found.items()}
 
 

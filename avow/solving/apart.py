@@ -1,17 +1,20 @@
 """Solvers in processes of their own: a crash of one, or one that does not keep its time, is an unknown answer.
 
-Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.question_process`).
+Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.question_process`). There are
+scripts on which cvc5 does not keep its own limits (seen: sequences of tuples), and no call into a library can be ended
+from Python.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from importlib import metadata, util
+from typing import Any
 
 from avow.base.tuning.effort import KERNEL_SECOND_STEPS
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
-from avow.solving.cvc5_process import answer
 from avow.solving.question_process import Answering, NoAnswer, serve
 
 
@@ -36,10 +39,12 @@ class Apart:
 
     def _ask(self, script: str, limit: int) -> tuple[Said, int]:
         try:
-            return self._process.ask((self.solver, script, limit), tuple[Said, int], NET_MS / 1000)
+            asked = script if self.solver == "z3" else f"{script}(check-sat)\n"
+            said, used = self._process.ask((self.solver, asked, limit), tuple[str, int], NET_MS / 1000)
+            return Said(said or Said.UNKNOWN), used
         except TimeoutError:
             return Said.LATE, limit
-        except NoAnswer:
+        except (NoAnswer, ValueError):  # no word, or one that is no answer
             return Said.UNKNOWN, limit
 
     def close(self) -> None:
@@ -72,12 +77,47 @@ def versions() -> dict[str, str]:
     return found
 
 
+_PRODUCT = re.compile(r"\(\* (?!\(?[-/]? ?\d)(?!\S+ \(?[-/]? ?\d)")
+"""Of what are not numbers."""
+
+
+def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
+    """``sat``, ``unsat`` or ``unknown``, nothing where cvc5 cannot read the script; and how many of its own steps it
+    took, of so many that it has."""
+    import cvc5
+
+    terms = cvc5.TermManager()
+    solver = cvc5.Solver(terms)
+    solver.setOption("rlimit-per", str(limit))
+    solver.setOption("full-saturate-quant", "true")
+    if _PRODUCT.search(script) and re.search(r"\((forall|exists) ", script):
+        solver.setOption("cegqi", "false")  # it never ends there, and counts no steps (seen: ``exists x. x * x == y``)
+    parser = cvc5.InputParser(solver)
+    parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, script, "query")
+    symbols = parser.getSymbolManager()
+    found = ""
+    try:
+        while True:
+            command = parser.nextCommand()
+            if command.isNull():
+                return found, _steps(solver)
+            said = command.invoke(solver, symbols).strip()
+            if said.split(" ")[0] in {"sat", "unsat", "unknown"}:
+                found = said.split(" ")[0]  # "unknown (INCOMPLETE)"
+            elif said and said != "success":
+                return "", 0
+    except RuntimeError:
+        return "", 0
+
+
+def _steps(solver: Any) -> int:
+    counted = solver.getStatistics().get(internal=True).get("resource::resourceUnitsUsed", {})
+    return int(counted.get("value", 0))
+
+
 def _said(question: tuple[str, str, int]) -> tuple[str, int]:
     solver, script, limit = question
-    if solver == "z3":
-        return ask_z3(script, limit), 0
-    said, used = answer(f"{script}(check-sat)\n", limit)
-    return said or Said.UNKNOWN, used
+    return (ask_z3(script, limit), 0) if solver == "z3" else _ask_cvc5(script, limit)
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
     steps, seconds = max(1, effort * CVC5_STEPS), net(effort) + CVC5_START_SECONDS
     for _ in range(2):  # another process may have been ended by somebody else
         try:
-            found = _cvc5.ask((script, steps), str, seconds)
+            found, _ = _cvc5.ask(("cvc5", script, steps), tuple[str, int], seconds)
         except TimeoutError:
             return "unknown"
         except NoAnswer:
@@ -98,7 +98,7 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
     return None
 
 
-_cvc5 = Answering("avow.solving.cvc5_process")
+_cvc5 = Answering("avow.solving.apart")
 
 
 def end_cvc5() -> None:

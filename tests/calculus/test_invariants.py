@@ -15,7 +15,7 @@ from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Hint
-from avow.calculus.invariants import read, write
+from avow.calculus.induction import read, write
 from avow.calculus.variables import frame, system_variable
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate
