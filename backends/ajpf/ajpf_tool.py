@@ -194,21 +194,22 @@ def check(
 def judge(done: Completed) -> Answer:
     """What the output says. Anything unexpected is an error, never a pass."""
     text = _HARMLESS.sub("", done.stdout + "\n" + done.stderr)
-    log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
-    framework = _FRAMEWORK.search(text)
-    named = framework[1].strip() if framework else ""
-    if done.timed_out:
-        return Answer(Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}", log=log, framework=named)
-    parser = _PARSER.search(text)
-    if parser:
-        return Answer(Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}", log=log, framework=named)
-    if "search constraint" in text:
-        return Answer(Said.INCONCLUSIVE, "a search constraint cut the search short", log=log, framework=named)
+    framework, parser = _FRAMEWORK.search(text), _PARSER.search(text)
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
     once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
-    if holds and once and not violated and "error #" not in text:
-        return Answer(Said.HOLDS, log=log, framework=named)
-    if violated and not holds:
+    path: tuple[int, ...] = ()
+    if done.timed_out:
+        said, reason = Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
+    elif parser:
+        said, reason = Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}"
+    elif "search constraint" in text:
+        said, reason = Said.INCONCLUSIVE, "a search constraint cut the search short"
+    elif holds and once and not violated and "error #" not in text:
+        said, reason = Said.HOLDS, ""
+    elif violated and not holds:
+        said, reason = Said.VIOLATED, ""
         path = tuple(int(step[0]) for step in _STEP.findall(done.stderr))
-        return Answer(Said.VIOLATED, path=path, log=log, framework=named)
-    return Answer(Said.ERROR, f"no answer that can be relied upon (exit code {done.code})", log=log, framework=named)
+    else:
+        said, reason = Said.ERROR, f"no answer that can be relied upon (exit code {done.code})"
+    log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
+    return Answer(said, reason, path, log, framework[1].strip() if framework else "")

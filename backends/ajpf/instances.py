@@ -27,6 +27,7 @@ from .shape import TooComplex
 from .syntax import DeedKind, Struct
 from .timing import timed
 from .tuning import FORMULA_DEPTH, PROPERTIES
+from .words import runs, together
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +165,7 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
             values = mapper.range_of(variable)
             if values is None:
                 raise NotCovered(f"{variable.name} has no finite range (options: instances)", clause.span)
-            ranges[variable.name] = _span(values)
+            ranges[variable.name] = runs(values)
             domains.append(values)
         for choice in product(*domains):
             values_now = dict(zip(used, choice, strict=True))
@@ -191,10 +192,10 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
             if not made:
                 settled.append(f"{said or 'the guarantee'}: the scenario and the table alone make it true")
     properties = tuple(
-        replace(p, key=_key(clause.name, about[f], keys), about=_merged(about[f])) for f, p in found.items()
+        replace(p, key=_key(clause.name, about[f], keys), about=together(about[f])) for f, p in found.items()
     )
     for name, numbers in mapper.expanded.items():
-        ranges.setdefault(name, _span(numbers))
+        ranges.setdefault(name, runs(numbers))
     indices = tuple(f"{name} in {values}" for name, values in ranges.items())
     granted = tuple(sorted(mapper.granted))
     about_it = timing.hypothesis if timing is not None else ""
@@ -247,22 +248,6 @@ def _key(name: str, about: Sequence[str], keys: set[str]) -> str:
         key = f"{base}_{number}"
     keys.add(key)
     return key
-
-
-def _span(values: Sequence[int]) -> str:
-    if len(values) > 2 and list(values) == list(range(values[0], values[0] + len(values))):
-        return f"{values[0]}…{values[-1]}"
-    return ", ".join(map(str, values))
-
-
-def _merged(about: Sequence[str]) -> str:
-    """Instances that gave one and the same property."""
-    if len(about) <= 1:
-        return "".join(about)
-    split = [text.split(" = ") for text in about]
-    if all(len(s) == 2 and s[0] == split[0][0] and s[1].isdigit() for s in split):
-        return f"{split[0][0]} = {_span([int(s[1]) for s in split])}"
-    return "; ".join(about)
 
 
 # Words that neither the program nor the environment ever has: mostly slips of the pen. They matter most where something

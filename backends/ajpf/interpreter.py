@@ -20,7 +20,7 @@ from typing import NamedTuple
 from .environment import Choice, Environment
 from .intentions import PERCEPTION, START, achieve, of_deed, of_event, perform
 from .mind import NONE, Done, Mind, Table
-from .syntax import Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
+from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
 
 
 class Semantics(StrEnum):
@@ -111,8 +111,6 @@ class Agent(Mind):
         self.environment = self.world.environment
         self.semantics = semantics
         self.probed = probed
-        self._deeds: dict[tuple[int, int, int], Done] = {}
-        self._plans: dict[tuple[int, int, int], tuple[int, int]] = {}
         self._draws, self._offers = self.world.after, self.world.offers
         self._percepts = cache(self._perceptions)
         self._direct = cache(self._changes)
@@ -126,6 +124,11 @@ class Agent(Mind):
     def minds(self, state: State) -> tuple[State, ...]:
         """The state of each of `agents`."""
         return (state,)
+
+    def believed(self, state: State) -> frozenset[Struct]:
+        """All that is believed, without what the agent remembers of its own messages."""
+        beliefs = self.beliefs.items[state.beliefs]
+        return frozenset(b for b in beliefs.own | beliefs.perceived if b.functor != SENT)
 
     def did(self, state: State) -> tuple[int, Struct] | None:
         """Which of `agents` acted last, and its action."""
@@ -202,7 +205,9 @@ class Agent(Mind):
             return state._replace(current=NONE, queue=queue, asleep=asleep)
         if current == self.empty:
             return state._replace(current=current, queue=queue)
-        chosen, goals = self._chosen(state.beliefs, state.goals, current)
+        chosen, goals = current, state.goals
+        if self.intentions.items[current].frames[-1].deeds is None:
+            chosen, goals = self.chosen(state.beliefs, goals, current)
         return state._replace(current=chosen, goals=goals, queue=queue, planned=chosen != self.empty)
 
     def _perceive(self, state: State) -> tuple[int, int, tuple[int, ...]]:
@@ -252,16 +257,6 @@ class Agent(Mind):
     def _rest(self, ready: list[int], queue: tuple[int, ...]) -> tuple[int, ...]:
         return (*ready[1:], *(n for n in queue if self.intentions.items[n].waiting is not None))
 
-    def _chosen(self, base: int, goals: int, number: int) -> tuple[int, int]:
-        """The intention with a plan for its top event, and the goal base."""
-        if self.intentions.items[number].frames[-1].deeds is not None:
-            return number, goals
-        key = (base, goals, number)
-        found = self._plans.get(key)
-        if found is None:
-            found = self._plans[key] = self.choose(base, goals, number)
-        return found
-
     # The second half: one deed
 
     def _deed(self, state: State) -> tuple[State, ...]:
@@ -284,10 +279,7 @@ class Agent(Mind):
     def act(self, state: State) -> tuple[State, int]:
         """The next deed of the current intention done, and the action that it was; what the world makes of that is not
         yet in the state."""
-        key = (state.beliefs, state.goals, state.current)
-        done = self._deeds.get(key)
-        if done is None:
-            done = self._deeds[key] = self.effect(*key)
+        done = self.done(state.beliefs, state.goals, state.current)
         deed = self.next_deed(state)
         if deed is not None and deed.kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL):
             done, queue = self._goal_deed(state, deed, done)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Generic, NamedTuple, Protocol, TypeVar, assert_never
+from functools import cache
+from typing import Generic, NamedTuple, TypeVar, assert_never
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
@@ -62,11 +63,6 @@ class Done(NamedTuple):
     suspended: bool = False
 
 
-class Thinking(Protocol):
-    @property
-    def beliefs(self) -> int: ...
-
-
 class Mind:
     """Belief bases, goal bases, intentions and actions by their numbers; and the steps between them."""
 
@@ -80,7 +76,8 @@ class Mind:
         self.empty = self.intentions.number(EMPTY)
         self.uses_goals = any(c.is_goal for plan in program.plans for c in plan.guard)
         self._triggers = _trigger_index(program.plans)
-        self._bases: dict[tuple[frozenset[Struct], frozenset[Struct]], int] = {}
+        self.base = cache(self._base)
+        self.chosen, self.done = cache(self.choose), cache(self.effect)
 
     # Plans
 
@@ -222,22 +219,13 @@ class Mind:
 
     # Parts
 
-    def believed(self, mind: Thinking) -> frozenset[Struct]:
-        """All that is believed, without what the agent remembers of its own messages."""
-        beliefs = self.beliefs.items[mind.beliefs]
-        return frozenset(b for b in beliefs.own | beliefs.perceived if b.functor != SENT)
-
     def number(self, intention: Intention) -> int:
         if not intention.frames:
             return self.empty
         return self.intentions.number(canonical(intention))
 
-    def base(self, own: frozenset[Struct], perceived: frozenset[Struct]) -> int:
-        key = (own, perceived)
-        found = self._bases.get(key)
-        if found is None:
-            found = self._bases[key] = self.beliefs.number(Beliefs.of(own, perceived))
-        return found
+    def _base(self, own: frozenset[Struct], perceived: frozenset[Struct]) -> int:
+        return self.beliefs.number(Beliefs.of(own, perceived))
 
     def without(self, goals: int, goal: Goal | None) -> int:
         if goal is None or goal not in self.goals.items[goals]:

@@ -17,7 +17,8 @@ from avow.formulas import ltl
 from avow.formulas.flattening import joined
 from avow.formulas.ltl import Automaton
 
-from .syntax import Struct, Term, Var
+from .syntax import Struct
+from .syntax import show as show_fact
 
 KEYWORDS = frozenset({"A", "E", "U", "R", "B", "G", "F", "I", "D", "P", "T", "ItD"})
 """Words of the language: an agent may not be called so."""
@@ -176,7 +177,7 @@ class Notation:
 
 def _atom(atom: Atom) -> str:
     who = "" if atom.modality is Modality.PERCEPT else f"{atom.agent}, "
-    return f"{atom.modality}({who}{show_term(atom.term)})"
+    return f"{atom.modality}({who}{show_fact(atom.term)})"
 
 
 _AJPF = Notation(_atom, ("F", "T"), "~", "&", "R")
@@ -208,15 +209,9 @@ def _operand(formula: Formula, written: Notation) -> str:
     return show(formula, written) if alone else f"({show(formula, written)})"
 
 
-def show_term(term: Term) -> str:
-    if isinstance(term, Var):
-        return "_"
-    return f"{term.functor}({', '.join(map(show_term, term.args))})" if term.args else term.functor
-
-
 def show_template(formula: Formula) -> str:
     """For people: index terms as the plan writes them."""
-    return re.sub(r"([+-])\((\w+), (\w+)\)", r"\2 \1 \3", show(formula))
+    return re.sub(r"\((\w+ [+-] \w+)\)", r"\1", show(formula))
 
 
 def automaton_of(formula: Formula) -> Automaton[Formula]:

@@ -15,7 +15,7 @@ from .instances import Claim, Instantiation
 from .options import Extra, Setup
 from .syntax import RECEIVED, Program, Struct
 from .tautology import is_valid
-from .words import runs
+from .words import together
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,14 +208,7 @@ def _some(these: Sequence[Property], all_of_them: Sequence[Property]) -> str:
 
 def _which(properties: Sequence[Property]) -> str:
     """`` for i = 2, 3, 5`` as far as that helps."""
-    names = [p.about or p.key for p in properties]
-    shown = list(dict.fromkeys(names))
-    split = [name.split(" = ") for name in shown]
-    if len(shown) > 1 and all(len(s) == 2 and s[0] == split[0][0] for s in split):
-        values = [s[1] for s in split]
-        said = runs(map(int, values)) if all(v.isdigit() for v in values) else ", ".join(values)
-        return f" for {split[0][0]} = {said}"
-    return f" for {'; '.join(shown[:6])}{' …' if len(shown) > 6 else ''}"
+    return f" for {together((p.about or p.key for p in properties), 6)}"
 
 
 def _entry(p: Property, result: Settled) -> dict[str, object]:

@@ -8,6 +8,7 @@ every way. Percepts wake all agents, a message the one that it is for. One agent
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import NamedTuple, TypeVar
 
 from .beliefs import apart
@@ -54,8 +55,7 @@ class Society:
         self._places = {program.name: place for place, program in enumerate(programs)}
         self._minds: tuple[Table[State], ...] = tuple(Table() for _ in programs)
         self._actions: Table[tuple[int, Struct]] = Table()
-        self._cycles: dict[tuple[int, int, int, tuple[int, ...], bool], tuple[int, bool]] = {}
-        self._deeds: dict[tuple[int, int], tuple[int, bool, int]] = {}
+        self._cycled, self._acted = cache(self._after_cycle), cache(self._after_deed)
 
     def minds(self, state: Common) -> tuple[State, ...]:
         """The state of each of `agents`."""
@@ -138,23 +138,28 @@ class Society:
         place = state.turn
         mind = self._minds[place].items[state.minds[place]]
         letters = state.mail[place]
-        key = (place, state.minds[place], state.choice if mind.new else NONE, letters, again)
-        found = self._cycles.get(key)
-        if found is None:
-            after = self.agents[place].cycle(mind._replace(choice=state.choice), again=again, letters=letters)
-            found = self._cycles[key] = self._keep(place, after), after.asleep
+        after = self._cycled(place, state.minds[place], state.choice if mind.new else NONE, letters, again)
         if letters:
             state = state._replace(mail=_put(state.mail, place, ()))
-        return self._done(state, *found)
+        return self._done(state, *after)
+
+    def _after_cycle(
+        self, place: int, number: int, choice: int, letters: tuple[int, ...], again: bool
+    ) -> tuple[int, bool]:
+        """The agent's own state then, and whether it sleeps. `choice` is what it perceives, if that is new."""
+        mind = self._minds[place].items[number]._replace(choice=choice)
+        after = self.agents[place].cycle(mind, again=again, letters=letters)
+        return self._keep(place, after), after.asleep
+
+    def _after_deed(self, place: int, number: int) -> tuple[int, bool, int]:
+        """The agent's own state then, whether it sleeps, and its action."""
+        after, action = self.agents[place].act(self._minds[place].items[number])
+        return self._keep(place, after), after.asleep, action
 
     def _deed(self, state: Common) -> Iterator[Common]:
         place, agent = state.turn, self.agents[state.turn]
         number = state.minds[place]
-        found = self._deeds.get((place, number))
-        if found is None:
-            after, action = agent.act(self._minds[place].items[number])
-            found = self._deeds[place, number] = self._keep(place, after), after.asleep, action
-        kept, asleep, action = found
+        kept, asleep, action = self._acted(place, number)
         deed = agent.next_deed(self._minds[place].items[number])
         state = self._done(state, kept, asleep)
         if action == NONE or deed is None:

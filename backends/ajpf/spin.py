@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -35,21 +35,11 @@ def opinions(
     """Key → whether the property holds, says Spin. Raises NoOpinion."""
     if spin_tool.version() is None:
         raise NoOpinion("spin or gcc is not installed")
+    deadline = time.monotonic() + seconds
     try:
         files = _translated(checker, properties)
     except promela.NotTranslated as error:
         raise NoOpinion(f"no translation of {error}") from None
-    return _asked(files, checker, properties, folder, time.monotonic() + seconds, outside)
-
-
-def _asked(
-    files: Mapping[str, str],
-    checker: Checker,
-    properties: Sequence[Property],
-    folder: Path,
-    deadline: float,
-    outside: Outside,
-) -> dict[str, bool]:
     for name, text in files.items():
         write(folder / name, text)
     # The model's own code grows with the properties, and takes longer to optimize than it then saves.

@@ -96,44 +96,34 @@ def explain(graph: Graph, lasso: Lasso, refuted: Property, wording: Wording) -> 
 
 
 def _because(graph: Graph, visited: Sequence[Any], places: Sequence[int], refuted: Property, wording: Wording) -> str:
-    trigger, goal = refuted.trigger, refuted.goal
+    trigger, goal, forbidden = refuted.trigger, refuted.goal, refuted.forbidden
     if trigger is None:
         return "the property fails on this run"
-    if refuted.forbidden is not None:
-        at, came = _banned(graph, visited, places, trigger, refuted.forbidden)
-        when = "demanded whatever happens" if trigger == psl.TRUE else f"in step {at}: {wording.say(trigger)}"
-        return f"{when}; what is then forbidden comes in step {came}: {wording.say(refuted.forbidden)}"
+    meant = _where(graph, visited, trigger)
+    if forbidden is not None:
+        at = next(iter(meant), None)
+        came = next((to for to in _where(graph, visited, forbidden) if at is not None and to >= at), None)
+        met = f"in step {_step(places, at)}: {wording.say(trigger)}"
+        when = "demanded whatever happens" if trigger == psl.TRUE else met
+        return f"{when}; what is then forbidden comes in step {_step(places, came)}: {wording.say(forbidden)}"
     if goal is None:
-        return f"in step {_first(graph, visited, places, trigger, None)}: {wording.say(trigger)}; this must never be"
+        return f"in step {_step(places, next(iter(meant), None))}: {wording.say(trigger)}; this must never be"
     if trigger == psl.TRUE:
         return f"demanded whatever happens, and never so on this run: {wording.say(goal)}"
-    step = _first(graph, visited, places, trigger, goal)
+    last = max(_where(graph, visited, goal), default=-1)
+    step = _step(places, next((at for at in meant if at > last), None))
     return f"in step {step}: {wording.say(trigger)}; what must follow never does: {wording.say(goal)}"
 
 
-def _first(graph: Graph, visited: Sequence[Any], places: Sequence[int], trigger: Formula, goal: Formula | None) -> str:
-    """The first step in which the trigger holds and after which the goal never does."""
-    atoms = tuple(dict.fromkeys(a for f in (trigger, goal) if f is not None for a in psl.atoms(f)))
-    numbers = {atom: at for at, atom in enumerate(atoms)}
-    labels = label_states(graph.system, visited, atoms)
-    meant = compiled(trigger, numbers)
-    reached = compiled(goal, numbers) if goal is not None else None
-    last = max((at for at, label in enumerate(labels) if reached is not None and reached(label)), default=-1)
-    found = next((at for at, label in enumerate(labels) if at > last and meant(label)), None)
-    return "?" if found is None else str(places[found])
+def _where(graph: Graph, visited: Sequence[Any], formula: Formula) -> list[int]:
+    """The places of the states in which a formula without temporal operators holds."""
+    atoms = tuple(dict.fromkeys(psl.atoms(formula)))
+    test = compiled(formula, {atom: at for at, atom in enumerate(atoms)})
+    return [at for at, label in enumerate(label_states(graph.system, visited, atoms)) if test(label)]
 
 
-def _banned(
-    graph: Graph, visited: Sequence[Any], places: Sequence[int], trigger: Formula, forbidden: Formula
-) -> tuple[str, str]:
-    """The first step in which the trigger holds, and the first from there on in which what is forbidden comes."""
-    atoms = tuple(dict.fromkeys((*psl.atoms(trigger), *psl.atoms(forbidden))))
-    numbers = {atom: at for at, atom in enumerate(atoms)}
-    labels = label_states(graph.system, visited, atoms)
-    meant, banned = compiled(trigger, numbers), compiled(forbidden, numbers)
-    first = next((at for at, label in enumerate(labels) if meant(label)), None)
-    came = next((at for at, label in enumerate(labels) if first is not None and at >= first and banned(label)), None)
-    return ("?" if first is None else str(places[first])), ("?" if came is None else str(places[came]))
+def _step(places: Sequence[int], at: int | None) -> str:
+    return "?" if at is None else str(places[at])
 
 
 def _contract_cells(graph: Graph, visited: Sequence[Any], wording: Wording) -> list[Step]:
@@ -179,6 +169,16 @@ def runs(numbers: Iterable[int]) -> str:
         else:
             groups.append([n])
     return ", ".join(f"{g[0]}…{g[-1]}" if len(g) > 2 else ", ".join(map(str, g)) for g in groups)
+
+
+def together(texts: Iterable[str], most: int | None = None) -> str:
+    """Instances in one text: ``i = 1, 2, 5…9``; of those that are no values of one variable so many, if not all."""
+    shown = list(dict.fromkeys(texts))
+    split = [text.split(" = ") for text in shown]
+    if len(shown) > 1 and all(len(s) == 2 and s[0] == split[0][0] for s in split):
+        values = [s[1] for s in split]
+        return f"{split[0][0]} = {runs(map(int, values)) if all(v.isdigit() for v in values) else ', '.join(values)}"
+    return "; ".join(shown[:most]) + (" …" if most is not None and len(shown) > most else "")
 
 
 def _instances(
