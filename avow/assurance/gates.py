@@ -35,14 +35,20 @@ def gates(
     """Every gate, in the order in which a reader should look at them."""
     views = {view.id: view for view in obligations}
     excused = {name for f in findings if not f.expired for name in f.obligations}
+    claims = [view for view in obligations if not view.advice]
     return (
         *_earlier(facts),
         _integrity(facts),
         *_findings(facts, findings, obligations),
         _nothing_wrong(facts, obligations, excused),
-        _kind(facts, obligations, excused, Kind.WELL_FORMED, "Contracts parse and are well-typed", (Status.PROVED,)),
-        _kind(facts, obligations, excused, Kind.SANITY, "Contracts are worth verifying", facts.policy.sanity),
-        _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition holds", facts.policy.composition),
+        *(
+            _held_to(kind.value, title, [v for v in claims if v.obligation.kind is kind], good, excused)
+            for kind, title, good in (
+                (Kind.WELL_FORMED, "Contracts parse and are well-typed", (Status.PROVED,)),
+                (Kind.SANITY, "Contracts are worth verifying", facts.policy.sanity),
+                (Kind.COMPOSITION, "The composition holds", facts.policy.composition),
+            )
+        ),
         *_guarantees(facts, obligations, excused),
         *_programs(facts, obligations, relied, excused),
         _derivations(facts, derivations, views, excused),
@@ -131,23 +137,15 @@ def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused:
     )
 
 
-def _kind(
-    facts: Facts,
-    obligations: Sequence[ObligationView],
-    excused: set[str],
-    kind: Kind,
-    title: str,
-    good: Sequence[Status],
-) -> Gate:
-    of_kind = [v for v in obligations if v.obligation.kind is kind and not v.advice]
-    failing = [v for v in of_kind if good and v.status not in good]
+def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Sequence[Status], excused: set[str]) -> Gate:
+    """That each of some claims stands as the policy asks; where it names no status, nothing is asked."""
     return _gate(
-        kind.value,
+        name,
         title,
-        failing,
+        [v for v in views if good and v.status not in good],
         excused,
         lambda view: _short_of(view.status, good),
-        _holding([v.status.supports for v in of_kind], asked=bool(good)),
+        _holding([v.status.supports for v in views], asked=bool(good)),
         _in_words(good),
         idle=not good,
     )
@@ -193,17 +191,8 @@ def _programs(
     guarantees = [v for v in obligations if v.obligation.kind is Kind.GUARANTEE and v.id in relied]
     of_models = {v.obligation.node for v in guarantees if looked_at(relied[v.id]) is Object.MODEL}
     asked = [v for v in own if v.obligation.name != ProgramClaim.LINKED or v.obligation.node in of_models]
-    good = facts.policy.programs
-    yield _gate(
-        Kind.PROGRAM.value,
-        "Programs run without fault, and answer as the models that are relied upon",
-        [v for v in asked if good and v.status not in good],
-        excused,
-        lambda view: _short_of(view.status, good),
-        _holding([v.status.supports for v in asked], asked=bool(good)),
-        _in_words(good),
-        idle=not good,
-    )
+    title = "Programs run without fault, and answer as the models that are relied upon"
+    yield _held_to(Kind.PROGRAM.value, title, asked, facts.policy.programs, excused)
 
 
 def _criticality(view: ObligationView, facts: Facts) -> str:

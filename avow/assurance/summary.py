@@ -204,46 +204,43 @@ def not_shown(
     facts: Facts, views: Sequence[ObligationView], requirements: Sequence[RequirementView]
 ) -> tuple[str, ...]:
     """What nobody should read into this case."""
-    lines = []
-    prose = [r.id for r in requirements if not r.formula and not r.temporal]
-    if prose:
-        lines.append(
-            f"{listed(prose, 12)}: stated in prose. That the guarantees named amount to the requirement is a person's "
-            "judgement; no tool has checked it."
-        )
-    told = (Kind.GUARANTEE, Kind.REQUIREMENT)
-    bounded = [short(v.id) for v in views if v.obligation.kind in told and v.status is Status.CHECKED]
-    if bounded:
-        names = listed(bounded, 12)
-        lines.append(f"{names}: checked exhaustively, but only within the finite scenario; nothing is said outside it.")
-    sampled = [
-        short(v.id) for v in views if v.obligation.kind in told and v.status in (Status.TESTED, Status.MONITORED)
+    guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
+    told = [v for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
+
+    def of(among: Iterable[ObligationView], *statuses: Status) -> list[str]:
+        return [short(v.id) for v in among if v.status in statuses]
+
+    about = [
+        (
+            [r.id for r in requirements if not r.formula and not r.temporal],
+            (
+                "stated in prose. That the guarantees named amount to the requirement is a person's judgement; no tool "
+                "has checked it"
+            ),
+        ),
+        (
+            of(told, Status.CHECKED),
+            "checked exhaustively, but only within the finite scenario; nothing is said outside it",
+        ),
+        (
+            of(told, Status.TESTED, Status.MONITORED),
+            "observed on samples; other inputs and other runs may behave otherwise",
+        ),
+        *_protocols(views),
+        (of(guarantees, Status.REVIEWED, Status.JUSTIFIED), "rests on a person's word alone"),
+        (
+            [short(v.id) for v in guarantees if v.status.supports and v.link in (Link.MAPPED, Link.GUIDED)],
+            (
+                "what was verified is tied to the formula by a table or a judgement of a person, not by translation; "
+                "that the tie is right is not shown"
+            ),
+        ),
+        (
+            [e.port for e in facts.environment if e.assume],
+            "what is assumed of these environment inputs is believed for a reason, not shown",
+        ),
     ]
-    if sampled:
-        lines.append(f"{listed(sampled, 12)}: observed on samples; other inputs and other runs may behave otherwise.")
-    lines += _protocols(views)
-    person = [
-        short(v.id)
-        for v in views
-        if v.obligation.kind is Kind.GUARANTEE and v.status in (Status.REVIEWED, Status.JUSTIFIED)
-    ]
-    if person:
-        lines.append(f"{listed(person, 12)}: rests on a person's word alone.")
-    linked = [
-        short(v.id)
-        for v in views
-        if v.obligation.kind is Kind.GUARANTEE and v.status.supports and v.link in (Link.MAPPED, Link.GUIDED)
-    ]
-    if linked:
-        lines.append(
-            f"{listed(linked, 12)}: what was verified is tied to the formula by a table or a judgement of a person, "
-            "not by translation; that the tie is right is not shown."
-        )
-    trusted = [e.port for e in facts.environment if e.assume]
-    if trusted:
-        lines.append(
-            f"{listed(trusted, 12)}: what is assumed of these environment inputs is believed for a reason, not shown."
-        )
+    lines = [f"{listed(names, 12)}: {text}." for names, text in about if names]
     used = {r.backend for view in views for r in view.records}
     if any(m.strength in (Verdict.PROVED, Verdict.CHECKED) and m.name in used for m in facts.methods):
         lines.append(
@@ -257,7 +254,7 @@ def not_shown(
     return tuple(lines)
 
 
-def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
+def _protocols(views: Sequence[ObligationView]) -> Iterable[tuple[list[str], str]]:
     """How measured runs were made, in the plan's words: 47 of 47 in a simulation is not 47 of 47 on the robot."""
     found: dict[str, list[str]] = {}
     for view in views:
@@ -266,4 +263,4 @@ def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
                 case str(text) if text.strip():
                     found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
     for text, names in found.items():
-        yield f"{listed(names, 12)}: measured under this protocol, and not beyond it: {text}."
+        yield names, f"measured under this protocol, and not beyond it: {text}"

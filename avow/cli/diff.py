@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import tempfile
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
 
 import click
 
+from avow import __version__
+from avow.assurance.case import conclude
+from avow.assurance.codec import read_case
+from avow.assurance.compare import Change, Snapshot, compare, of_case, of_ledger
+from avow.assurance.facts import facts_of_system
+from avow.assurance.model import RunInfo
+from avow.base import git
 from avow.base.codec import document, to_json
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write_out
 from avow.base.plain import count
 from avow.base.tuning.shown import DIFF_REASONS
+from avow.base.workspace import Workspace, workspace
+from avow.cli.ledgers import readable
 from avow.cli.options import json_option
-
-if TYPE_CHECKING:
-    from avow.assurance.compare import Change
+from avow.evidence.ledger import Entry, Ledger
+from avow.pipeline.workload import survey
 
 
 @click.command()
@@ -34,10 +47,7 @@ def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on:
     contracts and plans of that revision are held against today's ledger. NEW is the workspace as it is, if left out.
     Exit code 1 where something got worse.
     """
-    from avow.assurance.compare import compare
-    from avow.cli.snapshots import pair
-
-    changes = [(system, change) for system, before, after in pair(old, new) for change in compare(before, after)]
+    changes = [(system, change) for system, before, after in _pair(old, new) for change in compare(before, after)]
     if page is not None:
         _write(page, old, new, changes)
     if as_json:
@@ -68,10 +78,6 @@ def _tell(changes: list[Change]) -> None:
 
 def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
     """Raises Rejected where the page cannot be written."""
-    from pathlib import Path
-
-    from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.files import write_out
     from avow.report.comparison import render_comparison
 
     text = render_comparison(old, new or "the workspace as it is", changes)
@@ -79,3 +85,70 @@ def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change
         write_out(Path(page), text.encode("utf-8", "replace").decode())
     except OSError as error:
         raise Rejected(Diagnostic("DIFF002", f"{page} cannot be written: {error.strerror}")) from None
+
+
+def _pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
+    """(system, before, after) for every system that either side has. Raises Rejected."""
+    before, after = _snapshots(old), _snapshots(new)
+    if len(before) == len(after) == 1:  # two reports of one system may stand under different names
+        (name, one), (_, other) = next(iter(before.items())), next(iter(after.items()))
+        yield name, one, other
+        return
+    nothing = Snapshot("", {}, {})
+    for name in dict.fromkeys((*before, *after)):
+        if Path(old).exists() and name not in before:
+            continue  # one report or ledger against all of the workspace: only its own system is meant
+        yield name, before.get(name, nothing), after.get(name, nothing)
+
+
+def _snapshots(name: str | None) -> dict[str, Snapshot]:
+    """System → its snapshot, from a report, a ledger, a revision, or (None) the workspace as it is. Raises Rejected."""
+    path = Path(name) if name is not None else None
+    if path is not None and path.suffix == ".jsonl" and path.is_file():
+        return {path.stem: of_ledger(path.stem, _records(path))}
+    if path is not None and (path.is_file() or (path / "report.json").is_file()):
+        case = read_case(path)
+        return {case.system: of_case(case)}
+    place = workspace()
+    if name is None:
+        return _of_contracts(place, place)
+    with tempfile.TemporaryDirectory() as folder:
+        _checkout(place, name, Path(folder))
+        return _of_contracts(Workspace(Path(folder)), place)
+
+
+def _records(path: Path) -> tuple[Entry, ...]:
+    """Raises Rejected."""
+    with readable(path):
+        return Ledger(path).records()
+
+
+def _checkout(place: Workspace, revision: str, folder: Path) -> None:
+    """The contracts as of a revision. Raises Rejected."""
+    try:
+        git.write_files(place.root, revision, place.contracts.name, folder)
+    except (git.GitFailed, OSError) as error:
+        message = f"'{revision}' is no report, ledger or revision here: {error}"
+        raise Rejected(Diagnostic("DIFF001", message)) from None
+
+
+def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:
+    found = {}
+    for folder in contracts.systems():
+        surveyed = survey(folder)
+        if isinstance(surveyed, Rejected):
+            found[folder.name] = Snapshot(folder.name, {}, {})
+            continue
+        system = surveyed.system
+        case = conclude(
+            facts_of_system(
+                system,
+                surveyed.catalogue.obligations,
+                _records(place.ledger(system.name)),
+                keys=surveyed.keys,
+                today=date.today(),
+                run=RunInfo("diff", "", 0.0, __version__),
+            )
+        )
+        found[system.name] = of_case(case)
+    return found

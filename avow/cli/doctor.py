@@ -16,7 +16,7 @@ def command(as_json: bool) -> int:
 
     found = findings()
     if as_json:
-        click.echo(document({"tools": [f.json() for f in found]}))
+        click.echo(document({"tools": found}))
     else:
         from rich.console import Console
         from rich.markup import escape
@@ -24,8 +24,8 @@ def command(as_json: bool) -> int:
 
         table = Table("for", "tool", "version", "where, or how to get it", box=None, header_style="bold")
         for f in found:
-            state = f"[green]{f.tool.version}[/]" if f.tool.present else "[yellow]missing[/]"
-            where = f.tool.path or "" if f.tool.present else f.tool.install
-            table.add_row(escape(f.used_by), escape(f.tool.name), state, escape(where))
+            state = "[yellow]missing[/]" if f.version is None else f"[green]{f.version}[/]"
+            where = f.install if f.version is None else f.path or ""
+            table.add_row(escape(f.used_by), escape(f.tool), state, escape(where))
         Console(highlight=False, soft_wrap=True).print(table)
-    return 3 if any(not f.tool.present and not f.tool.optional for f in found) else 0
+    return 3 if any(f.version is None and not f.optional for f in found) else 0

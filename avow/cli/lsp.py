@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.workspace import find_workspace
+from avow.evidence.ledger import Ledger
+from avow.system.plan_file import read_plan
+
+if TYPE_CHECKING:
+    from avow.lsp.features import StatusLookup
 
 
 @click.command()
 def command() -> int:
     """Serve an editor on standard input and output: messages, fixes, completion, rename, references, sanity."""
-    from avow.base.diagnostics import Diagnostic, Rejected
-
     try:
-        from avow.cli.clause_status import standing
         from avow.lsp.server import serve
     except ImportError:
         raise Rejected(
@@ -19,3 +27,40 @@ def command() -> int:
         ) from None
     serve(standing)
     return 0
+
+
+def standing(file: str) -> StatusLookup:
+    """The latest verdict of each method on each guarantee of the system that the file belongs to: shown when hovering
+    over them.
+
+    What the ledger holds may be about an older text: finding that out takes more than an editor waits for, so the
+    answer says when the verdict was given. Files outside a workspace have no status.
+    """
+    path = Path(file).resolve()
+    workspace = find_workspace(path.parent)
+    if workspace is None or not path.is_relative_to(workspace.contracts):
+        return lambda node, clause: None
+    system = _system(path.parent)
+    try:
+        entries = Ledger(workspace.ledger(system)).records()
+    except OSError:
+        entries = ()
+    latest: dict[str, dict[str, str]] = {}
+    for entry in entries:
+        evidence = entry.evidence
+        said = f"{evidence.verdict} by {evidence.method} ({evidence.started[:16].replace('T', ' ')})"
+        latest.setdefault(evidence.obligation, {})[evidence.method] = said
+
+    def lookup(node: str, clause: str) -> str | None:
+        found = latest.get(f"{system}/{node}/guarantee/{clause}")
+        return "last time: " + ", ".join(found[method] for method in sorted(found)) if found else None
+
+    return lookup
+
+
+def _system(folder: Path) -> str:
+    """The name of the system in a folder: its plan's, else the folder's."""
+    try:
+        return read_plan(folder / "plan.yaml")[0].system
+    except (Rejected, OSError):
+        return folder.name

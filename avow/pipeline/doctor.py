@@ -6,7 +6,6 @@ import shutil
 import sys
 from dataclasses import replace
 from importlib import metadata
-from typing import Any
 
 from avow.backend_kit.registry import backend, names
 from avow.base.records import dataclass
@@ -27,31 +26,26 @@ _PACKAGES = (
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    used_by: str
-    tool: Tool
+    """A tool, and what it is used by; no version where it is missing."""
 
-    def json(self) -> dict[str, Any]:
-        tool = self.tool
-        return {
-            "used_by": self.used_by,
-            "tool": tool.name,
-            "version": tool.version,
-            "path": tool.path,
-            "install": tool.install,
-            "optional": tool.optional,
-        }
+    used_by: str
+    tool: str
+    version: str | None
+    path: str | None
+    install: str
+    optional: bool
 
 
 def findings() -> tuple[Finding, ...]:
-    python = Tool("python", sys.version.split()[0], sys.executable, "", optional=False)
-    found = [Finding("everything", python)]
-    found += [Finding(use, _package(name, install, optional)) for use, name, install, optional in _PACKAGES]
     strace = find_tool("strace", ("-V",), install=INSTALL)
-    found.append(Finding("what tools read", strace if traces() else replace(strace, version=None, install=remedy())))
-    found.append(Finding("sandbox", find_tool("bwrap", install="sudo apt install bubblewrap")))
-    for name in names():
-        found += [Finding(name, tool) for tool in backend(name).tools()]
-    return tuple(found)
+    found = [
+        ("everything", Tool("python", sys.version.split()[0], sys.executable, "", optional=False)),
+        *((use, _package(name, install, optional)) for use, name, install, optional in _PACKAGES),
+        ("what tools read", strace if traces() else replace(strace, version=None, install=remedy())),
+        ("sandbox", find_tool("bwrap", install="sudo apt install bubblewrap")),
+        *((name, tool) for name in names() for tool in backend(name).tools()),
+    ]
+    return tuple(Finding(use, t.name, t.version, t.path, t.install, t.optional) for use, t in found)
 
 
 def _package(name: str, install: str, optional: bool) -> Tool:

@@ -131,7 +131,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
     def _write_index(self) -> None:
         if self._state.read:  # else nothing can have changed
-            from avow.pipeline.index_page import index_is_due, mark_earlier, write_overview
+            from avow.pipeline.assess import index_is_due, mark_earlier, write_overview
 
             try:
                 mark_earlier(self._state)
@@ -143,7 +143,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     def _earlier(self) -> tuple[str, ...]:
         if not self._state.read:
             return ()
-        from avow.pipeline.index_page import earlier
+        from avow.pipeline.assess import earlier
 
         return earlier(self._state)
 

@@ -15,62 +15,45 @@ from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
 
-MARKS = {
-    Status.PROVED: "✔",
-    Status.CHECKED: "✔",
-    Status.TESTED: "◐",
-    Status.MONITORED: "◐",
-    Status.REVIEWED: "◔",
-    Status.JUSTIFIED: "◔",
-    Status.LINKED: "↳",
-    Status.PARTIAL: "◑",
-    Status.VACUOUS: "∅",
-    Status.UNKNOWN: "?",
-    Status.NOT_RUN: "–",
-    Status.ERROR: "!",
-    Status.STALE: "⟲",
-    Status.MISSING: "·",
-    Status.UNSUPPORTED: "▽",
-    Status.CIRCULAR: "↻",
-    Status.REFUTED: "✘",
-    Status.CONTRADICTORY: "⚡",
+_SHOWN = {
+    Status.PROVED: ("✔", "good", "for all behaviours and inputs, by a sound method"),
+    Status.CHECKED: ("✔", "good", "exhaustively, within a finite scenario"),
+    Status.TESTED: ("◐", "fair", "on a number of cases"),
+    Status.MONITORED: ("◐", "fair", "on a recorded or live trace"),
+    Status.REVIEWED: ("◔", "fair", "by a person who said what was read and concluded"),
+    Status.JUSTIFIED: ("◔", "fair", "a person's dated reason, in place of evidence"),
+    Status.LINKED: ("↳", "fair", "a person says that what stands below it, which holds, amounts to it"),
+    Status.PARTIAL: (
+        "◑",
+        "open",
+        "partial correctness: proved of every run that ends; that all of them do is not shown",
+    ),
+    Status.VACUOUS: ("∅", "open", "it passed, but its trigger was never met: it supports nothing"),
+    Status.UNKNOWN: ("?", "open", "the method gave up"),
+    Status.NOT_RUN: ("–", "open", "the tool is not here"),
+    Status.ERROR: ("!", "open", "the tool failed, or its answer could not be read"),
+    Status.STALE: ("⟲", "open", "there was evidence, but what it was about has changed since"),
+    Status.MISSING: ("·", "open", "nobody has tried"),
+    Status.UNSUPPORTED: ("▽", "open", "nothing speaks against it, but something that it rests on fails"),
+    Status.CIRCULAR: ("↻", "bad", "it would support itself: refused"),
+    Status.REFUTED: ("✘", "bad", "false: there is a counterexample"),
+    Status.CONTRADICTORY: (
+        "⚡",
+        "bad",
+        "one tool proves it, another refutes it: one of them is wrong, or they were shown different things",
+    ),
 }
-"""A mark for each status: colour is never the only sign."""
+"""Of each status its mark (colour is never the only sign), its colour, and what it says."""
 
-MEANINGS = {
-    Status.PROVED: "for all behaviours and inputs, by a sound method",
-    Status.CHECKED: "exhaustively, within a finite scenario",
-    Status.TESTED: "on a number of cases",
-    Status.MONITORED: "on a recorded or live trace",
-    Status.REVIEWED: "by a person who said what was read and concluded",
-    Status.JUSTIFIED: "a person's dated reason, in place of evidence",
-    Status.LINKED: "a person says that what stands below it, which holds, amounts to it",
-    Status.PARTIAL: "partial correctness: proved of every run that ends; that all of them do is not shown",
-    Status.VACUOUS: "it passed, but its trigger was never met: it supports nothing",
-    Status.UNKNOWN: "the method gave up",
-    Status.NOT_RUN: "the tool is not here",
-    Status.ERROR: "the tool failed, or its answer could not be read",
-    Status.STALE: "there was evidence, but what it was about has changed since",
-    Status.MISSING: "nobody has tried",
-    Status.UNSUPPORTED: "nothing speaks against it, but something that it rests on fails",
-    Status.CIRCULAR: "it would support itself: refused",
-    Status.REFUTED: "false: there is a counterexample",
-    Status.CONTRADICTORY: "one tool proves it, another refutes it: "
-    "one of them is wrong, or they were shown different things",
-}
+MARKS = {status: mark for status, (mark, _, _) in _SHOWN.items()}
+MEANINGS = {status: meaning for status, (_, _, meaning) in _SHOWN.items()}
 
 _DIGEST = re.compile(r"[0-9a-f]{64}\Z")
-_GOOD = frozenset({Status.PROVED, Status.CHECKED})
-_BAD = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.CIRCULAR})
 
 
 def tone(status: Status) -> str:
     """``good``, ``fair``, ``open`` or ``bad``: the four colours."""
-    if status in _GOOD:
-        return "good"
-    if status in _BAD:
-        return "bad"
-    return "fair" if status.supports else "open"
+    return _SHOWN[status][1]
 
 
 def anchor(claim: str) -> str:

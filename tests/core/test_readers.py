@@ -27,10 +27,9 @@ from avow.fretish.project import _Export
 from avow.isolation.judge import _Word
 from avow.kernel.certificate import Certificate
 from avow.lsp.background import _Wanted
-from avow.pipeline.assess import Rendering
+from avow.pipeline.assess import Rendering, _Overview
 from avow.pipeline.check import Checked
 from avow.pipeline.export import Stamp
-from avow.pipeline.index_page import _Overview
 from avow.pipeline.shortcut import _Settled
 from avow.pipeline.workload import Listing
 

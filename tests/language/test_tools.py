@@ -280,7 +280,7 @@ def test_standing_of_a_guarantee(workspace: Path) -> None:
     """Hovering shows each method's latest verdict from the ledger, and nothing where there is none."""
     from avow.base.verdict import Link, Verdict
     from avow.base.workspace import Workspace
-    from avow.cli.clause_status import standing
+    from avow.cli.lsp import standing
     from avow.evidence.ledger import Ledger
     from avow.evidence.record import Evidence
 

@@ -172,9 +172,8 @@ def test_doctor_prints_install_commands_whole(
 ) -> None:
     """Brackets once were taken for markup, so that the extra's name was missing."""
     import avow.pipeline.doctor as doctor
-    from avow.base.tools import Tool
 
-    told = doctor.Finding("a [use]", Tool("thing", None, None, "pip install 'avow[signing]'", True))
+    told = doctor.Finding("a [use]", "thing", None, None, "pip install 'avow[signing]'", True)
     monkeypatch.setattr(doctor, "findings", lambda: (told,))
     from avow.cli import main
 

@@ -16,7 +16,7 @@ from avow.evidence.status import Status
 from avow.report import formats
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page
-from avow.report.wording import bound_text, gate_line, tool_command
+from avow.report.wording import bound_text, gate_line, tone, tool_command
 from avow.sanity.claims import Property
 from avow.system.plan import Requirement
 
@@ -95,6 +95,10 @@ def test_one_word_for_one_meaning_in_every_format_for_people() -> None:
     assert '"monitored"' in made["report.json"]
     assert "monitored" in made["report.sarif"]
     assert GONE & set(map(said, Status)) == set()
+
+
+def test_only_what_supports_a_claim_has_a_good_colour() -> None:
+    assert {s for s in Status if tone(s) in ("good", "fair")} == {s for s in Status if s.supports}
 
 
 def test_a_plan_may_use_either_word() -> None:
