@@ -127,7 +127,7 @@ class RosMonitoringBackend(Backend):
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
         from .configuration import identifier
-        from .ends import method_of
+        from .observing import method_of
         from .options import usable
         from .rml.translate import translate
 
@@ -250,8 +250,8 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
     """The node's own monitor, and those of the nodes from which its data comes: as far as they can be watched."""
     from avow.system.graph import dataflow
 
-    from .ends import method_of
     from .engine import Monitor
+    from .observing import method_of
     from .options import setup
 
     system, names = job.system, dataflow(job.system).upstream(job.node.name)

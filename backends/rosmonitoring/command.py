@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from avow.system.plan import System
 
     from .engine import Monitor
+    from .judged import Recorder
     from .lanes import Marks
-    from .mcap_file import Recorder
     from .session import Session
     from .watched import Violation
 
@@ -142,7 +142,7 @@ class _Telling:
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
     from .configuration import of_system
-    from .ends import method_of
+    from .observing import method_of
     from .session import session
 
     setups = [monitor.setup for monitor in session(system, nodes).monitors]
@@ -236,8 +236,7 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
 
 def _recorder(running: Session, path: Path) -> Recorder:
     """An MCAP that hears each judgement. Raises Rejected."""
-    from .judged import Telling
-    from .mcap_file import Recorder
+    from .judged import Recorder, Telling
 
     recorder = Recorder(path)
     for monitor in running.monitors:

@@ -20,13 +20,11 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
-from .clocks import SIMULATED, By, Clock
 from .coverage import Tally
-from .doubts import Doubts
-from .latest import judge_latest, not_met
-from .memory import SoFar, hear, overdue, soonest, watching
+from .latest import Doubts, SoFar, judge_latest, not_met
+from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
-from .pace import Passage, Timing
+from .pace import SIMULATED, By, Clock, Passage, Timing
 from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
 from .parts import came, finish, judge_part, own, scatter
 from .reading import Reader, reader

@@ -23,8 +23,8 @@ from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort
+from avow.ros.bags import Origin
 
-from .bags import Origin
 from .judged import as_float
 from .options import Setup, same_topic
 from .reading import Reader, reader

@@ -1,18 +1,87 @@
-"""What a monitor does with a clause that is judged by the latest values."""
+"""What a monitor does with a clause that is judged by the latest values.
+
+A node promises nothing once one of its assumptions was broken (`SoFar`). On a running graph each topic has its own
+connection: what is heard first need not have been said first. So there a breach by the order of arrival waits until
+what was heard within `LIVE_APART` of it is known (`Doubts`), and is told where it is one whichever of these messages of
+other topics came before it; else it is undecided. What its clause remembers of steps hangs on all that came before:
+where that is of several topics, a breach is undecided.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
+from avow.language.contract import ClauseKind
 
-from .memory import UNSURE, blamed
-from .pairing import time_of
+from .options import same_topic
+from .pairing import Answers, Asked, Pairing, ticks, time_of
+from .rules import Choice, Fields
+from .tuning import LIVE_APART
 from .watched import Answer, Fault, Violation, Watched
 
 if TYPE_CHECKING:
     from .engine import Monitor
+
+UNSURE = "it is not known whether the assumptions have held so far"
+
+
+@dataclass(slots=True)
+class SoFar:
+    """Whether the assumptions of a node that remembers have held so far: it promises nothing once one was broken."""
+
+    jitter: Fraction
+    """By which a clock may go back."""
+    broken: str = ""
+    unsure: bool = False
+    """A message of an assumption was not seen, or nobody could tell whether one held."""
+    newest: Fraction | None = None
+    """The latest time of a message, in the run that goes on."""
+
+    def hears(self, now: Fraction, timed: Sequence[Watched]) -> None:
+        """A message has come. Where times go back further than a clock does, a run begins anew for all clauses at once:
+        were it for each at its own next step, an assumption broken between would be forgotten."""
+        if self.newest is not None and now < self.newest - self.jitter:
+            self.broken, self.unsure, self.newest = "", False, now
+            for watched in timed:
+                assert watched.steps is not None
+                watched.steps.restart()
+        self.newest = now if self.newest is None else max(now, self.newest)
+
+    def note(self, watched: Watched) -> None:
+        """A clause was judged: an assumption?"""
+        if watched.clause.kind is not ClauseKind.ASSUMPTION:
+            return
+        if watched.truth is False:
+            self.broken = self.broken or watched.clause.name
+        self.unsure = self.unsure or watched.truth is None
+
+
+def blamed(
+    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool, so_far: SoFar | None,
+    event: int,
+) -> tuple[Fault, str] | None:  # fmt: skip
+    """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
+    if watched.truth is None:
+        return None
+    said = watched.said
+    if watched.clause.kind is ClauseKind.ASSUMPTION:
+        return Fault.ASSUMPTION, said
+    for assumed in assumptions:
+        if assumed.steps is not None or any(n not in values for n in assumed.names):
+            continue
+        if assumed.truth_of(values, solver) is False:
+            if so_far is not None:
+                so_far.broken = so_far.broken or assumed.clause.name
+            return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
+    if so_far is not None and so_far.broken:
+        return Fault.EXCUSED, f"{said}; but the assumption {so_far.broken} did not hold before"
+    # an assumption about the node's own answers is judged with the answer, of which a part may be missing
+    late = (a.steps for a in assumptions if a.steps is not None and a.steps.answers and a.steps.stepped != event)
+    return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
 
 
 def judge_latest(
@@ -78,3 +147,49 @@ def not_met(
     if fault is Fault.EXCUSED:
         tally.excused += 1
     found.append(monitor.violation(fault, watched.clause.name, event, why + late, watched, values))
+
+
+REMEMBERS = "it speaks of other steps and of several topics, whose order a running graph does not tell"
+
+
+@dataclass(slots=True)
+class Doubts:
+    """The breaches of one node that wait."""
+
+    pairing: Pairing
+    """The messages of each variable, and the breaches, as answers that may have answered any of those."""
+    latest: int = 0
+    """The event of the latest guarantee that was not met."""
+
+    @staticmethod
+    def beginning(values: Mapping[str, Value]) -> Doubts:
+        """`values`: what is known before any message."""
+        pairing = Pairing(Answers("latency", jitter=LIVE_APART))
+        for name, value in values.items():
+            pairing.saw(name, -1, -1.0, None, value, 0)
+        return Doubts(pairing)
+
+    def ask(self, monitor: Monitor, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any]) -> bool:
+        """Whether a breach is not told yet."""
+        topic = same_topic(str(event.get("topic", "")))
+        spoken = [n for n in dict.fromkeys(monitor.spoken(watched)) if n in values or n not in watched.names]
+        rules = monitor.setup.rules
+        topics = {n: same_topic(r.topic) for n in spoken if isinstance(r := rules.get(n), Fields | Choice)}
+        inputs = tuple(n for n, of in topics.items() if of != topic)
+        guarantee = watched.clause.kind is ClauseKind.GUARANTEE
+        remembers = watched.steps is not None or (monitor.so_far is not None and guarantee)
+        if not inputs or (remembers and watched.clause.pace is not None):
+            return False
+        if guarantee:
+            self.latest = monitor.events
+        if remembers:
+            if len(set(topics.values())) < 2:
+                return False
+            watched.tally.unsure(REMEMBERS)
+            return True
+        own = tuple(n for n in spoken if n not in inputs and n in values)
+        now, heard, known = time_of(event), monitor.heard_of(watched.names), tuple(values[n] for n in own)
+        asked = Asked(watched, event, monitor.events, own, known, inputs, ticks(now), float(now), None, heard, ())
+        asked.needless = frozenset(inputs).difference(watched.names)
+        self.pairing.ask(asked)
+        return True

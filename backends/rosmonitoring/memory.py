@@ -9,31 +9,32 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import product
 from typing import Any, NoReturn
 
+from avow.base.tuning.bounds import POINTS_OF_ARGUMENTS
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
-from avow.evaluation.running import Keeper
+from avow.evaluation.running import Keeper, unnamed
 from avow.formulas.formula import conjunction, free_variables
-from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.temporal.ages import CLOCK, ELAPSED, Side
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid
 from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
 from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending, responding
-from avow.formulas.values import Value
+from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
-from avow.language.subterms import histories, timed
-from avow.language.terms import History, Implies, Literal, Past, Quantified, Role, Term, Variable
+from avow.language.subterms import histories, subterms, timed
+from avow.language.terms import Apply, History, Implies, Literal, Past, Quantified, Role, Term, Variable
 
 from .coverage import Tally
 from .options import Setup
 from .pace import Leeway
 from .pairing import time_of
 from .rules import Choice, Fields, Previous
-from .silence import Silence, moments
-from .watched import Fault, Watched, trigger_of
+from .watched import Watched, trigger_of
 from .word import untold
 
 
@@ -54,6 +55,76 @@ class _Unknown:
 
 
 numbers.Rational.register(_Unknown)  # a Fraction of it asks for its numerator
+
+
+Moments = Callable[[Mapping[str, Value]], Iterator[Value]]
+
+
+@dataclass(slots=True)
+class Silence:
+    """What a clause with limits in seconds is like between steps, and when its steps were."""
+
+    holds: Mapping[Side, Callable[[Mapping[str, Value]], Value]]
+    """Whether it holds so many seconds (`ELAPSED`) after a step."""
+    breaks: tuple[Moments, ...]
+    """How many seconds after a step it may change."""
+    period: Fraction | None
+    """Of a clause that says that steps come every so many seconds."""
+    leeway: Leeway
+    latest: Fraction | None = None
+    """When its latest step was."""
+    elapsed: Fraction = Fraction(0)
+    """The time from the latest step to the next, which is being judged."""
+    told: bool = False
+    """That it was broken since, has been told."""
+    spared: Fraction | None = None
+    """Where the step that is being judged came a little after a deadline: the time to it, `elapsed` to the deadline."""
+
+    def broken(self, memory: Mapping[str, Value]) -> Fraction | None:
+        """How long after the latest step silence breaks the clause; None where it never does. Raises NotEvaluable."""
+
+        def at(side: Side, elapsed: Fraction) -> bool:
+            return bool(self.holds[side]({**memory, ELAPSED.qualified: elapsed}))
+
+        if not at(Side.AFTER, Fraction(0)):
+            return Fraction(0)
+        times = {Fraction(t) for each in self.breaks for t in each(memory) if isinstance(t, int | Fraction)}
+        for time in sorted(t for t in times if t > 0):
+            if not at(Side.AT, time) or not at(Side.AFTER, time):
+                return time
+        return None
+
+    def passed(self, now: Fraction) -> None:
+        """A step comes."""
+        self.elapsed = max(now - self.latest, Fraction(0)) if self.latest is not None else Fraction(0)
+        if self.period is not None and abs(self.elapsed - self.period) <= self.leeway.jitter:
+            self.elapsed = self.period
+
+
+def _moments(at: Term) -> Moments:
+    """The values of a term over memory; where it hangs on quantified variables, at all that is remembered of these and
+    at values of which nothing is. They raise NotEvaluable."""
+    value = compile_term(at)
+    bound = sorted({v for v in free_variables(at) if v.role is Role.BOUND}, key=lambda v: v.name)
+    if not bound:
+        return lambda memory: iter((value(memory),))
+    applied = [t for t in subterms(at) if isinstance(t, Apply) and isinstance(t.function, Variable)]
+    places = {v: [(t.function, t.arguments.index(v)) for t in applied if v in t.arguments] for v in bound}
+
+    def each(memory: Mapping[str, Value]) -> Iterator[Value]:
+        known: list[list[Value]] = []
+        for variable in bound:
+            found = dict.fromkeys((unnamed(variable.sort),))
+            for function, place in places[variable]:
+                table = memory[function.qualified] if isinstance(function, Variable) else None
+                found |= dict.fromkeys(k[place] for k in table.table) if isinstance(table, FunctionValue) else {}
+            known.append(list(found))
+        for count, point in enumerate(product(*known)):
+            if count >= POINTS_OF_ARGUMENTS:
+                raise NotEvaluable("too many combinations of values are remembered")
+            yield value({**memory, **{v.name: p for v, p in zip(bound, point, strict=True)}})
+
+    return each
 
 
 class Memory:
@@ -234,62 +305,6 @@ class Memory:
 
 
 MUTE = "a response is due of which no message was ever heard: its topic may not have been recorded"
-UNSURE = "it is not known whether the assumptions have held so far"
-
-
-@dataclass(slots=True)
-class SoFar:
-    """Whether the assumptions of a node that remembers have held so far: it promises nothing once one was broken."""
-
-    jitter: Fraction
-    """By which a clock may go back."""
-    broken: str = ""
-    unsure: bool = False
-    """A message of an assumption was not seen, or nobody could tell whether one held."""
-    newest: Fraction | None = None
-    """The latest time of a message, in the run that goes on."""
-
-    def hears(self, now: Fraction, timed: Sequence[Watched]) -> None:
-        """A message has come. Where times go back further than a clock does, a run begins anew for all clauses at once:
-        were it for each at its own next step, an assumption broken between would be forgotten."""
-        if self.newest is not None and now < self.newest - self.jitter:
-            self.broken, self.unsure, self.newest = "", False, now
-            for watched in timed:
-                assert watched.steps is not None
-                watched.steps.restart()
-        self.newest = now if self.newest is None else max(now, self.newest)
-
-    def note(self, watched: Watched) -> None:
-        """A clause was judged: an assumption?"""
-        if watched.clause.kind is not ClauseKind.ASSUMPTION:
-            return
-        if watched.truth is False:
-            self.broken = self.broken or watched.clause.name
-        self.unsure = self.unsure or watched.truth is None
-
-
-def blamed(
-    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool, so_far: SoFar | None,
-    event: int,
-) -> tuple[Fault, str] | None:  # fmt: skip
-    """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
-    if watched.truth is None:
-        return None
-    said = watched.said
-    if watched.clause.kind is ClauseKind.ASSUMPTION:
-        return Fault.ASSUMPTION, said
-    for assumed in assumptions:
-        if assumed.steps is not None or any(n not in values for n in assumed.names):
-            continue
-        if assumed.truth_of(values, solver) is False:
-            if so_far is not None:
-                so_far.broken = so_far.broken or assumed.clause.name
-            return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
-    if so_far is not None and so_far.broken:
-        return Fault.EXCUSED, f"{said}; but the assumption {so_far.broken} did not hold before"
-    # an assumption about the node's own answers is judged with the answer, of which a part may be missing
-    late = (a.steps for a in assumptions if a.steps is not None and a.steps.answers and a.steps.stepped != event)
-    return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
 
 
 def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
@@ -308,7 +323,7 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
                 holds, breaks = records.instants(positions)
                 formula = positions.now
                 compiled = {side: compile_term(held) for side, held in holds.items()}
-                moved = tuple(map(moments, breaks))
+                moved = tuple(map(_moments, breaks))
                 period = clause.pace.amount if clause.pace is not None and clause.pace.relation == "==" else None
                 every = Fraction(period.value) if isinstance(period, Literal) else None
                 silence = Silence(compiled, moved, every, setup.leeway)

@@ -18,7 +18,7 @@ from avow.language.contract import Node, Port, Topic
 from avow.language.load import parse_term
 from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.ros.bags import publisher
+from avow.ros.bags import Event, Origin, is_bag, publisher
 from avow.ros.calls import CALL, part_topic
 from avow.ros.definitions import Definitions, Message, Wire
 from avow.ros.sources import definitions
@@ -26,16 +26,28 @@ from avow.system.graph import dataflow
 from avow.system.plan import Edge, Located, System
 
 from . import observing
-from .bags import Event, Origin, carried, is_bag
-from .clocks import By
-from .ends import mapping_of, method_of, published, said, show_entry, sources, written_out
 from .fitting import Undecided
 from .numbers import whole
-from .observing import Observed, Wrong, check_keys, literal, observe, table_of
-from .pace import NO_TIME, RATE, Leeway, Rate, duration
+from .observing import (
+    Observed,
+    Wrong,
+    check_keys,
+    literal,
+    mapping_of,
+    method_of,
+    observe,
+    published,
+    said,
+    show_entry,
+    sources,
+    table_of,
+    written_out,
+)
+from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import Answers
 from .reading import from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise
+from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError
 

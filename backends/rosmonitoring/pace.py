@@ -1,4 +1,4 @@
-"""Rates and losses of the messages that a monitor hears: judged by their own times, whatever they say."""
+"""When the messages that a monitor hears come, by which clock, at which rate, and what was lost; whatever they say."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from enum import StrEnum
 from fractions import Fraction
-from typing import Any
 
 from avow.base.tuning.bounds import INSTANCES
 from avow.formulas.values import show
+from avow.ros.bags import Event
 
 from .pairing import time_of
-from .tuning import GRACE, JITTER, RATE_MESSAGES
+from .reading import at
+from .rules import FieldPath
+from .tuning import EVENTS_WITHOUT_CLOCK, GRACE, JITTER, RATE_MESSAGES
+from .wires import MappingError, seconds
 
 RATE = re.compile(r"([0-9]+(?:[.][0-9]+)?) ?Hz ?(?:±|[+]/?-) ?([0-9]+(?:[.][0-9]+)?) ?%")
 
@@ -119,7 +123,7 @@ class Passage:
     """Why a loss need not show."""
     latest: Fraction | None = None
 
-    def heard(self, event: Mapping[str, Any], now: Fraction) -> bool:
+    def heard(self, event: Event, now: Fraction) -> bool:
         """Whether messages before this one were lost, or come later, by their numbers (which may never be set)."""
         if self.latest is not None and now < self.latest:
             self.disordered += 1
@@ -143,7 +147,7 @@ SEQUENCE = ("header", "seq")
 """Where a message of ROS 1 has its number."""
 
 
-def sequence(event: Mapping[str, Any]) -> int | None:
+def sequence(event: Event) -> int | None:
     """A message's number among its publisher's."""
     header = event.get("header")
     number = header.get("seq") if isinstance(header, Mapping) else None
@@ -167,7 +171,7 @@ class Timing:
     _since: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
     """When each variable with a deadline was last heard of, and whether its silence has been told."""
 
-    def passes(self, event: Mapping[str, Any], names: Set[str]) -> Iterator[tuple[str, str, bool]]:
+    def passes(self, event: Event, names: Set[str]) -> Iterator[tuple[str, str, bool]]:
         """An event of whatever topic: time has passed. Deadlines do not wait for the next message: what is late is told
         once, at the first event of the run that comes later (variable, what is wrong, whether it is silent)."""
         if not self.fresh and not self.rates:
@@ -191,7 +195,7 @@ class Timing:
             if name in names and (wrong := pace.beat(now)):
                 yield name, f"{name} is too fast: {wrong}", False
 
-    def hear(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> bool:
+    def hear(self, event: Event, topic: str, names: Iterable[str]) -> bool:
         """A message of one of the monitor's topics; whether others before it were lost, or came out of order."""
         now = time_of(event)
         missed = self.passages.setdefault(topic, Passage()).heard(event, now)
@@ -199,7 +203,7 @@ class Timing:
         self.newest = max(self.newest, math.nextafter(float(now), math.inf))
         return missed
 
-    def caught_up(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> None:
+    def caught_up(self, event: Event, topic: str, names: Iterable[str]) -> None:
         """Take over the latest of some messages whose times were looked at elsewhere."""
         now = time_of(event)
         passage = self.passages[topic]
@@ -215,3 +219,61 @@ class Timing:
         left = [since + self.fresh[name] for name, (since, told) in self._since.items() if not told]
         left += [at for pace in self.paces.values() if (at := pace.deadline) is not None]
         return math.nextafter(float(min(left)), 0.0) if left else math.inf
+
+
+SIMULATED = "clock"
+"""The topic of rosgraph_msgs/Clock, without its slash."""
+
+
+class By(StrEnum):
+    RECEIPT = "receipt"
+    SIM = "sim"
+    STAMP = "stamp"
+
+
+class Clock:
+    """Gives events the time of another clock. Those before its first reading wait for it."""
+
+    def __init__(self, by: By) -> None:
+        self._by = by
+        self._now: Fraction | None = None
+        self._waiting: list[tuple[int, Event, int]] = []
+        self._dropped = False
+        self._moved = False
+
+    def ready(self, index: int, event: Event, place: int) -> Iterator[tuple[int, Event, int]]:
+        """The events that can be judged now, each with its number and its place in the trace."""
+        read = self._read(event)
+        self._moved = self._moved or (read is not None and self._now is not None and read != self._now)
+        self._now = self._now if read is None else read
+        if self._now is None:
+            self._dropped = len(self._waiting) == EVENTS_WITHOUT_CLOCK
+            if not self._dropped:
+                self._waiting.append((index, event, place))
+            return
+        for each in (*self._waiting, (index, event, place)):
+            yield each[0], {**each[1], "time": self._now}, each[2]
+        self._waiting.clear()
+
+    def passed(self, event: Event) -> Event | None:
+        """Time has passed by the recording's clock, which says nothing of this one."""
+        return None if self._now is None else {**event, "time": self._now}
+
+    def finish(self) -> str:
+        """Why the run is no evidence: the clock was never read, or stood still."""
+        if self._by is By.SIM and self._now is not None and not self._moved:
+            return f"/clock stood still, by which the plan goes (`time: {self._by}`)"
+        what = "no message of /clock came" if self._by is By.SIM else "no message had a `header.stamp`"
+        if self._dropped and not self._waiting:
+            what = f"more than {EVENTS_WITHOUT_CLOCK} events came before the first time"
+        return f"{what}, by which the plan goes (`time: {self._by}`)" if self._waiting or self._dropped else ""
+
+    def _read(self, event: Event) -> Fraction | None:
+        way: FieldPath = ("clock",) if self._by is By.SIM else ("header", "stamp")
+        if self._by is By.SIM and str(event.get("topic", "")).lstrip("/") != SIMULATED:
+            return None
+        try:
+            read = seconds(at(event, way))
+        except MappingError:
+            return None
+        return None if self._by is By.STAMP and not read else read  # ROS leaves 0 where nobody has set it

@@ -10,19 +10,20 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
 from avow.language.contract import ClauseKind
+from avow.ros.bags import is_bag
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
-from .bags import is_bag, messages
 from .blame import Blame
 from .compiled.monitors import Compiled
 from .coverage import Tally
-from .ends import NAME, method_of
 from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
+from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
 from .told import readable
+from .traces import messages
 from .watched import Fault, Violation
 
 

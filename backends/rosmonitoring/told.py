@@ -3,26 +3,28 @@ bags whose messages are other than they are taken for."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.graphs import reached
 from avow.formulas.formula import free_variables
 from avow.formulas.values import show
 from avow.language.contract import Clause
 from avow.language.sorts import RealSort
 from avow.language.subterms import subterms
 from avow.language.terms import Compare, Role, Term, Variable, Widen
+from avow.ros.bags import Carried, Origin, is_bag
 from avow.ros.calls import is_service_part
-from avow.ros.definitions import FLOATS, Scalar
+from avow.ros.definitions import FLOATS, Definitions, Message, Scalar, canonical
 
-from .bags import Origin, carried, conflicts, is_bag
-from .compiled.regions import number_of
+from .compiled.plans import number_of
 from .options import Setup, same_topic
 from .reading import shown
 from .rules import Choice, Constant, Fields, Previous, Rule
+from .traces import carried
 from .wires import of_type
 
 
@@ -49,7 +51,46 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
         text = f"{path.name} is a ROS 1 bag, which cannot hold calls of services: {', '.join(calls)}"
         return (Diagnostic("MON206", text, hint="publish what is called and answered, or write a JSON trace"),)
     types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
-    return tuple(conflicts(path, found, setup.known, types))
+    return tuple(_conflicts(path, found, setup.known, types))
+
+
+def _conflicts(path: Path, found: Carried, known: Definitions, types: Mapping[str, str]) -> Iterator[Diagnostic]:
+    """Where a bag's topics are other than they are taken for: of another type (`types`: topic → type), or of a type
+    that is made otherwise."""
+    for topic, kind in types.items():
+        there = found.types.get(topic)
+        if there is None:
+            continue
+        if there != canonical(kind):
+            text = f"{path.name}: the topic {topic} is {there} there, and {canonical(kind)} in the contract"
+            yield Diagnostic("MON205", text)
+            continue
+        for name, mine, theirs in _differences(there, known.messages, found.known):
+            text = (
+                f"{path.name}: {name} is {_fields(theirs)} there, and {_fields(mine)} by "
+                f"{mine.source or 'the definition that is known'}"
+            )
+            yield Diagnostic(
+                "MON205", text, hint="the plan's `messages:` or `ros: {distro: …}` names another definition"
+            )
+
+
+def _differences(
+    name: str, mine: Mapping[str, Message], theirs: Mapping[str, Message]
+) -> Iterator[tuple[str, Message, Message]]:
+    def inner(at: str) -> list[str]:
+        fields = mine[at].fields if at in mine and at in theirs else ()
+        return [getattr(getattr(field.wire, "item", field.wire), "name", "") for field in fields]
+
+    for at in reached([name], inner):
+        one, other = mine.get(at), theirs.get(at)
+        if one is not None and other is not None and (one.fields, one.constants) != (other.fields, other.constants):
+            yield at, one, other
+
+
+def _fields(message: Message) -> str:
+    constants = [f"{name}={value}" for name, _, value in message.constants]
+    return "(" + ", ".join([*(f"{f.wire} {f.name}" for f in message.fields), *constants]) + ")"
 
 
 def readings(setup: Setup, span: Span | None) -> Iterator[Diagnostic]:

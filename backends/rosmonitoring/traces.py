@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.codec import once
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.ros import bags
+from avow.ros.bags import NOWHERE, Carried, Event, Origin, is_bag
 
-from .bags import NOWHERE, Event, Origin, is_bag, messages
 from .numbers import Decimal, NotANumber, exact
 from .tuning import EVENT_CHARACTERS, LATEST_TIME
 
@@ -113,6 +115,28 @@ def read_trace(
         raise not_text(str(path)) from None
     except OSError as error:
         raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
+
+
+def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
+    """As `avow.ros.bags.carried`. Raises Rejected."""
+    with _told():
+        return bags.carried(path, origin)
+
+
+def messages(
+    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
+) -> Iterator[tuple[Event, int]]:
+    """As `avow.ros.bags.messages`. Raises Rejected."""
+    with _told():
+        yield from bags.messages(path, origin, wanted)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    try:
+        yield
+    except bags.NoBag as wrong:
+        raise Rejected(Diagnostic("MON202" if wrong.missing else "MON203", str(wrong), hint=wrong.hint)) from None
 
 
 def digest_trace(path: Path) -> str:

@@ -45,7 +45,7 @@ NOT_TUNED = {
     ("backends/ajpf/asking.py", "_FORM"),  # of a file
     ("backends/ajpf/mind.py", "NONE"),
     ("backends/review/record.py", "FORMAT"),  # of a file
-    ("backends/rosmonitoring/mcap_file.py", "_LAST"),  # the last time that the format has
+    ("backends/rosmonitoring/judged.py", "_LAST"),  # the last time that the format has
 }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from avow.backends.rosmonitoring import clocks
+from avow.backends.rosmonitoring import pace
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.session import session
 from avow.backends.rosmonitoring.watched import Fault
@@ -79,7 +79,7 @@ def test_without_the_clock_nothing_is_judged(make_system: Make, monkeypatch: pyt
         unset.step({**event, "header": {"stamp": time(0)}})
     assert unset.finish() == []
     assert "no message had a `header.stamp`" in unset.backwards
-    monkeypatch.setattr(clocks, "EVENTS_WITHOUT_CLOCK", 5)
+    monkeypatch.setattr(pace, "EVENTS_WITHOUT_CLOCK", 5)
     late = Monitor(found(made(make_system, "sim")))
     events = run("sim", 2.9)
     for event in (*[e for e in events if e["topic"] != "/clock"][:9], *events):

@@ -12,7 +12,7 @@ import pytest
 from helpers import some
 
 from avow.backends.rosmonitoring.compiled.monitors import Compiled
-from avow.backends.rosmonitoring.compiled.regions import regions
+from avow.backends.rosmonitoring.compiled.plans import regions
 from avow.backends.rosmonitoring.compiled.shapes import scanner, shape
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup, setup

@@ -20,7 +20,8 @@ from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND
 from avow.backends.rosmonitoring.command import command
 from avow.backends.rosmonitoring.engine import Monitor
-from avow.backends.rosmonitoring.memory import Memory, SoFar
+from avow.backends.rosmonitoring.latest import SoFar
+from avow.backends.rosmonitoring.memory import Memory
 from avow.backends.rosmonitoring.options import Setup, setup
 from avow.backends.rosmonitoring.session import session
 from avow.backends.rosmonitoring.watched import Fault

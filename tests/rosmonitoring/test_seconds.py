@@ -14,9 +14,9 @@ from drawn.memory import TIMED_NODE, B, timed_formula, timed_response, word_of
 from oracle.seconds import InSeconds, Word
 
 from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.memory import Silence
 from avow.backends.rosmonitoring.options import Setup
 from avow.backends.rosmonitoring.pace import Leeway
-from avow.backends.rosmonitoring.silence import Silence
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected

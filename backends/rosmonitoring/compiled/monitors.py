@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import LIVE
+from avow.ros.bags import LIVE, Event
 
-from ..bags import Event
 from ..engine import Monitor
 from ..numbers import Decimal
 from ..options import same_topic
@@ -32,10 +31,9 @@ from ..rules import FieldPath, Previous
 from ..traces import event_of, not_text
 from ..tuning import BATCH, CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT, TEXT_BYTES
 from ..watched import Fault, Violation, time_text
-from .paired import Paired
+from .noted import Paired, Timed
 from .plans import Plan, Token, Watch, below, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
 from .shapes import Shape, scanner, shape
-from .timed import Timed
 
 Match = re.Match[bytes]
 Handler = Callable[[Match, int], Any]

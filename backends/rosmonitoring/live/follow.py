@@ -12,11 +12,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import LIVE
+from avow.ros.bags import LIVE, Event
 from avow.ros.calls import is_part
 from avow.ros.dds import domain_of
 
-from ..bags import Event
 from ..coverage import coverage
 from ..enforce import RAW, filtered
 from ..session import Session

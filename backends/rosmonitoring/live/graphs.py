@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol
 
-from ..bags import Event
+from avow.ros.bags import Event
+
 from ..tuning import QUEUED_MESSAGES
 
 OK, WARN, ERROR, STALE = range(4)
