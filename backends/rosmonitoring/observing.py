@@ -34,9 +34,9 @@ from avow.system.graph import dataflow
 from avow.system.plan import Endpoint, Located, Plan, System, Table
 
 from .fitting import SOURCES, Undecided, decide, parts_of, words
-from .reading import convert, shown
+from .reading import shown
 from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
-from .wires import MappingError, fits
+from .wires import MappingError, converter, fits
 
 
 class Wrong(Exception):  # noqa: N818 - it is what was found wrong
@@ -329,7 +329,7 @@ def path(text: str) -> FieldPath:
 def literal(raw: Any, sort: Sort, key: str) -> Value:
     """A value that the plan gives. Raises Wrong."""
     try:
-        return convert(raw, sort, {})
+        return converter(sort)(raw)
     except MappingError as error:
         raise Wrong(str(error), key) from None
 

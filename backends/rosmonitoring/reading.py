@@ -5,31 +5,26 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import Any, assert_never
+from typing import Any
 
-from avow.formulas.values import Data, FunctionValue, SequenceValue, Value
+from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
     DataSort,
-    EnumSort,
     FunctionSort,
     IntegerSort,
     NaturalSort,
-    OpaqueSort,
     RealSort,
-    SequenceSort,
-    SetSort,
     Sort,
-    StringSort,
     TupleSort,
 )
 from avow.ros.bags import ENVELOPE, message_of
 from avow.ros.definitions import Array, Wire
 
-from .numbers import Decimal, NotANumber, exact, whole
-from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Hold, Lookup
-from .wires import Convert, MappingError, NoReading, converter, element, fits, of_type, show, taken
+from .numbers import Decimal
+from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup
+from .wires import Convert, MappingError, NoReading, converter, of_type, show, taken
 
 Message = Mapping[str, Any]
 Reader = Callable[[Message, Value | None], Value]
@@ -77,91 +72,6 @@ def shown(path: FieldPath) -> str:
 _MISSING = object()
 
 
-def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
-    """A field's content as a value of a sort. Raises MappingError."""
-    match sort:
-        case RealSort():
-            real = _number(raw)
-            return whole(real) if isinstance(real, int) else real
-        case IntegerSort() | NaturalSort():
-            number = _number(raw)
-            if number.denominator != 1:
-                raise MappingError(f"{show(raw)} is not a whole number")
-            if isinstance(sort, NaturalSort) and number < 0:
-                raise MappingError(f"{show(raw)} is negative, where a natural number is wanted")
-            return int(number)
-        case BoolSort():
-            if isinstance(raw, bool):
-                return raw
-            raise MappingError(f"{show(raw)} is not a truth value")
-        case StringSort():
-            if isinstance(raw, str):
-                return names.get(raw, raw)
-            raise MappingError(f"{show(raw)} is not a string")
-        case EnumSort():
-            return element(raw, sort, names)
-        case DataSort():
-            return _data(raw, sort, names)
-        case TupleSort(items=items, labels=labels) if labels and isinstance(raw, Mapping):
-            if missing := [label for label in labels if label not in raw]:
-                raise MappingError(f"{show(raw)} has no {', '.join(missing)}")
-            return tuple(convert(raw[label], item, names) for label, item in zip(labels, items, strict=True))
-        case TupleSort(items=items):
-            if isinstance(raw, list) and len(raw) == len(items):
-                return tuple(convert(part, item, names) for part, item in zip(raw, items, strict=True))
-            raise MappingError(f"{show(raw)} is not a list of {len(items)}")
-        case SequenceSort(item=item):
-            if isinstance(raw, list):
-                return SequenceValue(tuple(convert(part, item, names) for part in raw))
-            raise MappingError(f"{show(raw)} is not a list")
-        case FunctionSort():
-            return _relation_literal(raw, sort, names)
-        case OpaqueSort(name=name):
-            raise MappingError(f"{name} is an unspecified sort: no message can be read as one of its values")
-        case SetSort():
-            raise MappingError("no message can be read as a value of this sort")
-        case _:
-            assert_never(sort)
-
-
-def _number(raw: Any) -> Fraction | int:
-    if raw.__class__ is int or raw.__class__ is Decimal or isinstance(raw, float):
-        try:
-            return exact(raw)
-        except NotANumber:
-            pass
-    raise MappingError(f"{show(raw)} is not a number")
-
-
-def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
-    """``{"move": [1, 2]}``, or a word for a constructor without arguments."""
-    if isinstance(raw, str):
-        raw = {raw: []}
-    if isinstance(raw, Mapping) and len(raw) == 1:
-        ((word, arguments),) = raw.items()
-        word = names.get(word, word)
-        for constructor in sort.constructors:
-            if constructor.name == word and isinstance(arguments, list):
-                if len(arguments) == len(constructor.parameters):
-                    pairs = zip(arguments, constructor.parameters, strict=True)
-                    return Data(word, tuple(convert(part, p, {}) for part, p in pairs))
-                raise MappingError(f"{word} takes {len(constructor.parameters)} arguments, not {len(arguments)}")
-    raise MappingError(f"{show(raw)} is no value of {sort.name}")
-
-
-def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) -> FunctionValue:
-    """``[[1, 2], [3, 4]]``: the tuples at which a relation holds."""
-    if sort.result != BOOL or not isinstance(raw, list):
-        raise MappingError("only a relation can be written out, as the list of its tuples")
-    table: dict[tuple[Value, ...], Value] = {}
-    for row in raw:
-        parts = row if isinstance(row, list) else [row]
-        if len(parts) != len(sort.parameters):
-            raise MappingError(f"{show(row)} is not a list of {len(sort.parameters)}")
-        table[tuple(convert(p, s, names) for p, s in zip(parts, sort.parameters, strict=True))] = True
-    return FunctionValue(table, False)
-
-
 def _converters(rule: Fields, sorts: tuple[Sort, ...]) -> tuple[Convert, ...]:
     """How what each of the rule's paths leads to becomes a value."""
     found: list[Convert] = []
@@ -169,8 +79,6 @@ def _converters(rule: Fields, sorts: tuple[Sort, ...]) -> tuple[Convert, ...]:
         wire = rule.wire(place)
         if rule.take is not None and isinstance(wire, Array):
             found.append(taken(rule.take, sort, wire, rule.known, rule.gaps))
-        elif wire is None or not fits(sort, wire, rule.known):
-            found.append(functools.partial(convert, sort=sort, names=rule.names))
         else:
             found.append(converter(sort, wire, rule.names, rule.known, rule.gaps))
     return tuple(found)
@@ -281,10 +189,7 @@ def _choice(rule: Choice) -> Reader:
 def _argument(where: Argument, sort: Sort, rule: Choice) -> Callable[[Message], Value]:
     if isinstance(where, Lookup):
         return functools.partial(_looked_up, where=where, sort=sort)
-    wire = rule.wires.get(where)
-    if wire is None:
-        return lambda message: convert(at(message, where), sort, {})
-    read = converter(sort, wire, {}, NOTHING_KNOWN, frozenset())
+    read = converter(sort, rule.wires.get(where))
     return lambda message: read(at(message, where))
 
 
@@ -299,8 +204,8 @@ def _looked_up(message: Message, where: Lookup, sort: Sort) -> Value:
 def from_text(cell: str, sort: Sort, held: Wire | None = None) -> Value:
     """A table's cell as a value; `held`: the type in which a node holds it. Raises MappingError."""
     if isinstance(sort, RealSort | IntegerSort | NaturalSort):
-        value = convert(Decimal(cell.strip()), sort, {})
+        value = converter(sort)(Decimal(cell.strip()))
         return of_type(value, held) if isinstance(value, Fraction) else value
     if isinstance(sort, BoolSort):
-        return convert({"TRUE": True, "FALSE": False}.get(cell.strip().upper(), cell), sort, {})
-    return convert(cell, sort, {})
+        return converter(sort)({"TRUE": True, "FALSE": False}.get(cell.strip().upper(), cell))
+    return converter(sort)(cell)

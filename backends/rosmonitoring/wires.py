@@ -11,17 +11,23 @@ import math
 import struct
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import Any
+from types import MappingProxyType
+from typing import Any, assert_never
 
 from avow.backend_kit.programs.samples import as_single, next_single
-from avow.formulas.values import Binary, Element, SequenceValue, Value
+from avow.formulas.values import Binary, Data, Element, FunctionValue, SequenceValue, Value
 from avow.language.sorts import (
+    BOOL,
     BoolSort,
+    DataSort,
     EnumSort,
+    FunctionSort,
     IntegerSort,
     NaturalSort,
+    OpaqueSort,
     RealSort,
     SequenceSort,
+    SetSort,
     Sort,
     StringSort,
     TupleSort,
@@ -29,7 +35,7 @@ from avow.language.sorts import (
 from avow.ros.definitions import FLOATS, HEADER, INTEGERS, Array, Definitions, Nested, Scalar, Wire
 
 from .numbers import Decimal, Exact, NotANumber, exact, whole
-from .rules import Gap, Take
+from .rules import NOTHING_KNOWN, Gap, Take
 
 Convert = Callable[[Any], Value]
 
@@ -79,41 +85,113 @@ def record(wire: Nested, known: Definitions) -> tuple[tuple[str, Wire], ...]:
     return tuple((f.name, f.wire) for f in message.fields if f.wire != Nested(HEADER)) if message else ()
 
 
-def converter(sort: Sort, wire: Wire, names: Mapping[str, str], known: Definitions, gaps: frozenset[Gap]) -> Convert:
-    """From what a field of this type holds to a value of the sort; made once for each rule. `fits` holds of them."""
-    match sort, wire:
-        case RealSort(), Scalar(name="float32" | "float64" as name):
-            return functools.partial(_float, wide=name == "float64", gaps=gaps)
-        case RealSort(), Scalar(name="time" | "duration"):
-            return seconds
-        case RealSort(), Scalar(name=name):
-            return lambda raw: whole(_whole(raw, name))
-        case ((IntegerSort() | NaturalSort()), Scalar(name=name)):
-            natural = isinstance(sort, NaturalSort)
-            return lambda raw: _natural(_whole(raw, name)) if natural else _whole(raw, name)
-        case BoolSort(), Scalar():
+def converter(
+    sort: Sort, wire: Wire | None = None, names: Mapping[str, str] = MappingProxyType({}),
+    known: Definitions = NOTHING_KNOWN, gaps: frozenset[Gap] = frozenset(),
+) -> Convert:  # fmt: skip
+    """From what a field holds to a value of a sort; made once for each rule. Where its type is not known, or does not
+    fit, digits mean what they say."""
+    wire = None if wire is None or not fits(sort, wire, known) else wire
+    match sort:
+        case RealSort():
+            return _real(wire, gaps)
+        case IntegerSort() | NaturalSort():
+            kind, natural = wire.name if isinstance(wire, Scalar) else None, isinstance(sort, NaturalSort)
+            return lambda raw: _natural(_whole(raw, kind)) if natural else _whole(raw, kind)
+        case BoolSort():
             return _truth
-        case StringSort(), Scalar():
+        case StringSort():
             return lambda raw: names.get(_word(raw), _word(raw))
-        case EnumSort(), Scalar():
+        case EnumSort():
             return lambda raw: element(raw, sort, names)
-        case SequenceSort(item=item), Array(item=inner, length=length):
-            part = converter(item, inner, names, known, frozenset())
+        case SequenceSort(item=item):
+            inner, length = (wire.item, wire.length) if isinstance(wire, Array) else (None, None)
+            part = converter(item, inner, names, known)
             return lambda raw: SequenceValue(tuple(map(part, _items(raw, length))))
-        case TupleSort(items=items), Array(item=inner, length=length):
-            parts = [converter(item, inner, names, known, gaps) for item in items]
-            return lambda raw: tuple([p(x) for p, x in zip(parts, _items(raw, length), strict=True)])
-        case TupleSort(items=items), Nested():
-            fields = record(wire, known)
-            if sort.labels:  # by name, whatever else the message holds
-                fields = tuple((label, dict(fields)[label]) for label in sort.labels)
-            readers = [
-                (name, converter(item, inner, names, known, gaps))
-                for item, (name, inner) in zip(items, fields, strict=True)
-            ]
-            return lambda raw: tuple([read(_member(raw, name)) for name, read in readers])
+        case TupleSort():
+            return _tuple(sort, wire, names, known, gaps)
+        case DataSort():
+            return functools.partial(_data, sort=sort, names=names)
+        case FunctionSort():
+            return functools.partial(_relation_literal, sort=sort, names=names)
+        case OpaqueSort(name=name):
+            return _unreadable(f"{name} is an unspecified sort: no message can be read as one of its values")
+        case SetSort():
+            return _unreadable("no message can be read as a value of this sort")
         case _:
-            raise ValueError(f"{wire} does not fit {sort}: `fits` is asked first")
+            assert_never(sort)
+
+
+def _real(wire: Wire | None, gaps: frozenset[Gap]) -> Convert:
+    match wire:
+        case Scalar(name="float32" | "float64" as name):
+            return functools.partial(_float, wide=name == "float64", gaps=gaps)
+        case Scalar(name="time" | "duration"):
+            return seconds
+        case Scalar(name=name):
+            return lambda raw: whole(_whole(raw, name))
+        case _:  # not known
+            return lambda raw: whole(number) if isinstance(number := _number(raw), int) else number
+
+
+def _tuple(
+    sort: TupleSort, wire: Wire | None, names: Mapping[str, str], known: Definitions, gaps: frozenset[Gap]
+) -> Convert:
+    """Of a message the fields, by name where the tuple has names, whatever else it holds; else the items."""
+    if isinstance(wire, Nested):
+        fields: dict[str, Wire | None] = dict(record(wire, known))
+        labels = sort.labels or tuple(fields)
+        inner = [fields[label] for label in labels]
+    else:
+        labels, inner = sort.labels, [wire.item if isinstance(wire, Array) else None] * len(sort.items)
+    parts = [converter(item, one, names, known, gaps) for item, one in zip(sort.items, inner, strict=True)]
+
+    def by_name(raw: Any) -> Value:
+        return tuple([read(_member(raw, name)) for name, read in zip(labels, parts, strict=True)])
+
+    def by_place(raw: Any) -> Value:
+        return tuple([read(item) for read, item in zip(parts, _items(raw, len(parts)), strict=True)])
+
+    if isinstance(wire, Nested):
+        return by_name
+    if wire is None and labels:
+        return lambda raw: by_name(raw) if isinstance(raw, Mapping) else by_place(raw)
+    return by_place
+
+
+def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
+    """``{"move": [1, 2]}``, or a word for a constructor without arguments."""
+    if isinstance(raw, str):
+        raw = {raw: []}
+    if isinstance(raw, Mapping) and len(raw) == 1:
+        ((word, arguments),) = raw.items()
+        word = names.get(word, word)
+        for constructor in sort.constructors:
+            if constructor.name == word and isinstance(arguments, list):
+                if len(arguments) == len(constructor.parameters):
+                    pairs = zip(arguments, constructor.parameters, strict=True)
+                    return Data(word, tuple(converter(p)(part) for part, p in pairs))
+                raise MappingError(f"{word} takes {len(constructor.parameters)} arguments, not {len(arguments)}")
+    raise MappingError(f"{show(raw)} is no value of {sort.name}")
+
+
+def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) -> FunctionValue:
+    """``[[1, 2], [3, 4]]``: the tuples at which a relation holds."""
+    if sort.result != BOOL or not isinstance(raw, list):
+        raise MappingError("only a relation can be written out, as the list of its tuples")
+    parts = [converter(part, None, names) for part in sort.parameters]
+    table: dict[tuple[Value, ...], Value] = {}
+    for row in raw:
+        items = _items(row if isinstance(row, list) else [row], len(parts))
+        table[tuple(read(item) for read, item in zip(parts, items, strict=True))] = True
+    return FunctionValue(table, False)
+
+
+def _unreadable(why: str) -> Convert:
+    def refuse(raw: Any) -> Value:
+        raise MappingError(why)
+
+    return refuse
 
 
 def taken(take: Take, sort: Sort, wire: Array, known: Definitions, gaps: frozenset[Gap]) -> Convert:
@@ -224,14 +302,19 @@ def seconds(raw: Any) -> Fraction:
     raise MappingError(f"{show(raw)} is no time of seconds and nanoseconds")
 
 
-def _whole(raw: Any, name: str) -> int:
+def _number(raw: Any) -> Fraction | int:
     try:
-        number = exact(raw)
+        return exact(raw)
     except NotANumber:
         raise MappingError(f"{show(raw)} is not a number") from None
+
+
+def _whole(raw: Any, name: str | None) -> int:
+    """Of a type of ROS, where it is known."""
+    number = _number(raw)
     if number.denominator != 1:
         raise MappingError(f"{show(raw)} is not a whole number")
-    least, greatest = INTEGERS[name]
+    least, greatest = (number, number) if name is None else INTEGERS[name]
     if not least <= number <= greatest:
         raise MappingError(f"{show(raw)} is no {name}")
     return int(number)

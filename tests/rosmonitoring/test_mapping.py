@@ -157,6 +157,22 @@ def test_constructors_by_a_field(make_system: Callable[..., System], message: di
     assert expected in found if isinstance(expected, str) and isinstance(found, str) else found == expected
 
 
+def test_an_argument_of_an_algebraic_type_is_named_by_its_field(make_system: Callable[..., System]) -> None:
+    """Where the message's type is known, too: the monitor could not be made, and died with a traceback."""
+    rcl = """
+context { Gear : { up(REAL), down }; Command : { go(Gear), stop }; }
+node n {
+  inputs( b : BOOL ) outputs( cmd : Command ) topics( a/Cmd cmd matches(out.cmd) )
+  guarantee g ( out.cmd != stop )
+}
+"""
+    mapping = {"out.cmd": {"constructor": "kind", "go": ["gear"]}}
+    system = make_system(rcl, mapping, messages={"a/Cmd": "string kind\nstring gear"})
+    event = {"topic": "cmd", "kind": "go", "gear": "down"}
+    assert value_of(system, "out.cmd", event) == Data("go", (Data("down"),))
+    assert "up takes 1 arguments" in str(value_of(system, "out.cmd", {**event, "gear": "up"}))
+
+
 TABLE = {"scenario": {"waypoints": [{"id": 3, "x": 1.5, "y": "-2.0"}, {"id": 4, "x": 0, "y": 0}]}}
 
 
