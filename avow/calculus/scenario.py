@@ -24,10 +24,7 @@ from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.contract import Node, Port
 from avow.language.sorts import (
     BOOL,
-    INTEGER,
-    NATURAL,
     REAL,
-    STRING,
     DataSort,
     FunctionSort,
     IntegerSort,
@@ -39,10 +36,8 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.terms import Literal, Variable
-from avow.system.names import ports_named
+from avow.system.names import BASE_SORTS, ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
-
-_SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
 
 Point = tuple[Value, ...]
 
@@ -236,7 +231,7 @@ def world(frame: Frame) -> World:
     """The scenario of a system. Raises CannotRun where there is none, or its values cannot be read."""
     scenario = frame.system.plan.scenario or Scenario()
     found = World(frame, scenario, {})
-    named = {**_SORTS, **dict(frame.system.contract.types)}
+    named = {**BASE_SORTS, **dict(frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         sort = named.get(name)
         if sort is not None and not isinstance(sort, FunctionSort):
@@ -268,7 +263,7 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
     """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
     leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
     scenario, found = world.scenario, list[Hypothesis]()
-    named = {**_SORTS, **dict(world.frame.system.contract.types)}
+    named = {**BASE_SORTS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         ports = ports_named(name, world.frame.system.contract.nodes)
         sort = named.get(name) or (ports[0][1].sort if ports else None)

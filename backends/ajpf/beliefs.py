@@ -59,13 +59,11 @@ class Beliefs:
         return tuple(b for b in found if unify(pattern, apart(b, "''"), {}) is not None)
 
 
-def apart(belief: Struct, suffix: str) -> Struct:
-    """A belief with variables in it (what was added had them) speaks of anything: they are nobody else's."""
-    if not belief.args or is_ground(belief):
-        return belief
-    renamed = rename(belief, {name: Var(name + suffix) for name in variables(belief)})
-    assert isinstance(renamed, Struct)
-    return renamed
+def apart(term: Term, suffix: str) -> Term:
+    """The term with variables of its own: what was added as a belief with variables speaks of anything, and a plan or a
+    rule is used more than once."""
+    names = set(variables(term))
+    return rename(term, {name: Var(name + suffix) for name in names}) if names else term
 
 
 @dataclass(slots=True)
@@ -112,9 +110,8 @@ class Reasoner:
         key = (goal.functor, len(goal.args))
         for belief in beliefs.index.get(key, ()):
             self._tried()
-            if belief.args and not is_ground(belief):
-                belief = apart(belief, f"'{next(self.fresh)}")
-            found = unify(goal, belief, bindings)
+            known_as = belief if is_ground(belief) else apart(belief, f"'{next(self.fresh)}")
+            found = unify(goal, known_as, bindings)
             if found is not None:
                 yield found
         for rule in self.rules.get(key, ()):
@@ -205,16 +202,13 @@ def _text(name: Term) -> Struct:
 
 def renamed_rule(rule: Rule, suffix: str) -> Rule:
     """The rule with variables of its own."""
-    terms = [rule.head, *(term for c in rule.body for term in c.terms())]
-    own: Bindings = {name: Var(name + suffix) for term in terms for name in variables(term)}
-    body = tuple(renamed_condition(c, own) for c in rule.body)
-    head = rename(rule.head, own)
+    head = apart(rule.head, suffix)
     assert isinstance(head, Struct)
-    return Rule(head, body, rule.span)
+    return Rule(head, tuple(renamed_condition(c, suffix) for c in rule.body), rule.span)
 
 
-def renamed_condition(condition: Condition, names: Mapping[str, Term]) -> Condition:
-    """The condition with other variables in the place of its own."""
-    term = None if condition.term is None else rename(condition.term, names)
-    group = tuple(renamed_condition(part, names) for part in condition.group)
-    return replace(condition, term=term, group=group)
+def renamed_condition(condition: Condition, suffix: str) -> Condition:
+    """The condition with variables of its own."""
+    term = None if condition.term is None else apart(condition.term, suffix)
+    group = tuple(renamed_condition(part, suffix) for part in condition.group)
+    return condition if term is condition.term and not group else replace(condition, term=term, group=group)

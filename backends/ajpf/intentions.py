@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .syntax import (
@@ -78,17 +79,20 @@ def of_deed(event: Event, deed: Deed) -> Intention:
 
 def bind(intention: Intention, bindings: Bindings) -> Intention:
     """The intention with its bound variables replaced, in all its frames."""
-    if not bindings or not intention.frames:
-        return intention
-    return replace(intention, frames=tuple(_bound(frame, bindings) for frame in intention.frames))
+    return _changed(intention, lambda term: apply(term, bindings)) if bindings and intention.frames else intention
 
 
-def _bound(frame: Frame, bindings: Bindings) -> Frame:
-    event = replace(frame.event, term=apply(frame.event.term, bindings))
-    if frame.deeds is None:
-        return Frame(event)
-    deeds = tuple(d if not d.args else replace(d, term=apply(d.term, bindings)) for d in frame.deeds)
-    return Frame(event, deeds, frame.fresh)
+def _changed(intention: Intention, change: Callable[[Term], Term]) -> Intention:
+    """The intention with all its terms changed."""
+
+    def changed(frame: Frame) -> Frame:
+        event = replace(frame.event, term=change(frame.event.term))
+        if frame.deeds is None:
+            return Frame(event)
+        deeds = tuple(replace(d, term=change(d.term)) if d.args else d for d in frame.deeds)
+        return Frame(event, deeds, frame.fresh)
+
+    return replace(intention, frames=tuple(map(changed, intention.frames)))
 
 
 def tail(intention: Intention) -> tuple[Intention, Goal | None]:
@@ -100,19 +104,13 @@ def tail(intention: Intention) -> tuple[Intention, Goal | None]:
     return replace(intention, frames=intention.frames[:-1]), goal_of(top.event)
 
 
-def perform(intention: Intention, goal: Goal) -> Intention:
-    """The goal is posted; the deed that did so becomes one that does nothing, which takes a turn of its own later."""
+def post(intention: Intention, goal: Goal) -> Intention:
+    """The goal is posted. The deed that posts a goal to be performed becomes one that does nothing, which takes a turn
+    of its own later; one that posts a goal to be achieved is looked at again when that has been dealt with."""
     top = intention.frames[-1]
     assert top.deeds
-    below = Frame(top.event, (NULL, *top.deeds[1:]))
-    return replace(intention, frames=(*intention.frames[:-1], below, Frame(event_of(goal))))
-
-
-def achieve(intention: Intention, goal: Goal) -> Intention:
-    """The goal is posted; the deed that did so stays, and is looked at again when the goal has been dealt with."""
-    top = intention.frames[-1]
-    below = Frame(top.event, top.deeds)
-    return replace(intention, frames=(*intention.frames[:-1], below, Frame(event_of(goal))))
+    deeds = top.deeds if goal.kind is GoalKind.ACHIEVE else (NULL, *top.deeds[1:])
+    return replace(intention, frames=(*intention.frames[:-1], Frame(top.event, deeds), Frame(event_of(goal))))
 
 
 def event_of(goal: Goal, sign: Sign = Sign.ADD) -> Event:
@@ -131,12 +129,4 @@ def canonical(intention: Intention) -> Intention:
                     names.setdefault(name, Var(f"~{len(names)}"))
     if not names:
         return intention
-    frames = tuple(
-        replace(
-            frame,
-            event=replace(frame.event, term=rename(frame.event.term, names)),
-            deeds=None if frame.deeds is None else tuple(replace(d, term=rename(d.term, names)) for d in frame.deeds),
-        )
-        for frame in intention.frames
-    )
-    return replace(intention, frames=frames)
+    return _changed(intention, lambda term: rename(term, names))

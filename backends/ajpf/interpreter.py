@@ -18,7 +18,7 @@ from functools import cache
 from typing import NamedTuple
 
 from .environment import Choice, Environment
-from .intentions import PERCEPTION, START, achieve, of_deed, of_event, perform
+from .intentions import PERCEPTION, START, of_deed, of_event, post
 from .mind import NONE, Done, Mind, Table
 from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
 
@@ -304,7 +304,7 @@ class Agent(Mind):
         if deed.kind is DeedKind.DROP_GOAL:
             return self.drop_goal(state.beliefs, state.goals, intention, state.queue, goal)
         if deed.goal is GoalKind.PERFORM:
-            number = self.number(perform(intention, goal))
+            number = self.number(post(intention, goal))
             return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
         beliefs = self.beliefs.items[state.beliefs]
         met = self.reasoner.derived(beliefs, goal.term)
@@ -320,7 +320,7 @@ class Agent(Mind):
             found = unify(goal.term, other.term, {})
             if found is not None:  # some intention is at it already
                 return self.after(state.beliefs, state.goals, intention, found), state.queue
-        number = self.number(achieve(intention, goal))
+        number = self.number(post(intention, goal))
         return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
 
     def _suspend(self, state: State) -> State:

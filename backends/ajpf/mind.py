@@ -13,7 +13,6 @@ from .intentions import EMPTY, PERCEPTION, Frame, Intention, bind, canonical, go
 from .syntax import (
     SENT,
     Bindings,
-    Condition,
     DeedKind,
     Event,
     Goal,
@@ -27,9 +26,7 @@ from .syntax import (
     is_ground,
     name_of,
     plain,
-    rename,
     unify,
-    variables,
 )
 
 T = TypeVar("T")
@@ -89,10 +86,10 @@ class Mind:
             kind = _kind_met(plan.event, event) if event.is_goal else None
             if event.is_goal and kind is None:
                 continue
-            bindings = unify(_own(plan.event.term, suffix), event.term, {})
+            bindings = unify(apart(plan.event.term, suffix), event.term, {})
             if bindings is None:
                 continue
-            guard = tuple(_own_condition(c, suffix) for c in plan.guard)
+            guard = tuple(renamed_condition(c, suffix) for c in plan.guard)
             met = self.reasoner.first_way(self.beliefs.items[base], guard, bindings, self._wanted(goals))
             if met is None:
                 continue
@@ -100,7 +97,7 @@ class Mind:
                 left = bind(replace(intention, frames=below), met)
                 gone = goal_of(event) if event.sign is Sign.ADD else None
                 return self.number(left), self.without(goals, gone)
-            deeds = tuple(replace(d, term=_own(d.term, suffix)) if d.args else d for d in plan.deeds)
+            deeds = tuple(replace(d, term=apart(d.term, suffix)) if d.args else d for d in plan.deeds)
             top = Frame(replace(event, goal=kind), deeds, fresh=True)
             return self.number(bind(replace(intention, frames=(*below, top)), met)), goals
         if not below and not (event.is_goal and event.sign is Sign.DROP):
@@ -277,17 +274,6 @@ def _posts(intention: Intention, goal: Goal) -> bool:
     """Whether its next deed posts the goal."""
     deeds = intention.frames[-1].deeds
     return bool(deeds) and deeds[0].kind is DeedKind.ADD_GOAL and unify(goal.term, deeds[0].term, {}) is not None  # type: ignore[index]
-
-
-def _own(term: Term, suffix: str) -> Term:
-    """The term with the variables of one use of a plan."""
-    names = set(variables(term))
-    return rename(term, {name: Var(name + suffix) for name in names}) if names else term
-
-
-def _own_condition(condition: Condition, suffix: str) -> Condition:
-    names = {name for term in condition.terms() for name in variables(term)}
-    return renamed_condition(condition, {name: Var(name + suffix) for name in names}) if names else condition
 
 
 def _named(term: Term) -> Struct:

@@ -17,6 +17,7 @@ from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Not, Quantified, Role, Term, Variable
+from avow.system.names import BASE_SORTS
 from avow.system.schema import violations
 
 from .environment import Environment, read_environment
@@ -196,7 +197,7 @@ class _OptionsReader:
                     for variable in term.variables:
                         found.setdefault(variable.name, variable.sort)
         for name, sort in self.options.get("variables", {}).items():
-            found[name] = _sort(sort)
+            found[name] = BASE_SORTS[sort]
         ports = {p.name for p in (*self.job.node.inputs, *self.job.node.outputs)}
         return {name: sort for name, sort in found.items() if name not in ports}
 
@@ -297,13 +298,6 @@ def _called(names: Sequence[str]) -> str:
     if len(names) == 1:
         return f"the program's agent is called '{names[0]}'"
     return f"the program's agents are called {', '.join(map(repr, names))}"
-
-
-def _sort(name: str) -> Sort:
-    from avow.language import sorts
-
-    found: Sort = getattr(sorts, name)
-    return found
 
 
 def is_index(sort: Sort) -> bool:

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, assert_never
+from typing import Any
 
 from avow.backend_kit.linked import Recorded, settled
 from avow.backend_kit.programs.judging import Formula, NoValue, Seen, exact, returned, seen, started, triggers
@@ -18,24 +18,18 @@ from avow.evidence.record import CASE
 from avow.formulas.values import Value
 from avow.language.sorts import (
     BoolSort,
-    DataSort,
     EnumSort,
-    FunctionSort,
     IntegerSort,
     NaturalSort,
-    OpaqueSort,
     RealSort,
     SequenceSort,
-    SetSort,
     Sort,
-    StringSort,
-    TupleSort,
 )
 
 from .drawn import Step
 from .reading import Reading
 from .runner import Run
-from .tables import Drawable
+from .tables import Drawable, sort_name
 from .tuning import APART
 
 SPECIAL = {"NaN": math.nan, "infinity": math.inf, "-infinity": -math.inf}
@@ -418,19 +412,9 @@ def _single(data: Any) -> bool:
 
 
 def _simple(sort: Sort) -> Any:
-    match sort:
-        case BoolSort():
-            return False
-        case EnumSort(members=members):
-            return members[0]
-        case RealSort():
-            return 0.0
-        case SequenceSort():
-            return []
-        case IntegerSort() | NaturalSort():
-            return 0
-        case _:
-            raise TypeError(f"no value of {sort} is drawn")
+    if isinstance(sort, EnumSort):
+        return sort.members[0]
+    return [] if isinstance(sort, SequenceSort) else {"truth": False, "integer": 0, "real": 0.0}[sort_name(sort)]
 
 
 def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
@@ -439,24 +423,15 @@ def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
             return [True]
         case EnumSort(members=members):
             return list(members)
-        case RealSort() if single:
-            found = [n for r in made.reals for n in (r, next_single(r, math.inf), next_single(r, -math.inf))]
-            return [as_single(n) for n in found if math.isfinite(n)]
         case RealSort():
-            found = [n for r in made.reals for n in (r, math.nextafter(r, math.inf), math.nextafter(r, -math.inf))]
-            return [n for n in found if math.isfinite(n)]
-        case IntegerSort():
-            return list(made.integers)
-        case NaturalSort():
-            return [n for n in made.integers if n >= 0]
+            step, near = (next_single, as_single) if single else (math.nextafter, float)
+            found = [n for r in made.reals for n in (r, step(r, math.inf), step(r, -math.inf))]
+            return [near(n) for n in found if math.isfinite(n)]
         case SequenceSort(item=item):
             one = _values(item, made, single)
             return [[_simple(item)] * n for n in made.lengths] + [row for v in one for row in ([v], [_simple(item), v])]
-        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SetSort():
-            # refused when the source is read
-            return []
-        case _:
-            assert_never(sort)
+        case _:  # a whole number: the source is refused when it is read where a port is of any other sort
+            return [n for n in made.integers if n >= 0 or not isinstance(sort, NaturalSort)]
 
 
 def _finite(value: Any) -> Any:
