@@ -1,9 +1,11 @@
-"""Names of persons: which cannot be told from another by reading, and which two may be one person's."""
+"""What people write of themselves: names, which cannot be told from another by reading, and which two may be one
+person's; days, in the past where they say what was done."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
+from datetime import UTC, date, datetime, timedelta
 
 from avow.base.plain import invisible
 
@@ -181,3 +183,25 @@ def _words(name: str) -> list[str]:
     family, comma, given = plain.partition(",")
     found = re.findall(r"[^\W\d_]+", re.sub("([aou])e", r"\1", f"{given} {family}" if comma else plain))
     return [word for word in found if word not in _TITLES] or found
+
+
+# -- days --------------------------------------------------------------------------------------------------------------
+
+EARLIEST = date(2000, 1, 1)
+"""Years before ROS, and before anything that a contract is of: an earlier day is a slip of the pen."""
+_DAY = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
+
+
+def wrong_day(text: str, *, past: bool = True) -> str:
+    """What is wrong with a day such as 2026-11-21, in words; empty: nothing. With `past` it says when something was
+    done, and is not still to come anywhere on earth."""
+    try:
+        if not _DAY.fullmatch(text):  # the standard has other forms, which do not sort as texts
+            raise ValueError
+        day = date.fromisoformat(text)
+    except ValueError:
+        return f"{text!r} is no date of the calendar such as 2026-11-21"
+    if day < EARLIEST:
+        return f"{text} is long before any contract"
+    latest = datetime.now(UTC).date() + timedelta(days=1)  # somewhere it may be tomorrow already
+    return f"{text} is still to come" if past and day > latest else ""

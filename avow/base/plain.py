@@ -1,10 +1,15 @@
-"""Plain words: texts that a reader meets before any contract hold no identifiers."""
+"""Plain words: texts that a reader meets before any contract hold no identifiers; numbers as people write them; texts
+that people take for one another."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 _IDENTIFIER = re.compile(
     r"""[A-Za-z]\w*\.[A-Za-z_]\w*      # node.port
@@ -79,3 +84,45 @@ def listed(items: Sequence[str], most: int = 8) -> str:
     """So many items at most, and how many more there are: ``a, b and 3 more``."""
     more = f" and {len(items) - most} more" if len(items) > most else ""
     return ", ".join(items[:most]) + more
+
+
+def decimal(value: Fraction) -> str | None:
+    """The number with all its decimals (``-2.5``, ``3``); None where they do not end."""
+    digits, rest = 0, value.denominator
+    for prime in (2, 5):
+        power = 0
+        while rest % prime == 0:
+            rest, power = rest // prime, power + 1
+        digits = max(digits, power)
+    if rest != 1:
+        return None
+    if not digits:
+        return str(value.numerator)
+    whole = f"{abs(value.numerator) * 10**digits // value.denominator:0{digits + 1}d}"
+    return f"{'-' if value < 0 else ''}{whole[:-digits]}.{whole[-digits:]}"
+
+
+# -- texts that people take for one another: in other forms and cases, with signs that are not seen, of letters alike --
+
+LOOK = str.maketrans(
+    "aceiopsxyABCEHIKMOPSTX",
+    "\u0430\u0441\u0435\u0456\u043e\u0440\u0455\u0445\u0443"
+    "\u0410\u0412\u0421\u0415\u041d\u0406\u041a\u041c\u041e\u0420\u0405\u0422\u0425",
+)
+"""Latin letters → those of another alphabet that look the same."""
+
+SEEN_AS = {
+    **{other: chr(letter) for letter, other in LOOK.items()},
+    **dict(zip(map(ord, "αινορυχ\u03f2ΑΒΕΖΗΙΚΜΝΟΡΤΥΧ"), "aivopuxcABEZHIKMNOPTYX", strict=True)),
+    **dict(
+        zip(map(ord, "\u0501\u0261\u04bb\u0458\u051b\u051d\u0131\u2212\u2010\u2011\u2013"), "dghjqwi----", strict=True)
+    ),
+}
+"""Letters and signs → those of ASCII that look the same."""
+
+
+def alike(text: str) -> str:
+    """The same for all texts that look the same, or differ in case only."""
+    plain = unicodedata.normalize("NFKC", text.translate(SEEN_AS))
+    seen = "".join(c for c in plain if unicodedata.category(c) not in ("Cc", "Cf"))
+    return " ".join(seen.casefold().split())

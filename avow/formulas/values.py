@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from fractions import Fraction
 
-from avow.base.decimals import decimal
+from avow.base.plain import decimal
 from avow.base.records import dataclass
 
 

@@ -11,7 +11,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 
-from avow.base.alike import SEEN_AS
+from avow.base.plain import SEEN_AS
 from avow.base.records import dataclass
 from avow.base.tuning.shown import PRINTED_SHOWN
 from avow.base.verdict import Isolation, Verdict

@@ -45,30 +45,41 @@ def simple(value: Any) -> Simple | None:
     return None
 
 
-class Sights:
-    """What has been seen since it was last taken."""
+class Eyes:
+    """What the host asks: to compile the subject's modules, and what has been seen since it last asked."""
 
-    def __init__(self) -> None:
+    def __init__(self, limits: Mapping[str, int]) -> None:
+        most.update(limits)
+        self.codes: list[CodeType] = []
+        self.paths: set[str] = set()
         self.kinds: list[Any] = []
         self._pending: dict[int, Any] = {}
         self._seen: dict[int, list[Sight]] = {}
         self._count = 0
         self._busy = False
+        setattr(builtins, _SEE, self.see)
 
-    def take(self) -> list[Sight]:
+    def loaded(self, modules: Callable[[], Iterable[ModuleType]]) -> list[Sight]:
+        """The constants of what has been loaded."""
+        self.told()
+        return constants([m for m in modules() if getattr(m, "__file__", None) in self.paths], self.codes)
+
+    def told(self) -> list[Sight]:
         found = [sight for sights in self._seen.values() for sight in sights]
         self._seen, self._pending, self._count = {}, {}, 0
         return found
 
     def compiled(self, data: bytes, path: str) -> CodeType:
         """A module whose operands are handed through `see`; as it is, where that is not possible."""
-        tree = ast.parse(data, path)
-        before = len(self.kinds)
+        plain = compile(data, path, "exec", dont_inherit=True)
+        self.codes.append(plain)
+        self.paths.add(path)
+        tree, before = ast.parse(data, path), len(self.kinds)
         try:
-            return compile(ast.fix_missing_locations(_Eyes(self.kinds).visit(tree)), path, "exec", dont_inherit=True)
+            return compile(ast.fix_missing_locations(_Led(self.kinds).visit(tree)), path, "exec", dont_inherit=True)
         except (SyntaxError, ValueError, RecursionError, TypeError):
             del self.kinds[before:]
-            return compile(data, path, "exec", dont_inherit=True)
+            return plain
 
     def see(self, place: int, part: int, value: Any) -> Any:
         """Notes an operand; it is what it was."""
@@ -239,7 +250,7 @@ _COMPARED: dict[type[ast.cmpop], str] = {
 _PLAIN_TRUTH = (ast.Compare, ast.BoolOp, ast.Constant)
 
 
-class _Eyes(ast.NodeTransformer):
+class _Led(ast.NodeTransformer):
     """Hands operands through `see`, in the order in which they are evaluated; nothing else changes."""
 
     def __init__(self, kinds: list[Any]) -> None:
@@ -350,31 +361,3 @@ class _Eyes(ast.NodeTransformer):
         return node
 
     visit_FunctionDef = visit_AsyncFunctionDef = _function  # noqa: N815
-
-
-# -- for the host ------------------------------------------------------------------------------------------------------
-
-
-class Eyes:
-    """What the host asks: to compile the subject's modules, and what each question has shown."""
-
-    def __init__(self, limits: Mapping[str, int]) -> None:
-        most.update(limits)
-        self.sights = Sights()
-        self.codes: list[CodeType] = []
-        self.paths: set[str] = set()
-        setattr(builtins, _SEE, self.sights.see)
-
-    def compiled(self, data: bytes, path: str) -> CodeType:
-        self.codes.append(compile(data, path, "exec", dont_inherit=True))
-        self.paths.add(path)
-        return self.sights.compiled(data, path)
-
-    def loaded(self, modules: Callable[[], Iterable[ModuleType]]) -> list[Sight]:
-        """The constants of what has been loaded."""
-        self.sights.take()
-        own = [m for m in modules() if getattr(m, "__file__", None) in self.paths]
-        return constants(own, self.codes)
-
-    def told(self) -> list[Sight]:
-        return self.sights.take()

@@ -9,7 +9,7 @@ from collections.abc import Container
 from fractions import Fraction
 from typing import assert_never
 
-from avow.base.decimals import decimal
+from avow.base.plain import decimal
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import (
     REAL,

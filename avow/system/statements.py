@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Severity
-from avow.base.persons import unreadable
+from avow.base.persons import unreadable, wrong_day
 from avow.base.plain import identifiers, is_blank
 from avow.base.tuning.sizes import STATEMENT_WORDS
 from avow.system.plan import Plan, Statement, System

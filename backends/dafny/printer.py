@@ -15,8 +15,8 @@ from fractions import Fraction
 from functools import reduce
 from typing import assert_never
 
-from avow.base.decimals import decimal
 from avow.base.diagnostics import Span
+from avow.base.plain import decimal
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run

@@ -10,8 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from avow.backend_kit.given import file_text
-from avow.base.alike import alike
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.plain import alike
 from avow.base.records import dataclass
 
 from .expression import Expression, Interval

@@ -9,9 +9,8 @@ from pathlib import Path
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backend_kit.stepping import Stepping
-from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.persons import unreadable
+from avow.base.persons import unreadable, wrong_day
 from avow.base.plain import is_blank
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.backend_kit.programs.samples import worked_out
-from avow.base.alike import LOOK
+from avow.base.plain import LOOK
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Element, Value

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avow.backend_kit.given import file_bytes
-from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import digest_file, inside
-from avow.base.persons import unreadable
+from avow.base.persons import unreadable, wrong_day
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.formulas.formula import node_digest

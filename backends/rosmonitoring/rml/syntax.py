@@ -9,7 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
 
-from avow.base.decimals import decimal
+from avow.base.plain import decimal
 from avow.formulas.flattening import joined
 from avow.language.operators import OPPOSITE
 
