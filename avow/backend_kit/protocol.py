@@ -26,7 +26,7 @@ from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import RETRY
 from avow.formulas.values import Value
 from avow.isolation.level import Unavailable
-from avow.isolation.observed import Observed, sandbox
+from avow.isolation.observed import Observed, Seen, as_here
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Driving, Method, Source, System
 
@@ -148,7 +148,7 @@ class Report:
     @classmethod
     def unsealed(cls, job: Job, why: Unavailable, tool: str, tool_version: str) -> Report:
         """Where a sandbox is required, and there is none: asked again as soon as there is, or as none is required."""
-        return replace(cls.alike(job, Verdict.NOT_RUN, str(why), tool, tool_version), observed=(sandbox(),))
+        return replace(cls.alike(job, Verdict.NOT_RUN, str(why), tool, tool_version), observed=(as_here(Seen.SANDBOX),))
 
 
 @dataclass(frozen=True, slots=True)

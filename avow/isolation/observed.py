@@ -286,19 +286,13 @@ def untold(what: str) -> Observed:
     return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})")
 
 
-def tracer() -> Observed:
-    """What is seen by another, or by nobody, is asked again."""
-    return Observed(Seen.TRACER, "strace", look(Seen.TRACER, "strace"))
+_OF_THE_MACHINE = {Seen.TRACER: "strace", Seen.SANDBOX: "bwrap", Seen.MODULES: "module path"}
 
 
-def sandbox() -> Observed:
-    """What is kept otherwise is asked again."""
-    return Observed(Seen.SANDBOX, "bwrap", look(Seen.SANDBOX, "bwrap"))
-
-
-def modules() -> Observed:
-    """What is imported is what is found first."""
-    return Observed(Seen.MODULES, "module path", look(Seen.MODULES, "module path"))
+def as_here(kind: Seen) -> Observed:
+    """Who traces, who keeps, or where modules are looked for: what is seen by another, or by nobody, what is kept
+    otherwise, and what is imported from elsewhere is asked again."""
+    return Observed(kind, _OF_THE_MACHINE[kind], look(kind, _OF_THE_MACHINE[kind]))
 
 
 def interpreter() -> Observed:

@@ -18,7 +18,7 @@ from avow.base import process
 from avow.base.process import Completed, ToolMissing
 from avow.base.programs import program_files, program_folders
 from avow.base.tools import Tool
-from avow.isolation.observed import Observed, folded, recorded, tracer, untold
+from avow.isolation.observed import Observed, Seen, as_here, folded, recorded, untold
 from avow.isolation.tracing import Trace, traces
 
 _SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin", "/bin")
@@ -74,7 +74,7 @@ class Outside:
             return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
 
         seen = recorded((event, path) for event, path in list(self._events) if told(event, path))
-        return folded((*seen, *map(untold, list(self._untraced)), tracer()))
+        return folded((*seen, *map(untold, list(self._untraced)), as_here(Seen.TRACER)))
 
     def _path(self, program: str) -> str:
         places = (program, *(place for tool in self.tools for place in tool.places))

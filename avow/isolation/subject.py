@@ -21,7 +21,7 @@ from avow.base.tuning.sizes import SCRATCH_BYTES
 from avow.base.verdict import Isolation
 from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
-from avow.isolation.observed import Observed, interpreter, modules, recorded, sandbox, tracer, untold, variables
+from avow.isolation.observed import Observed, Seen, as_here, interpreter, recorded, untold, variables
 from avow.isolation.printed import Printed
 from avow.isolation.tracing import Trace, traces
 
@@ -108,11 +108,11 @@ class SubjectProcess:
         untraced = map(untold, dict.fromkeys(programs)) if self._untraced else ()
         return (
             interpreter(),
-            modules(),
+            as_here(Seen.MODULES),
             *recorded(e for e in self._events if e[0] != "program"),
             *untraced,
-            tracer(),
-            sandbox(),
+            as_here(Seen.TRACER),
+            as_here(Seen.SANDBOX),
         )
 
     def close(self) -> str:

@@ -24,29 +24,15 @@ _ARROWHEAD = (
 )
 
 
-def svg(graph: Graph, composed: Container[str] = ()) -> str:
-    """The graph as SVG. Delayed edges are dashed; inputs from the environment are in italics, before who reads them;
-    nodes that are `composed` of others have a double border."""
-    if len(graph.nodes) > NODES_DRAWN:
-        return _message(f"{len(graph.nodes)} nodes, {len(graph.edges)} edges: too many to draw")
-    drawn = _drawn(graph, composed)
-    title = f"<title>{escape(f'{len(graph.nodes)} nodes, {len(graph.edges)} edges')}</title>"
-    return "\n".join([_opened(drawn.width, drawn.height), title, _ARROWHEAD, *drawn.parts, "</svg>"])
-
-
 def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
-    """Several graphs below one another, as `avow.system.folding.seen` gives them: a system whose subsystems are
-    nodes, and the inside of each, in a frame with its name."""
+    """Graphs below one another as SVG, as `avow.system.folding.seen` gives them: a system whose subsystems are nodes,
+    and the inside of each, in a frame with its name. Delayed edges are dashed; inputs from the environment are in
+    italics, before who reads them; nodes that are composed of others have a double border."""
     names = {name for name, _ in parts if name}
-    if not names:
-        return svg(parts[0][1])
     body: list[str] = []
     width = height = 0
     for name, graph in parts[:SUBSYSTEMS_DRAWN]:
-        if len(graph.nodes) > NODES_DRAWN:
-            drawn = _Drawn(600, 60, (f'<text x="20" y="35">{len(graph.nodes)} nodes: too many to draw</text>',))
-        else:
-            drawn = _drawn(graph, names)
+        drawn = _drawn(graph, names)
         heading = ""
         if name:
             height += _LANE
@@ -58,8 +44,10 @@ def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
     if len(parts) > SUBSYSTEMS_DRAWN:
         height += _LANE
         body.append(f'<text x="8" y="{height - 8}">and {len(parts) - SUBSYSTEMS_DRAWN} more subsystems</text>')
-    title = f"<title>{escape(f'{len(parts[0][1].nodes)} nodes, {len(names)} subsystems')}</title>"
-    return "\n".join([_opened(width, height), title, _ARROWHEAD, *body, "</svg>"])
+    whole = parts[0][1]
+    told = f"{len(whole.nodes)} nodes, " + (f"{len(names)} subsystems" if names else f"{len(whole.edges)} edges")
+    opened = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {_FONT}>'
+    return "\n".join([opened, f"<title>{escape(told)}</title>", _ARROWHEAD, *body, "</svg>"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +57,10 @@ class _Drawn:
     parts: tuple[str, ...]
 
 
-def _opened(width: int, height: int) -> str:
-    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {_FONT}>'
-
-
 def _drawn(graph: Graph, composed: Container[str]) -> _Drawn:
+    if len(graph.nodes) > NODES_DRAWN:
+        told = f"{len(graph.nodes)} nodes, {len(graph.edges)} edges: too many to draw"
+        return _Drawn(600, 60, (f'<text x="20" y="35">{told}</text>',))
     columns, links = _columns(graph)
     place = _places(columns)
     bottom = max((y for _, y in place.values()), default=0) + _HEIGHT
@@ -259,10 +246,3 @@ def _word(name: str, x: int, y: int) -> str:
     shown = name if len(name) <= 24 else f"{name[:23]}…"
     place = f'x="{x + _WIDTH - 6}" y="{y + _HEIGHT // 2 + 5}" text-anchor="end" font-style="italic"'
     return f"<text {place}>{escape(shown)}<title>{escape(name)}</title></text>"
-
-
-def _message(words: str) -> str:
-    return (
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 600 60" role="img" font-family="sans-serif">'
-        f'<text x="20" y="35">{escape(words)}</text></svg>'
-    )

@@ -15,7 +15,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import read_text
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.ltl import TooLarge
-from avow.isolation.observed import Observed, Seen, tracer
+from avow.isolation.observed import Observed, Seen, as_here
 from avow.isolation.outside import Outside
 from avow.isolation.tracing import remedy, traces
 
@@ -280,7 +280,7 @@ class _Run:
     def untraced(self) -> str:
         """Why another tool is not asked beside our own engine: its answer would be an undeclared input, and ours is
         none."""
-        self.observed[tracer()] = None
+        self.observed[as_here(Seen.TRACER)] = None
         return f"what it reads cannot be recorded ({remedy()})"
 
     def second(self, key: str, name: str, said: Said) -> None:

@@ -28,7 +28,7 @@ from avow.cli.graph import command as graph_command
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow
-from avow.system.graph_svg import svg, text
+from avow.system.graph_svg import sheet, text
 
 from .make import Limits, discharge, make, node
 
@@ -179,7 +179,7 @@ def test_names_are_escaped_everywhere(tmp_path: Path) -> None:
     ElementTree.fromstring(written.html)
     assert "a\\_1" in written.latex
     assert "a_1" not in written.latex
-    ElementTree.fromstring(svg(dataflow(system)))
+    ElementTree.fromstring(sheet([("", dataflow(system))]))
 
 
 def test_hostile_remarks_stay_text() -> None:
@@ -200,7 +200,7 @@ def test_pictures(tmp_path: Path) -> None:
     system = make(
         tmp_path, GOOD.replace("x : REAL )\n  outputs( y", "x : REAL, last : REAL, e : REAL )\n  outputs( y"), plan
     )
-    picture = svg(dataflow(system))
+    picture = sheet([("", dataflow(system))])
     assert ElementTree.fromstring(picture).tag.endswith("svg")
     assert picture.count("<rect") == 2
     assert picture.count("stroke-dasharray") == 1

@@ -12,7 +12,7 @@ from avow.calculus.composition import compose
 from avow.calculus.derivation import Rule
 from avow.cli.compose import command
 from avow.system.graph import dataflow
-from avow.system.graph_svg import svg, text
+from avow.system.graph_svg import sheet, text
 from avow.system.load import load_system
 from avow.system.rosgraph import account
 
@@ -182,7 +182,7 @@ def test_a_ros_graph_of_fifty_nodes(tmp_path: Path) -> None:
     assert not found.findings
     goal = compose(system).whole
     assert (goal.root.rule, len(goal.root.nodes)) == (Rule.R1, 47)
-    assert svg(dataflow(system)).count("<rect") == 47
+    assert sheet([("", dataflow(system))]).count("<rect") == 47
     (tmp_path / "plan.yaml").write_text(plan % "")
     system = load_system(tmp_path)
     (finding,) = account(system, dataflow(system)).findings

@@ -11,7 +11,7 @@ import pytest
 from helpers import some
 
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Observed, Seen, look, modules, recorded
+from avow.isolation.observed import Observed, Seen, as_here, look, recorded
 from avow.isolation.subject import SubjectProcess
 
 SEARCHED = {
@@ -81,11 +81,11 @@ def test_where_something_is_found_is_an_input(tmp_path: Path, name: str, monkeyp
 def test_what_adds_to_python_s_path_is_an_input(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "known.pth").write_text("/a\n")
     monkeypatch.setattr(site, "getsitepackages", lambda: [str(tmp_path)])
-    before = modules()
+    before = as_here(Seen.MODULES)
     (tmp_path / "package.py").touch()
-    assert modules() == before
+    assert as_here(Seen.MODULES) == before
     (tmp_path / name).write_text("/b\n")
-    assert modules() != before
+    assert as_here(Seen.MODULES) != before
 
 
 @pytest.mark.parametrize("name", ["purelib", "platlib"])
