@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from calculus.make import make, node, outcomes
+from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
@@ -44,16 +45,20 @@ def by_hand(path: Path) -> Established:
 
 @pytest.mark.parametrize(
     ("initial", "claim", "k", "y"),
-    [
-        ("out.y == in.k and in.k > 5", "n.k > 5", "REAL", "REAL"),
-        ("out.y == in.k", "n.k >= 0", "INTEGER", "NATURAL"),
-        ("in.k * out.y == 5", "n.k != 0", "REAL", "REAL"),
-        ("out.y == 1 and in.k > 5", "n.k > 5", "REAL", "REAL"),
-        ("out.y > in.k and out.y < 3", "n.k < 3", "REAL", "REAL"),
-        ("out.y + out.y == in.k", "mod(n.k, 2) == 0", "INTEGER", "INTEGER"),
-        ("in.k -> out.y != out.y", "not n.k", "BOOL", "REAL"),
-        ("exists(x in REAL | x * x == in.k) and out.y == 0", "n.k >= 0", "REAL", "REAL"),
-    ],
+    some(
+        [
+            ("out.y == in.k and in.k > 5", "n.k > 5", "REAL", "REAL"),
+            ("out.y == in.k", "n.k >= 0", "INTEGER", "NATURAL"),
+            ("in.k * out.y == 5", "n.k != 0", "REAL", "REAL"),
+            ("out.y == 1 and in.k > 5", "n.k > 5", "REAL", "REAL"),
+            ("out.y > in.k and out.y < 3", "n.k < 3", "REAL", "REAL"),
+            ("out.y + out.y == in.k", "mod(n.k, 2) == 0", "INTEGER", "INTEGER"),
+            ("in.k -> out.y != out.y", "not n.k", "BOOL", "REAL"),
+            ("exists(x in REAL | x * x == in.k) and out.y == 0", "n.k >= 0", "REAL", "REAL"),
+        ],
+        3,
+        slow=5,
+    ),
 )
 def test_it_cannot_make_a_claim_of_the_environment_true(
     tmp_path: Path, initial: str, claim: str, k: str, y: str

@@ -416,7 +416,7 @@ def test_nothing_is_found_where_nothing_was_done(place: Place) -> None:
     assert place.found() == []
 
 
-@pytest.mark.parametrize("kind", some(KINDS, 12, slow=len(KINDS) - 12), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", some(KINDS, 6, slow=len(KINDS) - 6), ids=lambda kind: kind.__name__)
 def test_every_tampering_is_found(place: Place, kind: Callable[[Place, random.Random], None]) -> None:
     for seed in range(TIMES):
         place.restore()

@@ -332,7 +332,7 @@ BY_PROGRAMS = {"the clock": ["date"], "the machine": ["hostname"]}
 
 
 @pytest.mark.skipif(not traces(), reason="strace does not run here")
-@pytest.mark.parametrize("name", BY_PROGRAMS)
+@pytest.mark.parametrize("name", some(BY_PROGRAMS, 1, slow=1))
 def test_what_a_started_program_asks_is_told(tmp_path: Path, name: str) -> None:
     """The clock, which it reads without asking the kernel, and what it asks the kernel."""
     (command,) = BY_PROGRAMS[name]
@@ -354,7 +354,7 @@ BY_THE_C_LIBRARY = {
 }
 
 
-@pytest.mark.parametrize("name", some(BY_THE_C_LIBRARY, 2))
+@pytest.mark.parametrize("name", some(BY_THE_C_LIBRARY, 1, slow=1))
 def test_what_machine_code_reads_is_told_by_a_trace_or_undeclared(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -369,7 +369,7 @@ def test_what_machine_code_reads_is_told_by_a_trace_or_undeclared(
     assert [what for what in outside(tmp_path, text) if tracing.remedy() in what]
 
 
-@pytest.mark.parametrize("name", some(UNRECORDABLE, 4))
+@pytest.mark.parametrize("name", some(UNRECORDABLE, 2, slow=2))
 def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str) -> None:
     if name == "a pipe":
         subprocess.run(["mkfifo", str(tmp_path / "pipe")], check=True)
@@ -427,7 +427,7 @@ WHERE = {
 }
 
 
-@pytest.mark.parametrize("name", WHERE)
+@pytest.mark.parametrize("name", some(WHERE, 3, slow=len(WHERE) - 3))
 def test_where_a_subject_runs_is_an_input_where_it_asks(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

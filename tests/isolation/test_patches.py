@@ -110,7 +110,7 @@ def asked(folder: Path, text: str, times: int = 30) -> tuple[list[Any], SubjectP
     return replies, subject
 
 
-@pytest.mark.parametrize("name", some(PATCHES, 5, 8))
+@pytest.mark.parametrize("name", some(PATCHES, 3, 10))
 def test_what_is_patched_answers_nothing(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, "off")
     replies, subject = asked(tmp_path, PATCHES[name])
@@ -147,7 +147,7 @@ WAYS_AROUND = {
 }
 
 
-@pytest.mark.parametrize("name", WAYS_AROUND)
+@pytest.mark.parametrize("name", some(WAYS_AROUND, 2, slow=2))
 def test_a_way_around_what_watches_is_closed_or_told(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -179,7 +179,7 @@ HONEST = {
 }
 
 
-@pytest.mark.parametrize("name", some(HONEST, 3))
+@pytest.mark.parametrize("name", some(HONEST, 2, slow=1))
 def test_what_only_concerns_itself_is_judged(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, "off")
     replies, subject = asked(tmp_path, HONEST[name], times=2)

@@ -3,6 +3,7 @@ to write instead. The wording stands in golden/slips.txt, to be read; AVOW_REFRE
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
 
@@ -35,6 +36,7 @@ def slips() -> list[tuple[str, str]]:
     return [(frame, text) for frame, _, text in found]
 
 
+@functools.cache
 def errors(frame: str, text: str) -> list[Diagnostic]:
     text = text.replace("\\n", "\n").replace("\\t", "\t")
     for character in ("\u00a0", "\u200b", "\ufeff"):

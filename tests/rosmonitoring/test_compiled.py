@@ -201,7 +201,7 @@ node n {{
 
 
 @pytest.mark.parametrize("kind", ["Float64", "Float32", "Other"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_readings_at_the_numbers_that_matter(
     kind: str, seed: int, make_system: Callable[..., System], tmp_path: Path
 ) -> None:

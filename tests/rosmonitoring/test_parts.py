@@ -66,7 +66,7 @@ def judged(
     return faults, counts, monitor.backwards
 
 
-@pytest.mark.parametrize("order", ["ab", "ba"])
+@pytest.mark.parametrize("order", ["ab", pytest.param("ba", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("way", WAYS)
 def test_of_a_correct_node_nothing_is_told(make_system: Make, way: str, order: str) -> None:
     for bad, clear in (("", (COUNT, 0, 0)), ("b", (COUNT - 1, 0, 1)), ("ab", (COUNT - 1, 0, 1))):
