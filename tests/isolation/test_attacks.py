@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from helpers import some
+from helpers import command, some
 from hoare.systems import make_job, sensor
 
 from avow.backend_kit.protocol import Limits, Report
@@ -209,14 +209,7 @@ def test_nothing_of_a_subject_is_left_and_the_level_is_recorded(
         f"def step(**inputs):\n    {WRONG}"
     )
     assert settle(tmp_path, text).isolation is (Isolation.PROCESSES if level == "off" else Isolation.SEALED)
-    assert not any(token in _command(pid) for pid in Path("/proc").glob("[0-9]*"))
-
-
-def _command(process: Path) -> str:
-    try:
-        return (process / "cmdline").read_bytes().decode(errors="replace")
-    except OSError:
-        return ""
+    assert not any(token.encode() in command(process.name) for process in Path("/proc").glob("[0-9]*"))
 
 
 @pytest.mark.slow

@@ -8,12 +8,11 @@ import subprocess
 import sys
 import textwrap
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from helpers import alive
+from helpers import alive, wait_for
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.base import process
@@ -104,15 +103,8 @@ def settle(root: Path, does: str) -> tuple[Outcome, Report]:
 def pids(root: Path) -> list[int]:
     """Of the hanging work and of what it started, once it hangs."""
     path = root / "pids"
-    until(path.is_file)
+    wait_for(path.is_file)
     return [int(word) for word in path.read_text().split()]
-
-
-def until(happens: object) -> None:
-    deadline = time.monotonic() + 120
-    while not happens():  # type: ignore[operator]
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def server() -> int:
@@ -158,7 +150,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
         if (odd / "pids").exists():
             break
     started = pids(odd)
-    until(lambda: not any(map(alive, started)))
+    wait_for(lambda: not any(map(alive, started)))
 
 
 @pytest.mark.slow
@@ -171,7 +163,7 @@ def test_an_interrupt_ends_all_works(odd: Path, way: str) -> None:
     process.kill_all()
     thread.join(120)
     assert found[0].verdict is Verdict.ERROR
-    until(lambda: not any(map(alive, started)))
+    wait_for(lambda: not any(map(alive, started)))
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED, "what was killed is started again for the next run"
 
 
@@ -211,7 +203,7 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     assert set(started) <= set(family)
     run.send_signal(signal.SIGKILL)
     run.wait()
-    until(lambda: not any(map(alive, family)))
+    wait_for(lambda: not any(map(alive, family)))
 
 
 @pytest.mark.slow
@@ -229,7 +221,7 @@ def test_nothing_outlives_a_process_that_is_killed_on_the_way(odd: Path, way: st
     os.kill(started[0] if whose == "the work's process" else above, signal.SIGKILL)
     thread.join(120)
     assert found[0].verdict is Verdict.ERROR
-    until(lambda: not any(map(alive, started)))
+    wait_for(lambda: not any(map(alive, started)))
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED
 
 

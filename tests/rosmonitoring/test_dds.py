@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from helpers import wait_for
 
 from avow.backends.rosmonitoring.live import dds
 from avow.backends.rosmonitoring.live.follow import UNORDERED, follow, graph_of
@@ -28,7 +29,7 @@ from avow.ros.listing import Listed, Listing
 from avow.system.load import load_system
 from avow.system.plan import System
 
-from .processes import LONGEST, MAPPING, RCL, running, wait_for
+from .processes import LONGEST, MAPPING, RCL, running
 from .test_bags import write_bag
 
 needs_dds = pytest.mark.needs_dds

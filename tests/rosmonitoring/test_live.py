@@ -18,6 +18,7 @@ from typing import Any
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
+from helpers import wait_for
 
 from avow.backends.rosmonitoring.live import ros1
 from avow.backends.rosmonitoring.live.follow import follow, graph_of
@@ -28,7 +29,7 @@ from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected
 from avow.system.plan import System
 
-from .processes import MAPPING, RCL, a_free_port, answers, running, wait_for
+from .processes import MAPPING, RCL, a_free_port, answers, running
 
 pytest.importorskip("rosbags")
 

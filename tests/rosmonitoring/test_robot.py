@@ -11,12 +11,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers import wait_for
 
 from avow.backends.rosmonitoring.session import session
 from avow.ros.bags import Event, carried, messages
 from avow.system.load import load_system
 
-from .processes import a_free_port, answers, running, wait_for
+from .processes import a_free_port, answers, running
 
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "contracts/remote_inspection"

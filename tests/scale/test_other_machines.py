@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from helpers import some
+from helpers import some, wait_for
 
 from avow.backend_kit.protocol import Report
 from avow.base.verdict import Verdict
@@ -28,9 +28,7 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
 from avow.pipeline.worker import answer
 
-from .test_executors import HANGS, Machines, Odd, command, machines, one, place, until, with_dafny, works
-
-__all__ = ["machines", "place"]  # fixtures
+from .machines import HANGS, Machines, Odd, one, with_dafny, works
 
 
 class Seeing(Odd):
@@ -172,8 +170,6 @@ def test_of_two_machines_only_what_is_as_here_is_on_record(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """For real: one worker sees another file at the place of the tool's settings."""
-    from avow.pipeline.cluster import Address, Cluster
-
     conf, theirs = tmp_path / "conf", tmp_path / "theirs"
     conf.write_text("ours")
     theirs.write_text("theirs")
@@ -181,20 +177,18 @@ def test_of_two_machines_only_what_is_as_here_is_on_record(
     other = ("bwrap", "--dev-bind", "/", "/", "--unshare-uts", "--hostname", "wk2", "--die-with-parent")
     for around, told in (((), ""), ((*other, "--bind", str(theirs), str(conf)), f"{conf} (on wk2)")):
         only = machines.worker(*around)
-        cluster = Cluster(Address.read(machines.url))
         try:
-            until(cluster.offers)
-            there = asking.elsewhere(cluster)
-            work = next(w for w in works(place, there) if w.engine == "dafny")
-            report = asking.settle(place, work, work.obligations, tmp_path, Run("a", False, elsewhere=there))
-            (row,) = [o for o in report.observed if o.path == str(conf)]
-            assert row == as_it_is(Seen.READ, conf)
-            assert not asking.unlike_here(report.observed, place.root)
-            assert told in capsys.readouterr().err
+            with machines.cluster() as cluster:
+                there = asking.elsewhere(cluster)
+                work = next(w for w in works(place, there) if w.engine == "dafny")
+                report = asking.settle(place, work, work.obligations, tmp_path, Run("a", False, elsewhere=there))
+                (row,) = [o for o in report.observed if o.path == str(conf)]
+                assert row == as_it_is(Seen.READ, conf)
+                assert not asking.unlike_here(report.observed, place.root)
+                assert told in capsys.readouterr().err
         finally:
             only.kill()
             only.wait()
-            cluster.close()
 
 
 @pytest.mark.slow
@@ -203,23 +197,16 @@ def test_a_run_that_ends_leaves_no_tool_on_a_worker(
     place: Workspace, machines: Machines, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, signal_sent: signal.Signals
 ) -> None:
     with_dafny(place, tmp_path, monkeypatch, HANGS.format(seconds=machines.seconds))
-    from avow.pipeline.cluster import Address, Cluster
-
     machines.worker()
-    cluster = Cluster(Address.read(machines.url))
-    until(cluster.offers)
-    cluster.close()
-
-    def hanging() -> bool:
-        return any(b"sleep" in command(pid) for pid in machines.left())
-
+    with machines.cluster():
+        pass
     words = [sys.executable, "-m", "avow", "verify", "--on", machines.url]
     run = subprocess.Popen(words, cwd=place.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        until(hanging)
+        wait_for(machines.hanging)
         run.send_signal(signal_sent)
         run.wait(60)
-        until(lambda: not hanging())
+        wait_for(lambda: not machines.hanging())
     finally:
         run.kill()
         run.wait()
