@@ -79,6 +79,23 @@ Values = OneOf["shown", "if any", "unused"]
 numbers that have no exact decimal); or not looked at."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A question: see `solve`. `free`: the variables whose values are wanted; `small`: with small numbers, where there
+    are such values."""
+
+    labelled: Mapping[str, Term]
+    free: frozenset[Variable]
+    given: Mapping[Variable, Value]
+    effort: int
+    seed: int
+    small: bool
+
+    def fixed(self, translator: Translator) -> dict[Variable, Meaning]:
+        """What is given, as meanings."""
+        return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
+
+
 # -- terms -------------------------------------------------------------------------------------------------------------
 
 
@@ -104,20 +121,14 @@ def solve(
     with budget(effort * QUESTION_SHARE):
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
-        small = values != "unused"
+        asked = _Asked(labelled, free, given or {}, effort, seed, values != "unused")
         try:
-            solution = _within_bounds(labelled, free, given or {}, effort, seed, small=small) or _solve(
-                Translator(), labelled, free, given or {}, effort, seed, small=small
-            )
+            solution = _within_bounds(asked) or _solve(Translator(), asked)
         except Unsupported as error:
             solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
         except z3.Z3Exception as error:
             solution = Solution("unknown", reason=f"Z3: {error}")
-        if (
-            solution.status == "unknown"
-            and values != "shown"
-            and _has_solution(labelled, free, given or {}, effort, seed)
-        ):
+        if solution.status == "unknown" and values != "shown" and _has_solution(asked):
             solution = Solution("sat")
         patient = solution.status == "unknown" and not given and effort >= ANOTHER_SOLVER_EFFORT
         if patient and allowed(effort):
@@ -158,19 +169,10 @@ def entails(
     return replace(found, engine=solution.engine, seconds=solution.seconds)
 
 
-def _solve(
-    translator: Translator,
-    labelled: Mapping[str, Term],
-    free: frozenset[Variable],
-    given: Mapping[Variable, Value],
-    effort: int,
-    seed: int,
-    *,
-    small: bool,
-) -> Solution:
-    """`small`: with small numbers, where that is possible."""
-    fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
-    free = free - set(fixed)
+def _solve(translator: Translator, question: _Asked) -> Solution:
+    labelled, given, effort, seed = question.labelled, question.given, question.effort, question.seed
+    fixed = question.fixed(translator)
+    free = question.free - set(fixed)
     tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
     background = [*translator.background(free), *translator.opaque_facts()]
     ordered = sorted(free, key=lambda v: (v.qualified, repr(v.sort)))
@@ -186,7 +188,7 @@ def _solve(
 
     def replayed(answer: Answer, engine: str, *, simple: bool) -> Solution | None:
         """The values of its model, if they can be read and replayed."""
-        for smaller in (True,) if small else (False, True):
+        for smaller in (True,) if question.small else (False, True):
             one = with_small_numbers(translator, whole, numbers, answer, seed=seed) if smaller else answer
             values = _read(one.model, free) if one.model is not None else None
             if values is None or (simple and not all(map(_is_simple, values.values()))):
@@ -230,60 +232,47 @@ def _solve(
     return Solution("unknown", reason=reason or NO_ANSWER)
 
 
-def _within_bounds(
-    labelled: Mapping[str, Term],
-    free: frozenset[Variable],
-    given: Mapping[Variable, Value],
-    effort: int,
-    seed: int,
-    *,
-    small: bool,
-) -> Solution | None:
+def _within_bounds(asked: _Asked) -> Solution | None:
     """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
     zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
+    labelled = asked.labelled
     if not any(is_partial(formula) for formula in labelled.values()):
         return None
     inside = conjunction(map(defined, labelled.values()))
-    sequences = [v for v in free if isinstance(v.sort, SequenceSort) and v not in given]
+    sequences = [v for v in asked.free if isinstance(v.sort, SequenceSort) and v not in asked.given]
     flat = flatten({**labelled, _INSIDE: inside}, sequences)
-    formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
-    variables = frozenset(flat.variables(free) if flat else free)
-    translator = Translator()
-    found = _solve(translator, formulas, variables, given, effort // 3, seed, small=small)
+    formulas = flat.formulas if flat else {**labelled, _INSIDE: inside}
+    variables = frozenset(flat.variables(asked.free) if flat else asked.free)
+    translator, within = Translator(), replace(asked, labelled=formulas, free=variables, effort=asked.effort // 3)
+    found = _solve(translator, within)
     if found.status == "sat":
         values = flat.values(found.values) if flat else found.values
-        if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
+        if values is not None and replay(labelled.values(), {**values, **asked.given}, beside=translator):
             return Solution("sat", values, engine=found.engine)
     if flat is None:
         return None
-    del formulas[_INSIDE]
-    anywhere = _solve(Translator(), formulas, variables, given, effort // 3, seed, small=small)
+    anywhere = _solve(Translator(), replace(within, labelled={label: flat.formulas[label] for label in labelled}))
     return anywhere if anywhere.status == "unsat" else None
 
 
 _INSIDE = "within the bounds"
 
 
-def _has_solution(
-    labelled: Mapping[str, Term],
-    free: frozenset[Variable],
-    given: Mapping[Variable, Value],
-    effort: int,
-    seed: int,
-) -> bool:
+def _has_solution(asked: _Asked) -> bool:
     """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
     finds is a solution even if it cannot be written down."""
-    parts = [part for formula in labelled.values() for part in subterms(formula)]
-    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(is_partial, labelled.values())):
+    formulas = asked.labelled.values()
+    parts = [part for formula in formulas for part in subterms(formula)]
+    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(is_partial, formulas)):
         return False
-    if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in free):
+    if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in asked.free):
         return False
     try:
         translator = Translator()
-        fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
-        facts = [translator.term(formula, fixed) for formula in labelled.values()]
-        asked = [*translator.background(free - set(fixed)), *facts]
-        return check(translator, asked, effort=effort, seed=seed).status == "sat"
+        fixed = asked.fixed(translator)
+        facts = [translator.term(formula, fixed) for formula in formulas]
+        whole = [*translator.background(asked.free - set(fixed)), *facts]
+        return check(translator, whole, effort=asked.effort, seed=asked.seed).status == "sat"
     except (Unsupported, z3.Z3Exception):
         return False
 
