@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
-from functools import partial
 from typing import TYPE_CHECKING, assert_never
 
 from avow.base.graphs import components, reached
@@ -118,13 +117,10 @@ class Certificates:
             entries += next(shown, ())
         scope = existence_scope(name)
         self.made[scope] = Certificate(scope, tuple(entries))
-        return self._existing(self.made[scope], name)
+        return self.existing(self.made[scope], name)
 
-    def kept_existence(self, name: str) -> list[Established] | None:
-        """As `existence`, from the certificate of an earlier run."""
-        return self._existing(self.kept.get(existence_scope(name)), name)
-
-    def _existing(self, certificate: Certificate | None, name: str) -> list[Established] | None:
+    def existing(self, certificate: Certificate | None, name: str) -> list[Established] | None:
+        """As `existence`, from a certificate."""
         found = complete(
             next((one for claim in part if (one := self.established(certificate, claim)) is not None), None)
             for part in self.parts(name)
@@ -212,7 +208,7 @@ class Certificates:
             self.known_with(tuple(lemmas)),
             goal.name,
             order,
-            partial(_behind, into),
+            lambda node: frozenset(reached(into.get(node, ()), lambda name: into.get(name, ()))),
             any(e.delayed for e in edges) or composition.frame.remembering(nodes),
             frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
             hints,
@@ -298,7 +294,3 @@ def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
         back = int(name != label)
         found.append((name if name.startswith(("environment ", "memory ", INVARIANT)) else innermost(name), back))
     return tuple(dict.fromkeys(found))
-
-
-def _behind(into: Mapping[str, list[str]], node: str) -> frozenset[str]:
-    return frozenset(reached(into.get(node, ()), lambda name: into.get(name, ())))

@@ -13,7 +13,7 @@ from avow.base.diagnostics import Span
 from avow.base.files import sha256
 from avow.base.optional import complete
 from avow.base.records import dataclass
-from avow.base.verdict import Hypothesis, HypothesisKind, Outcome
+from avow.base.verdict import Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, composed
@@ -73,7 +73,7 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], bou
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
-            outcome = questions.vanished(obligation.id)
+            outcome = Outcome(obligation.id, Verdict.ERROR, "the system as it stands has no such obligation")
         else:
             answer = task.ask(composition, bounds)
             goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
@@ -98,8 +98,9 @@ def reestablished(certificates: Certificates, obligation: str) -> Reestablished 
         scope = requirement_scope(name)
         return _all_told(obligation, [certificates.kept_for(scope, Claimed.REQUIREMENT, name)], scope)
     if certificates.parts(name):
-        possible = certificates.kept_existence(name)
-        return _all_told(obligation, possible or (None,), existence_scope(name))
+        scope = existence_scope(name)
+        possible = certificates.existing(certificates.kept.get(scope), name)
+        return _all_told(obligation, possible or (None,), scope)
     for goal in certificates.composition.goals:
         for part in goal.root.walk():
             if part.rule is Rule.R4 and name == _loop_name(certificates.composition, goal, part):

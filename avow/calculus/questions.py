@@ -7,6 +7,7 @@ from dataclasses import field, replace
 from typing import Protocol, assert_never
 
 from avow.base.files import sha256
+from avow.base.optional import complete
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
@@ -21,7 +22,6 @@ from avow.calculus.variables import Frame
 from avow.formulas.formula import negation
 from avow.kernel.check import Established
 from avow.language.printer import show_term
-from avow.language.terms import Term
 from avow.sanity.claims import triggers
 from avow.solving.questions import solve
 from avow.solving.sizes import in_every_size
@@ -64,11 +64,6 @@ class Question(Protocol):
     """Settles one obligation."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer: ...
-
-
-def vanished(obligation: str) -> Outcome:
-    """The answer to an obligation that the system does not have (any more)."""
-    return Outcome(obligation, Verdict.ERROR, "the system as it stands has no such obligation")
 
 
 # -- side conditions ---------------------------------------------------------------------------------------------------
@@ -270,20 +265,16 @@ class LoopQuestion:
     entered: str
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        answers = composition.settled(composition.goal(self.goal), bounds)
-        loop = next(loop for loop in answers.loops if loop.members == self.members)
+        goal = composition.goal(self.goal)
+        loop = next(loop for loop in composition.settled(goal, bounds).loops if loop.members == self.members)
         details: dict[str, object] = {"form": loop.form.value, "cycle": list(loop.cycle)}
         match loop.form:
             case LoopForm.BOOTSTRAP | LoopForm.INITIAL:
-                goal = composition.goal(self.goal)
-                conditions = [
-                    c for part in goal.root.walk() if part.nodes == self.members for c in part.side_conditions
-                ]
-                found = [composition.certificates.condition(goal, str(c.about), bounds) for c in conditions]
-                there = [one for one in found if one is not None]
-                complete = there if len(there) == len(found) else None
+                parts = (part for part in goal.root.walk() if part.nodes == self.members)
+                about = [str(condition.about) for part in parts for condition in part.side_conditions]
+                found = [composition.certificates.condition(goal, one, bounds) for one in about]
                 told = Answer(Verdict.PROVED, loop.note, details=details)
-                return made_up(told, complete, late=composition.certificates.late)
+                return made_up(told, complete(found), late=composition.certificates.late)
             case LoopForm.CIRCULAR:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
@@ -404,18 +395,3 @@ class JointQuestion:
         room = Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
         found = composition.certificates.existence(f"joint.{about}")
         return made_up(room, found, late=composition.certificates.late)
-
-
-# -- hypotheses --------------------------------------------------------------------------------------------------------
-
-
-def contracts(frame: Frame, clauses: Sequence[str], earlier: int = 0) -> dict[str, Term]:
-    """The guarantees named, and all assumptions of their nodes, as labelled hypotheses."""
-    suffix = " one step before" if earlier else ""
-    found: dict[str, Term] = {}
-    for name in clauses:
-        node, _, clause = name.partition(".")
-        for assumption in frame.node(node).assumptions:
-            found[f"{node}.{assumption.name}{suffix}"] = frame.clause(node, assumption.name, earlier)
-        found[f"{node}.{clause}{suffix}"] = frame.clause(node, clause, earlier)
-    return found

@@ -100,11 +100,9 @@ class Offer:
         return found | ({"when": when} if when else {})
 
 
-def offers(
-    frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place], effort: int = OFFERS_EFFORT
-) -> tuple[Offer, ...]:
+def offers(frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place]) -> tuple[Offer, ...]:
     """What would make the hypotheses imply the goal, at most one offer for each place."""
-    end = until(effort)
+    end = until(OFFERS_EFFORT)
     found: dict[tuple[str, str], Offer] = {}
     size = sum(1 for term in (goal, *hypotheses.values()) for _ in subterms(term))
     for number, place in enumerate(places):

@@ -22,7 +22,7 @@ from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import INVARIANT, Written, further, in_words, steps
 from avow.calculus.model_checking import cannot_run, judge_property, refuting_run
-from avow.calculus.questions import Answer, as_far_as_shown, certified, contracts, would_hold_if
+from avow.calculus.questions import Answer, as_far_as_shown, certified, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.scenario import CannotRun
 from avow.calculus.variables import Frame, Observed, system_term
@@ -173,8 +173,13 @@ class FormulaQuestion:
         )
 
     def known(self, frame: Frame, clauses: tuple[str, ...], earlier: int = 0) -> dict[str, Term]:
-        """What may be used of a step: these clauses, what is assumed of the environment, and what is remembered."""
-        return contracts(frame, clauses, earlier) | frame.environment(earlier) | frame.memory(earlier, self.name)
+        """What may be used of a step: these guarantees, all assumptions of their nodes, what is assumed of the
+        environment, and what is remembered."""
+        found: dict[str, Term] = {}
+        for node, _, clause in (name.partition(".") for name in clauses):
+            for name in (*(assumption.name for assumption in frame.node(node).assumptions), clause):
+                found[f"{node}.{name}{' one step before' if earlier else ''}"] = frame.clause(node, name, earlier)
+        return found | frame.environment(earlier) | frame.memory(earlier, self.name)
 
     def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
         return implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)

@@ -165,10 +165,9 @@ def normalise(term: Term) -> Term:
     return run(_normal(term, {}, 0))[0]
 
 
-def digest(*terms: Term, sorts: Iterable[Sort] = ()) -> str:
-    """SHA-256 of the meaning of some formulas (their order does not count) and of some sorts."""
-    keys = sorted(set(map(meaning, terms)))
-    return _hash("formulas", *keys, "sorts", *sorted({sort_digest(sort) for sort in sorts}))
+def digest(*terms: Term) -> str:
+    """SHA-256 of the meaning of some formulas; their order does not count."""
+    return _hash("formulas", *sorted(set(map(meaning, terms))), "sorts")
 
 
 @by_identity(50_000)

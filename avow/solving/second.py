@@ -31,10 +31,10 @@ def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFF
     return smtlib.ask_cvc5(script, effort=max(1, min(effort, SECOND_OPINION_EFFORT))) == "sat"
 
 
-def doubted(answer: Solution, formulas: Mapping[str, Term], *, effort: int = SECOND_OPINION_EFFORT) -> bool:
+def doubted(answer: Solution, formulas: Mapping[str, Term]) -> bool:
     """Whether cvc5 says that the labelled formulas which an `unsat` names can hold together. What is `unsat` by cvc5's
     own word is not asked again."""
     if answer.status != "unsat" or answer.engine == "cvc5":
         return False
     conflicting = [formula for label, formula in formulas.items() if label in answer.core]
-    return contradicted([conjunction(conflicting or formulas.values())], effort=effort)
+    return contradicted([conjunction(conflicting or formulas.values())])

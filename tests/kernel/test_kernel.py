@@ -279,7 +279,7 @@ def test_a_beginning_that_hinges_on_the_environment_rests_on_it(tmp_path: Path) 
         assert found is not None
         assert [need.kind for need in found.hypotheses] == [How.ENVIRONMENT] * needs
         again = Certificates(certificates.composition, kept=dict(certificates.made))
-        assert again.kept_existence("start.mem") == [found]
+        assert again.existing(again.kept.get("existence start.mem"), "start.mem") == [found]
         bare = Entry(How.POSSIBLE, "", certificates.made["existence start.mem"].entries[-1].digest)
         kernel = Kernel(certificates.known, Certificate("existence start.mem", (bare,)), Solvers())
         if needs:
