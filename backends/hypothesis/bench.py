@@ -36,18 +36,19 @@ from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import RealSort, Sort
 
 from . import steer
-from .beside import kept_inputs, system_root, table_rows
 from .convention import (
     EXACT,
     SPECIAL,
     Case,
     Malformed,
-    as_double,
     asked_with,
+    kept_inputs,
     outputs,
     pairs,
     rounded,
     sent_inputs,
+    system_root,
+    table_rows,
     told,
     valuation,
 )
@@ -124,7 +125,6 @@ class Bench:
     @property
     def inputs(self) -> st.SearchStrategy[Inputs]:
         """Inputs that meet the assumptions, mostly: `check` rejects the others."""
-
         text = st.binary(min_size=CASE_BYTES, max_size=CASE_BYTES)
         return text.map(lambda data: self.as_given(self.generator.case(Source(data), self.blamed, self._aims)))
 
@@ -132,7 +132,7 @@ class Bench:
         return {name: rounded(value) for name, value in inputs.items()} if self.doubles else inputs
 
     def sent(self, inputs: Inputs) -> dict[str, Any]:
-        return as_double(sent_inputs(inputs)) if self.doubles else sent_inputs(inputs)
+        return sent_inputs(inputs, doubles=self.doubles)
 
     def configured(self, test: Callable[..., None]) -> Callable[..., None]:
         """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""

@@ -7,11 +7,15 @@ infinities) is tried apart, and so is the negative zero.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+from avow.base.codec import from_text
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value, show
 from avow.language.printer import show_sort
 from avow.language.sorts import (
@@ -30,8 +34,9 @@ from avow.language.sorts import (
     TupleSort,
 )
 
-from .exchange import Pairs
+from .exchange import Pairs, Question
 from .generate import Inputs
+from .pools import parse_cell
 
 
 class Malformed(Exception):  # noqa: N818 - it names what is wrong
@@ -227,8 +232,10 @@ def asked_with(inputs: Inputs, name: str, word: str) -> Pairs:
     return tuple((n, word if n == f"in.{name}" else value) for n, value in pairs(inputs, {}))
 
 
-def sent_inputs(inputs: Inputs) -> dict[str, Any]:
-    return {name: sent(value) for name, value in inputs.items()}
+def sent_inputs(inputs: Inputs, *, doubles: bool = False) -> dict[str, Any]:
+    """Inputs as JSON data for the host; `doubles`: of rounded values, with doubles in it."""
+    made = {name: sent(value) for name, value in inputs.items()}
+    return {name: _as_double(data) for name, data in made.items()} if doubles else made
 
 
 # -- machine numbers ---------------------------------------------------------------------------------------------------
@@ -263,14 +270,58 @@ def rounded(value: Value) -> Value:
             return value
 
 
-def as_double(data: Any) -> Any:
+def _as_double(data: Any) -> Any:
     """What `sent` made of a rounded value, with doubles in it."""
     match data:
         case {"q": [numerator, denominator]}:
             return {"r": float(Fraction(numerator, denominator)).hex()}
         case dict():
-            return {key: as_double(part) for key, part in data.items()}
+            return {key: _as_double(part) for key, part in data.items()}
         case list():
-            return [as_double(part) for part in data]
+            return [_as_double(part) for part in data]
         case _:  # no number
             return data
+
+
+# -- what lies beside a generated test: kept cases, the scenario's rows ------------------------------------------------
+
+
+def kept_inputs(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
+    """The kept cases that are inputs of the contract as it is now; of a run, those of its steps."""
+    found: list[Inputs] = []
+    for case in (step for run in kept_runs(path) for step in run):
+        with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
+            found.append({name: received(case[name], sort, name) for name, sort in sorts.items()})
+    return tuple(found)
+
+
+def kept_runs(path: Path) -> tuple[tuple[Any, ...], ...]:
+    """The kept cases as data: each the inputs of the steps of a run; of a function that is asked one step, of one."""
+    return from_text(tuple[tuple[Any, ...], ...], path.read_bytes()) if path.is_file() else ()
+
+
+def table_rows(
+    scenario: Mapping[str, Sequence[Sequence[str]]], sorts: Mapping[str, Sort]
+) -> dict[str, tuple[tuple[Value, ...], ...]]:
+    """The scenario's rows for the ports that it interprets, as values; a row that does not fit is left out."""
+    found: dict[str, tuple[tuple[Value, ...], ...]] = {}
+    for name, table in scenario.items():
+        sort = sorts.get(name)
+        if isinstance(sort, FunctionSort):
+            columns = sort.parameters if isinstance(sort.result, BoolSort) else (*sort.parameters, sort.result)
+            read = [tuple(parse_cell(cell, s) for cell, s in zip(row, columns, strict=False)) for row in table]
+            fitting = [row for row in read if len(row) == len(columns) and None not in row]
+            found[name] = tuple(tuple(v for v in row if v is not None) for row in fitting)
+    return found
+
+
+def system_root(asked: Question, folder: Path) -> Path:
+    """The system's folder: known from the environment, or beside the artifacts."""
+    root = os.environ.get("AVOW_SYSTEM_ROOT")
+    if root:
+        return Path(root)
+    for parent in folder.resolve().parents:
+        candidate = parent / "contracts" / asked.folder
+        if (candidate / asked.subject.file).is_file():
+            return candidate
+    return folder

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import contextlib
 import itertools
 import math
 import unicodedata
@@ -13,9 +12,9 @@ from fractions import Fraction
 
 from avow.backend_kit.programs.samples import worked_out
 from avow.base.plain import LOOK
-from avow.evaluation.evaluate import NotEvaluable, evaluate
-from avow.formulas.formula import free_variables
+from avow.evaluation.linear import Linear
 from avow.formulas.values import Element, Value
+from avow.language.bounds import constant
 from avow.language.sorts import (
     INTEGER,
     NATURAL,
@@ -71,22 +70,11 @@ def pools(
     of_subject: tuple[frozenset[Fraction], frozenset[str]] = (frozenset(), frozenset()),
 ) -> Pools:
     """From the constants in the formulas, from the scenario's rows, and from the numbers and texts in the subject."""
-    numbers: set[Fraction] = set()
-    solved: set[Fraction] = set()
-    strings: set[str] = {"", *(t for text in of_subject[1] for t in (text, text + "x"))}
-    for formula in formulas:
-        for part in subterms(formula):
-            if isinstance(part, Literal) and not isinstance(part.value, bool):
-                if isinstance(part.value, str):
-                    strings |= {part.value, part.value + "x"}
-                else:
-                    numbers.add(Fraction(part.value))
-            elif isinstance(part, Arithmetic | Negative) and not free_variables(part):
-                with contextlib.suppress(NotEvaluable):
-                    value = evaluate(part, {})  # `4 * Flow` is a threshold as much as 2 is
-                    numbers.add(Fraction(value) if isinstance(value, int | Fraction) else Fraction(0))
-            elif isinstance(part, Compare):
-                solved |= _solved(part)
+    parts = [part for formula in formulas for part in subterms(formula)]
+    numbers = {number for part in parts if (number := constant(part)) is not None}  # `4 * Flow`, too
+    solved = {number for part in parts if isinstance(part, Compare) for number in _solved(part)}
+    said = {part.value for part in parts if isinstance(part, Literal) and isinstance(part.value, str)}
+    strings = {"", *(t for text in said | of_subject[1] for t in (text, text + "x"))}
     around = _around(numbers | solved)
     few = sorted({*numbers, Fraction(0)}) if len(numbers) <= CONSTANTS_COMBINED else []
     # An output's threshold may be reached from an input by adding or taking away.
@@ -175,51 +163,44 @@ def _lengths(numbers: Iterable[Fraction]) -> tuple[int, ...]:
 
 def _solved(comparison: Compare) -> set[Fraction]:
     """Where the two sides meet, if all that is open is one value: ``4 * gauge < 20`` has its threshold at 5."""
-    left, right = _linear(comparison.left), _linear(comparison.right)
-    if left is None or right is None:
+    names: dict[Term, str] = {}
+    left, right = _linear(comparison.left, names), _linear(comparison.right, names)
+    apart = left.plus(right, Fraction(-1)) if left is not None and right is not None else None
+    if apart is None or len(apart.coefficients) != 1:
         return set()
-    total = {what: left.get(what, Fraction(0)) - right.get(what, Fraction(0)) for what in left | right}
-    constant = total.pop(None, Fraction(0))
-    slopes = [slope for slope in total.values() if slope]
-    if len(slopes) != 1:
-        return set()
-    meeting = -constant / slopes[0]
+    meeting = -apart.constant / apart.coefficients[0][1]
     return {meeting, Fraction(math.floor(meeting)), Fraction(math.ceil(meeting))}
 
 
-def _linear(term: Term) -> dict[Term | None, Fraction] | None:
-    """The coefficients of what is no arithmetic (under None, the constant); None if it is not linear in it."""
+def _linear(term: Term, names: dict[Term, str]) -> Linear | None:
+    """A sum over what is no arithmetic, each by a name of its own; None if it is not linear in it."""
     match term:
-        case Literal(value=bool()) | Literal(value=str()):
+        case Literal(value=bool() | str()):
             return None
-        case Literal(value=value) if isinstance(value, int | Fraction):
-            return {None: Fraction(value)}
+        case Literal(value=value):
+            return Linear((), Fraction(value))
         case Widen(term=inner):
-            return _linear(inner)
+            return _linear(inner, names)
         case Negative(term=inner):
-            return _times(_linear(inner), Fraction(-1))
+            turned = _linear(inner, names)
+            return None if turned is None else turned.times(Fraction(-1))
         case Arithmetic(operator=operator, left=left, right=right):
-            one, other = _linear(left), _linear(right)
+            one, other = _linear(left, names), _linear(right, names)
             if one is None or other is None:
                 return None
             match operator:
                 case "+" | "-":
-                    more = _times(other, Fraction(1 if operator == "+" else -1)) or {}
-                    return {what: one.get(what, Fraction(0)) + more.get(what, Fraction(0)) for what in one | more}
-                case "*" if other.keys() <= {None}:
-                    return _times(one, other.get(None, Fraction(0)))
-                case "*" if one.keys() <= {None}:
-                    return _times(other, one.get(None, Fraction(0)))
-                case "/" if other.keys() == {None} and other[None]:
-                    return _times(one, 1 / other[None])
+                    return one.plus(other, Fraction(1 if operator == "+" else -1))
+                case "*" if not other.coefficients:
+                    return one.times(other.constant)
+                case "*" if not one.coefficients:
+                    return other.times(one.constant)
+                case "/" if not other.coefficients and other.constant:
+                    return one.times(1 / other.constant)
             return None
         case _ if isinstance(term.sort, RealSort | IntegerSort | NaturalSort):
-            return {term: Fraction(1)}
+            return Linear(((names.setdefault(term, str(len(names))), Fraction(1)),), Fraction(0))
     return None
-
-
-def _times(linear: dict[Term | None, Fraction] | None, factor: Fraction) -> dict[Term | None, Fraction] | None:
-    return None if linear is None else {what: coefficient * factor for what, coefficient in linear.items()}
 
 
 def _by_sort(numbers: tuple[Fraction, ...], texts: tuple[str, ...]) -> dict[Sort, tuple[Value, ...]]:

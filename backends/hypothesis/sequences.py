@@ -25,8 +25,7 @@ from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
 from . import steer
 from .bench import Bench, _Enough
-from .beside import kept_runs
-from .convention import SPECIAL, Case, Malformed, asked_with, outputs, pairs, received, told, valuation
+from .convention import SPECIAL, Case, Malformed, asked_with, kept_runs, outputs, pairs, received, told, valuation
 from .exchange import Answer, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Impossible, Inputs, Source

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
@@ -138,14 +139,7 @@ def locate(job: Job) -> SubjectFile:
     if not colon or not name or not function.isidentifier():
         message = f"`{text}` is not of the form file.py:function"
         raise Rejected(Diagnostic("HYPO100", message, options.at("subject")))
-    path = inside(job.root, name)
-    if path is None:
-        raise Rejected(Diagnostic("HYPO101", f"`{name}` is outside the system's folder", options.at("subject")))
-    if not path.is_file():
-        raise Rejected(
-            Diagnostic("HYPO101", f"there is no file `{name}` in the system's folder", options.at("subject"))
-        )
-    return SubjectFile(name, path, function)
+    return SubjectFile(name, existing_file(job, "subject", name, wrong="HYPO101", absent="HYPO101"), function)
 
 
 def _declared(job: Job, source: Source) -> SubjectFile:

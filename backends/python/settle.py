@@ -12,7 +12,7 @@ from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.linked import Recorded, recorded, settled
-from avow.backend_kit.programs.cpython import Told, ask, case_of
+from avow.backend_kit.programs.cpython import Subject, ask, case_of
 from avow.backend_kit.programs.judging import Formula, Seen, meets, seen, started
 from avow.backend_kit.programs.samples import Drawing, beside, leaves, numbers_of, pool, shifted, written
 from avow.backend_kit.protocol import Job, Limits, Report
@@ -186,17 +186,14 @@ class Work:
         exact numbers, what is judged are runs on fractions in which no float came in between."""
         if not cases:
             return ""
-        asked = [case_of(*self.parted(case)) for case in cases]
-        seconds = max(2.0, min(RUN_SECONDS, self.limits.seconds))
         subject = self.reading.subject
         if exactly:
             subject = replace(subject, params=_exactly(subject.params))
-        found = ask(subject, asked, seconds=seconds, megabytes=self.limits.megabytes)
-        self.keep(found)
-        if found.fault or len(found.replies) != len(cases):
-            return found.fault or "the class did not answer every case"
+        replies, fault = self.ask(subject, cases, max(2.0, min(RUN_SECONDS, self.limits.seconds)))
+        if fault:
+            return fault
         allowed = meets(assumed)
-        for case, reply in zip(cases, found.replies, strict=True):
+        for case, reply in zip(cases, replies, strict=True):
             if not isinstance(reply, dict) or "steps" not in reply:
                 return f"the class cannot be driven: {_reason(reply)}"
             why = self.differs(case, reply) if not exactly else ""
@@ -220,11 +217,16 @@ class Work:
         memory = self.reading.source.memory
         return {n: v for n, v in case.items() if n not in memory}, {n: v for n, v in case.items() if n in memory}
 
-    def keep(self, found: Told) -> None:
+    def ask(self, subject: Subject, cases: Sequence[Mapping[str, Any]], seconds: float) -> tuple[Sequence[Any], str]:
+        """CPython's answers, or why none of them counts."""
+        asked = [case_of(*self.parted(case)) for case in cases]
+        found = ask(subject, asked, seconds=seconds, megabytes=self.limits.megabytes)
         self.observed.update(dict.fromkeys(found.observed))
         self.isolation = min(self.isolation, found.isolation, key=lambda level: level.rank)
         self.silent |= found.silent
         self.deed |= found.deed
+        whole = len(found.replies) == len(cases)
+        return found.replies, found.fault or ("" if whole else "the class did not answer every case")
 
     def differs(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> str:
         """How class and translation differ on a case, bit for bit."""
@@ -337,12 +339,10 @@ class Work:
                 for special in (math.nan, math.inf, -math.inf):
                     held: Any = [special, *case[name][1:]] if isinstance(case[name], list) else special
                     asked.append(({**case, name: held}, name, str(special)))
-        texts = [case_of(*self.parted(case)) for case, _, _ in asked]
-        found = ask(self.reading.subject, texts, seconds=RUN_SECONDS, megabytes=self.limits.megabytes)
-        self.keep(found)
-        if found.fault or len(found.replies) != len(asked):
-            return self.alike(Verdict.ERROR, found.fault or "the class did not answer every case")
-        for (case, name, word), reply in zip(asked, found.replies, strict=True):
+        replies, fault = self.ask(self.reading.subject, [case for case, _, _ in asked], RUN_SECONDS)
+        if fault:
+            return self.alike(Verdict.ERROR, fault)
+        for (case, name, word), reply in zip(asked, replies, strict=True):
             zero = {**case, name: [0.0, *case[name][1:]] if isinstance(case[name], list) else 0.0}
             answer = seen(self.job.node, self.reading.source.memory, zero, reply)
             pairs = tuple((n, word if n == f"in.{name}" else v) for n, v in answer.pairs())

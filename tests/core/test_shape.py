@@ -269,7 +269,7 @@ OWN = {
     "backends/ajpf/spin.py",
     "backends/fuzz/runner.py",
     "backends/fuzz/tables.py",
-    "backends/hypothesis/beside.py",
+    "backends/hypothesis/convention.py",
     "backends/hypothesis/bench.py",
 }
 """These read what Avow brought, or wrote a moment ago in a folder that nobody else knows."""
