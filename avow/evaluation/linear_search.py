@@ -41,25 +41,25 @@ class _TooMany(Exception):  # noqa: N818 - it names what happened
 
 
 @dataclass(frozen=True, slots=True)
-class _Linear:
+class Linear:
     """``sum of coefficient * variable + constant``; no coefficient is zero."""
 
     coefficients: tuple[tuple[str, Fraction], ...]
     constant: Fraction
 
     @staticmethod
-    def of(coefficients: Mapping[str, Fraction], constant: Fraction) -> _Linear:
-        return _Linear(tuple(sorted((n, c) for n, c in coefficients.items() if c)), constant)
+    def of(coefficients: Mapping[str, Fraction], constant: Fraction) -> Linear:
+        return Linear(tuple(sorted((n, c) for n, c in coefficients.items() if c)), constant)
 
-    def plus(self, other: _Linear, factor: Fraction = Fraction(1)) -> _Linear:
+    def plus(self, other: Linear, factor: Fraction = Fraction(1)) -> Linear:
         """``self + factor * other``."""
         total = dict(self.coefficients)
         for name, coefficient in other.coefficients:
             total[name] = total.get(name, Fraction(0)) + factor * coefficient
-        return _Linear.of(total, self.constant + factor * other.constant)
+        return Linear.of(total, self.constant + factor * other.constant)
 
-    def times(self, factor: Fraction) -> _Linear:
-        return _Linear.of({n: c * factor for n, c in self.coefficients}, self.constant * factor)
+    def times(self, factor: Fraction) -> Linear:
+        return Linear.of({n: c * factor for n, c in self.coefficients}, self.constant * factor)
 
     def coefficient(self, name: str) -> Fraction:
         return dict(self.coefficients).get(name, Fraction(0))
@@ -72,7 +72,7 @@ class _Linear:
 class _Constraint:
     """``left < 0``, ``left <= 0`` or ``left == 0``."""
 
-    left: _Linear
+    left: Linear
     operator: str
 
     def holds(self, values: Mapping[str, Fraction]) -> bool:
@@ -265,15 +265,15 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
         left, right, operator = right, left, operator.replace(">", "<")
     one, other = left.constant, right.constant
     coefficients = _sum(left.coefficients, right.coefficients, Fraction(-1))
-    straight = _Linear.of(coefficients, Fraction(0)).coefficients
-    turned = _Linear.of({n: -c for n, c in coefficients.items()}, Fraction(0)).coefficients
+    straight = Linear.of(coefficients, Fraction(0)).coefficients
+    turned = Linear.of({n: -c for n, c in coefficients.items()}, Fraction(0)).coefficients
 
     def run(env: Env) -> list[_System]:
         constant = Fraction(one(env) - other(env))
         if operator != "!=":
-            return [(_Constraint(_Linear(straight, constant), operator),)]
-        below = _Constraint(_Linear(straight, constant), "<")
-        return [(below,), (_Constraint(_Linear(turned, -constant), "<"),)]
+            return [(_Constraint(Linear(straight, constant), operator),)]
+        below = _Constraint(Linear(straight, constant), "<")
+        return [(below,), (_Constraint(Linear(turned, -constant), "<"),)]
 
     return run
 

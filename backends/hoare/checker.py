@@ -25,21 +25,10 @@ from avow.language.sorts import (
 )
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 
+from . import syntax
 from .names import UNKNOWN, Names, assignments, expect, spread, vocabulary
 from .parser import parse_expression
 from .program import Assign, Block, If, Match, Predicate, Program, Reading, Skip, Statement, Update, While, variable
-from .syntax import (
-    AssignStatement,
-    Call,
-    Expression,
-    IfStatement,
-    MatchStatement,
-    Name,
-    SkipStatement,
-    Source,
-    StatementSyntax,
-    WhileStatement,
-)
 from .typing import Scope, fit, formula, rejected, term
 
 T = TypeVar("T")
@@ -61,11 +50,11 @@ class _Entry:
     port: Port
     parameters: tuple[Variable, ...] | None
     """Of a predicate's pattern; None for a whole port."""
-    meaning: Expression
+    meaning: syntax.Expression
     span: Span
 
 
-def check(source: Source, contract: Contract, node: Node, table: Table) -> Checked:
+def check(source: syntax.Source, contract: Contract, node: Node, table: Table) -> Checked:
     """Raises Rejected, with everything that is wrong (codes ``HOARE200``, ``HOARE300``, ``HOARE400``)."""
     checker = _Checker(source, contract, node)
     return checker.run(table)
@@ -88,7 +77,7 @@ def _covers(term: Term, sort: Sort, used: set[Variable]) -> bool:
 
 
 class _Checker:
-    def __init__(self, source: Source, contract: Contract, node: Node) -> None:
+    def __init__(self, source: syntax.Source, contract: Contract, node: Node) -> None:
         self.source, self.node = source, node
         self.names = Names(vocabulary(contract, node))
         self.problems: list[Diagnostic] = []
@@ -182,11 +171,13 @@ class _Checker:
     def _entry(self, key: str, text: str, span: Span) -> _Entry:
         pattern = parse_expression(key, span)
         meaning = parse_expression(text, span)
-        if isinstance(pattern, Name):
+        if isinstance(pattern, syntax.Name):
             return _Entry(self._port(pattern, key, span), None, meaning, span)
-        if isinstance(pattern, Call) and all(isinstance(a, Name) and a.prefix is None for a in pattern.arguments):
+        if isinstance(pattern, syntax.Call) and all(
+            isinstance(a, syntax.Name) and a.prefix is None for a in pattern.arguments
+        ):
             port = self._port(pattern.function, key, span)
-            names = [a.name for a in pattern.arguments if isinstance(a, Name)]
+            names = [a.name for a in pattern.arguments if isinstance(a, syntax.Name)]
             sort = port.sort
             if not isinstance(sort, FunctionSort) or sort.result != BOOL:
                 raise rejected(
@@ -199,7 +190,7 @@ class _Checker:
             return _Entry(port, parameters, meaning, span)
         raise rejected("HOARE400", f"`{key}` is neither a port (in.r) nor a relation with names (out.done(i))", span)
 
-    def _port(self, name: Name, key: str, span: Span) -> Port:
+    def _port(self, name: syntax.Name, key: str, span: Span) -> Port:
         ports = [
             port
             for port in (*self.node.inputs, *self.node.outputs)
@@ -319,23 +310,23 @@ class _Checker:
 
     # -- statements ----------------------------------------------------------------------------------------------------
 
-    def _block(self, body: tuple[StatementSyntax, ...], scope: Scope) -> Block:
+    def _block(self, body: tuple[syntax.Statement, ...], scope: Scope) -> Block:
         made = (self._attempt(lambda s=s: self._statement(s, scope)) for s in body)  # type: ignore[misc]
         return tuple(statement for statement in made if statement is not None)
 
-    def _statement(self, statement: StatementSyntax, scope: Scope) -> Statement:
+    def _statement(self, statement: syntax.Statement, scope: Scope) -> Statement:
         match statement:
-            case SkipStatement(span=span):
+            case syntax.Skip(span=span):
                 return Skip(span)
-            case AssignStatement():
+            case syntax.Assign():
                 return self._assign(statement, scope)
-            case IfStatement(condition=condition, then=then, otherwise=otherwise, span=span):
+            case syntax.If(condition=condition, then=then, otherwise=otherwise, span=span):
                 test = self._attempt(lambda: formula(condition, scope))
                 first, second = self._block(then, scope), self._block(otherwise, scope)
                 return Skip(span) if test is None else If(test, first, second, span)
-            case MatchStatement():
+            case syntax.Match():
                 return self._match(statement, scope)
-            case WhileStatement(condition=condition, invariant=invariant, variant=variant, body=body, span=span):
+            case syntax.While(condition=condition, invariant=invariant, variant=variant, body=body, span=span):
                 test = self._attempt(lambda: formula(condition, scope))
                 asserting = Scope(self.names, scope.local, self.ports, True)
                 holds = self._attempt(lambda: formula(invariant, asserting))
@@ -343,13 +334,13 @@ class _Checker:
                 inside = self._block(body, scope)
                 return Skip(span) if test is None or holds is None else While(test, holds, measure, inside, span)
 
-    def _measure(self, variant: Expression, scope: Scope) -> Term:
+    def _measure(self, variant: syntax.Expression, scope: Scope) -> Term:
         measure = term(variant, scope)
         if measure.sort not in (INTEGER, NATURAL):
             raise rejected("HOARE300", f"a variant is an integer; this is {show_sort(measure.sort)}", variant.span)
         return measure
 
-    def _assign(self, statement: AssignStatement, scope: Scope) -> Statement:
+    def _assign(self, statement: syntax.Assign, scope: Scope) -> Statement:
         name = statement.target
         words = self.names.vocabulary
         if name.name in scope.local or name.name in words.values or name.name in words.constructors:
@@ -387,7 +378,7 @@ class _Checker:
             target, arguments, fit(term(statement.value, scope), sort.result, statement.value.span), statement.span
         )
 
-    def _match(self, statement: MatchStatement, scope: Scope) -> Statement:
+    def _match(self, statement: syntax.Match, scope: Scope) -> Statement:
         subject = term(statement.subject, scope)
         words = self.names.vocabulary
         name = statement.constructor

@@ -29,28 +29,7 @@ from avow.language.sorts import (
 )
 from avow.language.terms import EnumValue, Term
 
-from .syntax import (
-    AssignStatement,
-    Binary,
-    Call,
-    Chain,
-    Expression,
-    IfStatement,
-    Inside,
-    MatchStatement,
-    Member,
-    Name,
-    Number,
-    Quantification,
-    Sequence,
-    SkipStatement,
-    StatementSyntax,
-    Text,
-    Truth,
-    Tuple,
-    Unary,
-    WhileStatement,
-)
+from . import syntax
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _ARITHMETIC = frozenset("+-*/")
@@ -109,26 +88,26 @@ def join(one: Sort | None, other: Sort | None) -> Sort | None:
     return one
 
 
-def _estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
+def _estimate(expression: syntax.Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
     """The sort that an expression seems to have, if its names' sorts are known."""
     match expression:
-        case Number(whole=whole):
+        case syntax.Number(whole=whole):
             return NATURAL if whole else REAL
-        case Truth() | Member() | Inside() | Chain() | Quantification():
+        case syntax.Truth() | syntax.Member() | syntax.Inside() | syntax.Chain() | syntax.Quantification():
             return BOOL
-        case Tuple(items=items):
+        case syntax.Tuple(items=items):
             sorts = [_estimate(item, names, local) for item in items]
             return TupleSort(tuple(s for s in sorts if s is not None)) if None not in sorts else None
-        case Sequence(items=items):
+        case syntax.Sequence(items=items):
             item: Sort | None = UNKNOWN
             for each in items:
                 item = join(item, _estimate(each, names, local))
             return SequenceSort(item or UNKNOWN)
-        case Call(function=Name(name="length", prefix=None)) if "length" not in names.sorts:
+        case syntax.Call(function=syntax.Name(name="length", prefix=None)) if "length" not in names.sorts:
             return NATURAL
-        case Text():
+        case syntax.Text():
             return STRING
-        case Name(name=name, prefix=None):
+        case syntax.Name(name=name, prefix=None):
             if name in local:
                 return local[name]
             if name in names.sorts:
@@ -137,40 +116,40 @@ def _estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) -
                 return names.vocabulary.constructors[name][0]
             value = names.vocabulary.values.get(name)
             return value.sort if value is not None else None
-        case Name():
+        case syntax.Name():
             return None
-        case Call(function=function):
+        case syntax.Call(function=function):
             if function.prefix is None and function.name in names.vocabulary.constructors:
                 return names.vocabulary.constructors[function.name][0]
             sort = names.sorts.get(function.name) if function.prefix is None else None
             if isinstance(sort, SequenceSort):
                 return sort.item
             return sort.result if isinstance(sort, FunctionSort) else None
-        case Unary(operator="-", operand=operand):
+        case syntax.Unary(operator="-", operand=operand):
             return join(INTEGER, _estimate(operand, names, local))
-        case Binary(operator="/"):
+        case syntax.Binary(operator="/"):
             return REAL
-        case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
+        case syntax.Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
             sort = join(_estimate(left, names, local), _estimate(right, names, local))
             return join(INTEGER, sort) if operator == "-" else sort
-        case Unary() | Binary():  # a comparison or a connective
+        case syntax.Unary() | syntax.Binary():  # a comparison or a connective
             return BOOL
         case _:
             assert_never(expression)
 
 
-def expect(expression: Expression, sort: Sort, names: Names) -> None:
+def expect(expression: syntax.Expression, sort: Sort, names: Names) -> None:
     """Give unknown names the sort that the place asks for: `f(i)` for a REAL makes f a function to REAL."""
     match expression:
-        case Name(name=name, prefix=None) if name not in names.vocabulary.values:
+        case syntax.Name(name=name, prefix=None) if name not in names.vocabulary.values:
             names.sorts.setdefault(name, sort)
-        case Tuple(items=items) if isinstance(sort, TupleSort):
+        case syntax.Tuple(items=items) if isinstance(sort, TupleSort):
             for item, part in zip(items, sort.items, strict=False):
                 expect(item, part, names)
-        case Sequence(items=items) if isinstance(sort, SequenceSort):
+        case syntax.Sequence(items=items) if isinstance(sort, SequenceSort):
             for item in items:
                 expect(item, sort.item, names)
-        case Call(function=Name(name=name, prefix=None), arguments=arguments):
+        case syntax.Call(function=syntax.Name(name=name, prefix=None), arguments=arguments):
             if name in names.vocabulary.constructors:
                 parameters = names.vocabulary.constructors[name][1].parameters
                 for argument, parameter in zip(arguments, parameters, strict=False):
@@ -183,7 +162,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
             pass
 
 
-def spread(body: tuple[StatementSyntax, ...], names: Names) -> None:
+def spread(body: tuple[syntax.Statement, ...], names: Names) -> None:
     """Sorts of assigned variables, from what is assigned to them, until nothing more is learnt."""
     fixed = frozenset(names.sorts) - names.inferred
     learnt = True
@@ -200,28 +179,26 @@ def spread(body: tuple[StatementSyntax, ...], names: Names) -> None:
                 learnt = True
 
 
-def assignments(
-    body: tuple[StatementSyntax, ...], names: Names
-) -> Iterator[tuple[AssignStatement, Mapping[str, Sort]]]:
+def assignments(body: tuple[syntax.Statement, ...], names: Names) -> Iterator[tuple[syntax.Assign, Mapping[str, Sort]]]:
     """Every assignment, with the sorts of the MATCH variables around it."""
-    stack: list[tuple[StatementSyntax, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
+    stack: list[tuple[syntax.Statement, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
     while stack:
         statement, local = stack.pop()
         match statement:
-            case AssignStatement():
+            case syntax.Assign():
                 yield statement, local
-            case IfStatement(then=then, otherwise=otherwise):
+            case syntax.If(then=then, otherwise=otherwise):
                 stack.extend((s, local) for s in reversed((*then, *otherwise)))
-            case MatchStatement(constructor=constructor, variables=variables, then=then, otherwise=otherwise):
+            case syntax.Match(constructor=constructor, variables=variables, then=then, otherwise=otherwise):
                 inner = dict(local)
                 if constructor.name in names.vocabulary.constructors:
                     parameters = names.vocabulary.constructors[constructor.name][1].parameters
                     inner.update((v.name, p) for v, p in zip(variables, parameters, strict=False))
                 stack.extend((s, local) for s in reversed(otherwise))
                 stack.extend((s, inner) for s in reversed(then))
-            case WhileStatement(body=inside):
+            case syntax.While(body=inside):
                 stack.extend((s, local) for s in reversed(inside))
-            case SkipStatement():  # holds no statement
+            case syntax.Skip():  # holds no statement
                 pass
             case _:
                 assert_never(statement)

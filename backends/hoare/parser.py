@@ -16,43 +16,20 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.grammars import lark_of
 from avow.base.records import dataclass
 
-from .syntax import (
-    AssignStatement,
-    Binary,
-    Call,
-    Chain,
-    Declaration,
-    Expression,
-    IfStatement,
-    Inside,
-    MatchStatement,
-    Member,
-    Memory,
-    Name,
-    Number,
-    Quantification,
-    Sequence,
-    SkipStatement,
-    Source,
-    Text,
-    Truth,
-    Tuple,
-    Unary,
-    WhileStatement,
-)
+from . import syntax
 from .tuning import NESTING
 
 
-def parse_program(text: str, file: str) -> Source:
+def parse_program(text: str, file: str) -> syntax.Source:
     """Raises Rejected with code ``HOARE100``."""
-    source: Source = _parse(text, file, "program")
+    source: syntax.Source = _parse(text, file, "program")
     return source
 
 
-def parse_expression(text: str, place: Span) -> Expression:
+def parse_expression(text: str, place: Span) -> syntax.Expression:
     """An expression from the plan, every part of which is reported at `place`. Raises Rejected."""
     try:
-        expression: Expression = _parse(text, place.file, "expression", place)
+        expression: syntax.Expression = _parse(text, place.file, "expression", place)
     except Rejected as rejected:
         raise Rejected(
             *(Diagnostic(d.code, f'in "{text}": {d.message}', place, hint=d.hint) for d in rejected.diagnostics)
@@ -155,10 +132,10 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
             return Span(self._file, 1, 1, 1, 1)
         return Span(self._file, meta.line, meta.column, meta.end_line, meta.end_column)
 
-    def program(self, meta: Any, items: list[Any]) -> Source:
-        declarations = tuple(item for item in items if isinstance(item, Declaration))
-        memory = tuple(item for item in items if isinstance(item, Memory))
-        return Source(declarations, memory, items[-1], self._span(meta))
+    def program(self, meta: Any, items: list[Any]) -> syntax.Source:
+        declarations = tuple(item for item in items if isinstance(item, syntax.Declaration))
+        memory = tuple(item for item in items if isinstance(item, syntax.Memory))
+        return syntax.Source(declarations, memory, items[-1], self._span(meta))
 
     def body(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return tuple(item for item in items if item is not None)
@@ -166,46 +143,46 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     def block(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return items[0]  # type: ignore[no-any-return]
 
-    def memory(self, meta: Any, items: list[Any]) -> Memory:
+    def memory(self, meta: Any, items: list[Any]) -> syntax.Memory:
         _, name, sort, _, initial = items
-        return Memory(name, str(sort), initial, self._span(meta))
+        return syntax.Memory(name, str(sort), initial, self._span(meta))
 
-    def declaration(self, meta: Any, items: list[Any]) -> Declaration:
-        names = tuple(item for item in items if isinstance(item, Name))
+    def declaration(self, meta: Any, items: list[Any]) -> syntax.Declaration:
+        names = tuple(item for item in items if isinstance(item, syntax.Name))
         *sorts, result = [item for item in items[1:] if item is None or isinstance(item, Token)]
         words = [str(word) for word in sorts if word is not None]
         span = self._span(meta)
         if result is None:
             if len(words) != 1:
                 raise Rejected(Diagnostic("HOARE100", "a type is one name, or A x B --> C", span))
-            return Declaration(names, (), words[0], items[0].type == "GIVEN", span)
+            return syntax.Declaration(names, (), words[0], items[0].type == "GIVEN", span)
         if len(words) % 2 == 0 or any(word != "x" for word in words[1::2]):
             raise Rejected(Diagnostic("HOARE100", "a function's parameters are separated by x: A x B --> C", span))
-        return Declaration(names, tuple(words[::2]), str(result), items[0].type == "GIVEN", span)
+        return syntax.Declaration(names, tuple(words[::2]), str(result), items[0].type == "GIVEN", span)
 
-    def skip(self, meta: Any, items: list[Any]) -> SkipStatement:
-        return SkipStatement(self._span(meta))
+    def skip(self, meta: Any, items: list[Any]) -> syntax.Skip:
+        return syntax.Skip(self._span(meta))
 
-    def assign(self, meta: Any, items: list[Any]) -> AssignStatement:
-        return AssignStatement(items[0], (), items[2], self._span(meta))
+    def assign(self, meta: Any, items: list[Any]) -> syntax.Assign:
+        return syntax.Assign(items[0], (), items[2], self._span(meta))
 
-    def update(self, meta: Any, items: list[Any]) -> AssignStatement:
-        return AssignStatement(items[0], items[1], items[3], self._span(meta))
+    def update(self, meta: Any, items: list[Any]) -> syntax.Assign:
+        return syntax.Assign(items[0], items[1], items[3], self._span(meta))
 
-    def conditional(self, meta: Any, items: list[Any]) -> IfStatement:
+    def conditional(self, meta: Any, items: list[Any]) -> syntax.If:
         blocks = [item for item in items if isinstance(item, tuple)]
-        return IfStatement(items[1], blocks[0], blocks[1] if len(blocks) > 1 else (), self._span(meta))
+        return syntax.If(items[1], blocks[0], blocks[1] if len(blocks) > 1 else (), self._span(meta))
 
-    def match(self, meta: Any, items: list[Any]) -> MatchStatement:
+    def match(self, meta: Any, items: list[Any]) -> syntax.Match:
         blocks = [item for item in items if isinstance(item, tuple)]
-        constructor, *variables = [item for item in items[3:] if isinstance(item, Name)]
+        constructor, *variables = [item for item in items[3:] if isinstance(item, syntax.Name)]
         otherwise = blocks[1] if len(blocks) > 1 else ()
-        return MatchStatement(items[1], constructor, tuple(variables), blocks[0], otherwise, self._span(meta))
+        return syntax.Match(items[1], constructor, tuple(variables), blocks[0], otherwise, self._span(meta))
 
-    def loop(self, meta: Any, items: list[Any]) -> WhileStatement:
+    def loop(self, meta: Any, items: list[Any]) -> syntax.While:
         variant = items[5] if items[4] is not None else None
         body = next(item for item in items if isinstance(item, tuple))
-        return WhileStatement(items[1], items[3], variant, body, self._span(meta))
+        return syntax.While(items[1], items[3], variant, body, self._span(meta))
 
     def arguments(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return tuple(items)
@@ -213,67 +190,67 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     def comparator(self, meta: Any, items: list[Any]) -> str:
         return "==" if items[0] == "=" else str(items[0])
 
-    def compare(self, meta: Any, items: list[Any]) -> Expression:
+    def compare(self, meta: Any, items: list[Any]) -> syntax.Expression:
         span = self._span(meta)
         if len(items) == 3:
-            return Binary(items[1], items[0], items[2], span)
-        return Chain(tuple(items[::2]), tuple(items[1::2]), span)
+            return syntax.Binary(items[1], items[0], items[2], span)
+        return syntax.Chain(tuple(items[::2]), tuple(items[1::2]), span)
 
-    def member(self, meta: Any, items: list[Any]) -> Member:
-        return Member(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+    def member(self, meta: Any, items: list[Any]) -> syntax.Member:
+        return syntax.Member(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
 
-    def inside(self, meta: Any, items: list[Any]) -> Inside:
-        return Inside(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+    def inside(self, meta: Any, items: list[Any]) -> syntax.Inside:
+        return syntax.Inside(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
 
-    def several(self, meta: Any, items: list[Any]) -> Tuple:
-        return Tuple(tuple(items), self._span(meta))
+    def several(self, meta: Any, items: list[Any]) -> syntax.Tuple:
+        return syntax.Tuple(tuple(items), self._span(meta))
 
-    def sequence(self, meta: Any, items: list[Any]) -> Sequence:
-        return Sequence(items[0] or (), self._span(meta))
+    def sequence(self, meta: Any, items: list[Any]) -> syntax.Sequence:
+        return syntax.Sequence(items[0] or (), self._span(meta))
 
     @staticmethod
     def _infix(operator: str) -> Any:
-        def build(self: _Build, meta: Any, items: list[Any]) -> Binary:
-            return Binary(operator, items[0], items[-1], self._span(meta))
+        def build(self: _Build, meta: Any, items: list[Any]) -> syntax.Binary:
+            return syntax.Binary(operator, items[0], items[-1], self._span(meta))
 
         return build
 
     iff, implies, disjoin, conjoin = map(_infix, ("<=>", "->", "or", "and"))
     add, subtract, multiply, divide = map(_infix, "+-*/")
 
-    def negate(self, meta: Any, items: list[Any]) -> Unary:
-        return Unary("not", items[1], self._span(meta))
+    def negate(self, meta: Any, items: list[Any]) -> syntax.Unary:
+        return syntax.Unary("not", items[1], self._span(meta))
 
-    def minus(self, meta: Any, items: list[Any]) -> Unary:
-        return Unary("-", items[0], self._span(meta))
+    def minus(self, meta: Any, items: list[Any]) -> syntax.Unary:
+        return syntax.Unary("-", items[0], self._span(meta))
 
-    def number(self, meta: Any, items: list[Any]) -> Number:
-        return Number(Fraction(str(items[0])), "." not in items[0], self._span(meta))
+    def number(self, meta: Any, items: list[Any]) -> syntax.Number:
+        return syntax.Number(Fraction(str(items[0])), "." not in items[0], self._span(meta))
 
-    def string(self, meta: Any, items: list[Any]) -> Text:
+    def string(self, meta: Any, items: list[Any]) -> syntax.Text:
         inner = str(items[0])[1:-1]
-        return Text(inner.replace('\\"', '"').replace("\\\\", "\\"), self._span(meta))
+        return syntax.Text(inner.replace('\\"', '"').replace("\\\\", "\\"), self._span(meta))
 
-    def truth(self, meta: Any, items: list[Any]) -> Truth:
-        return Truth(items[0].type == "TRUE", self._span(meta))
+    def truth(self, meta: Any, items: list[Any]) -> syntax.Truth:
+        return syntax.Truth(items[0].type == "TRUE", self._span(meta))
 
-    def reference(self, meta: Any, items: list[Any]) -> Name:
+    def reference(self, meta: Any, items: list[Any]) -> syntax.Name:
         prefix, _, name = str(items[0]).rpartition(".")
-        return Name(name, prefix or None, self._span(meta))
+        return syntax.Name(name, prefix or None, self._span(meta))
 
-    def name(self, meta: Any, items: list[Any]) -> Name:
-        return Name(str(items[0]), None, self._span(meta))
+    def name(self, meta: Any, items: list[Any]) -> syntax.Name:
+        return syntax.Name(str(items[0]), None, self._span(meta))
 
-    def call(self, meta: Any, items: list[Any]) -> Call:
-        return Call(items[0], items[1], self._span(meta))
+    def call(self, meta: Any, items: list[Any]) -> syntax.Call:
+        return syntax.Call(items[0], items[1], self._span(meta))
 
-    def group(self, meta: Any, items: list[Any]) -> tuple[tuple[Name, ...], str]:
-        return tuple(item for item in items if isinstance(item, Name)), str(items[-1])
+    def group(self, meta: Any, items: list[Any]) -> tuple[tuple[syntax.Name, ...], str]:
+        return tuple(item for item in items if isinstance(item, syntax.Name)), str(items[-1])
 
-    def quantified(self, meta: Any, items: list[Any]) -> Quantification:
+    def quantified(self, meta: Any, items: list[Any]) -> syntax.Quantification:
         groups = tuple(item for item in items[1:] if isinstance(item, tuple))
         kind = "forall" if items[0].type == "FORALL" else "exists"
-        return Quantification(kind, groups, items[-1], self._span(meta))
+        return syntax.Quantification(kind, groups, items[-1], self._span(meta))
 
 
 # -- blocks by indentation ---------------------------------------------------------------------------------------------

@@ -154,12 +154,12 @@ class Memory:
 
 
 @dataclass(frozen=True, slots=True)
-class SkipStatement:
+class Skip:
     span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class AssignStatement:
+class Assign:
     """``x := e``, or ``m(i) := e`` and ``m[i] := e`` with `arguments`."""
 
     target: Name
@@ -169,35 +169,35 @@ class AssignStatement:
 
 
 @dataclass(frozen=True, slots=True)
-class IfStatement:
+class If:
     condition: Expression
-    then: tuple[StatementSyntax, ...]
-    otherwise: tuple[StatementSyntax, ...]
+    then: tuple[Statement, ...]
+    otherwise: tuple[Statement, ...]
     span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class MatchStatement:
+class Match:
     """``MATCH e WITH c(x, y) THEN … ELSE …``: the variables stand for the arguments in the first branch."""
 
     subject: Expression
     constructor: Name
     variables: tuple[Name, ...]
-    then: tuple[StatementSyntax, ...]
-    otherwise: tuple[StatementSyntax, ...]
+    then: tuple[Statement, ...]
+    otherwise: tuple[Statement, ...]
     span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class WhileStatement:
+class While:
     condition: Expression
     invariant: Expression
     variant: Expression | None
-    body: tuple[StatementSyntax, ...]
+    body: tuple[Statement, ...]
     span: Span = field(compare=False, repr=False)
 
 
-StatementSyntax = SkipStatement | AssignStatement | IfStatement | MatchStatement | WhileStatement
+Statement = Skip | Assign | If | Match | While
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,5 +206,5 @@ class Source:
 
     declarations: tuple[Declaration, ...]
     memory: tuple[Memory, ...]
-    body: tuple[StatementSyntax, ...]
+    body: tuple[Statement, ...]
     span: Span = field(compare=False, repr=False)

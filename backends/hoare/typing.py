@@ -49,24 +49,9 @@ from avow.language.terms import (
     Widen,
 )
 
+from . import syntax
 from .names import UNKNOWN, Names, join
 from .program import variable
-from .syntax import (
-    Binary,
-    Call,
-    Chain,
-    Expression,
-    Inside,
-    Member,
-    Name,
-    Number,
-    Quantification,
-    Sequence,
-    Text,
-    Truth,
-    Tuple,
-    Unary,
-)
 
 _NUMERIC = (NATURAL, INTEGER, REAL)
 
@@ -81,48 +66,48 @@ class Scope:
     quantifiers: bool = False
 
 
-def term(expression: Expression, scope: Scope) -> Term:
+def term(expression: syntax.Expression, scope: Scope) -> Term:
     """The typed term. Raises Rejected (codes ``HOARE200``, ``HOARE300``). Depth is bounded by the parser."""
     match expression:
-        case Number(value=value, whole=whole, span=span):
+        case syntax.Number(value=value, whole=whole, span=span):
             return Literal(int(value), NATURAL, span) if whole else Literal(value, REAL, span)
-        case Truth(value=truth, span=span):
+        case syntax.Truth(value=truth, span=span):
             return Literal(truth, BOOL, span)
-        case Text(value=text, span=span):
+        case syntax.Text(value=text, span=span):
             return Literal(text, STRING, span)
-        case Name():
+        case syntax.Name():
             return _name(expression, scope)
-        case Call():
+        case syntax.Call():
             return _call(expression, scope)
-        case Unary(operator="-", operand=operand, span=span):
+        case syntax.Unary(operator="-", operand=operand, span=span):
             inner = _number(term(operand, scope), span)
             return Negative(inner, REAL if inner.sort == REAL else INTEGER, span)
-        case Unary(operand=operand, span=span):
+        case syntax.Unary(operand=operand, span=span):
             return Not(formula(operand, scope), span)
-        case Binary(operator=operator, left=left, right=right, span=span):
+        case syntax.Binary(operator=operator, left=left, right=right, span=span):
             return _binary(operator, left, right, span, scope)
-        case Chain(items=items, operators=operators, span=span):
+        case syntax.Chain(items=items, operators=operators, span=span):
             parts = [term(item, scope) for item in items]
             pairs = zip(operators, parts, parts[1:], strict=False)
             return And(tuple(compare(operator, a, b, span) for operator, a, b in pairs), span)
-        case Member(item=item, choices=choices, negated=negated, span=span):
+        case syntax.Member(item=item, choices=choices, negated=negated, span=span):
             one = term(item, scope)
             others = tuple(fit(term(choice, scope), one.sort, choice.span) for choice in choices)
             inside = In(one, SetTerm(others, SetSort(one.sort)), span)
             return Not(inside, span) if negated else inside
-        case Inside(item=item, collection=collection, negated=negated, span=span):
+        case syntax.Inside(item=item, collection=collection, negated=negated, span=span):
             among = _inside(term(item, scope), term(collection, scope), span)
             return Not(among, span) if negated else among
-        case Tuple(items=items, span=span):
+        case syntax.Tuple(items=items, span=span):
             values = tuple(term(item, scope) for item in items)
             return TupleTerm(values, TupleSort(tuple(v.sort for v in values)), span)
-        case Sequence(items=items, span=span):
+        case syntax.Sequence(items=items, span=span):
             return _sequence(tuple(term(item, scope) for item in items), span)
-        case Quantification():
+        case syntax.Quantification():
             return _quantified(expression, scope)
 
 
-def formula(expression: Expression, scope: Scope) -> Term:
+def formula(expression: syntax.Expression, scope: Scope) -> Term:
     """A term of sort BOOL. Raises Rejected."""
     return fit(term(expression, scope), BOOL, expression.span)
 
@@ -186,7 +171,7 @@ def rejected(code: str, message: str, span: Span | None, hint: str | None = None
     return Rejected(Diagnostic(code, message, span, hint=hint))
 
 
-def _name(name: Name, scope: Scope) -> Term:
+def _name(name: syntax.Name, scope: Scope) -> Term:
     if name.prefix is not None:
         return _port(name, scope)
     if name.name in scope.local:
@@ -213,7 +198,7 @@ def _name(name: Name, scope: Scope) -> Term:
     )
 
 
-def _port(name: Name, scope: Scope) -> Term:
+def _port(name: syntax.Name, scope: Scope) -> Term:
     if scope.ports is None or name.prefix != "in":
         what = "assertions only (INVARIANT)" if name.prefix == "in" else "the contract only"
         raise rejected("HOARE200", f"`{name}` belongs into {what}: a program has variables", name.span)
@@ -224,7 +209,7 @@ def _port(name: Name, scope: Scope) -> Term:
     return scope.ports[name.name]
 
 
-def _call(call: Call, scope: Scope) -> Term:
+def _call(call: syntax.Call, scope: Scope) -> Term:
     words = scope.names.vocabulary
     name = call.function
     arguments = [term(argument, scope) for argument in call.arguments]
@@ -243,7 +228,7 @@ def _call(call: Call, scope: Scope) -> Term:
     return Apply(function, _fitted(call, arguments, function.sort.parameters), function.sort.result, call.span)
 
 
-def _length(call: Call, arguments: list[Term]) -> Term:
+def _length(call: syntax.Call, arguments: list[Term]) -> Term:
     if len(arguments) != 1 or not isinstance(arguments[0].sort, SequenceSort):
         raise rejected("HOARE300", "length(…) takes one sequence", call.span)
     if arguments[0].sort.item == UNKNOWN:
@@ -251,14 +236,14 @@ def _length(call: Call, arguments: list[Term]) -> Term:
     return Length(arguments[0], NATURAL, call.span)
 
 
-def _fitted(call: Call, arguments: list[Term], parameters: tuple[Sort, ...]) -> tuple[Term, ...]:
+def _fitted(call: syntax.Call, arguments: list[Term], parameters: tuple[Sort, ...]) -> tuple[Term, ...]:
     if len(arguments) != len(parameters):
         message = f"`{call.function}` takes {len(parameters)} argument(s), not {len(arguments)}"
         raise rejected("HOARE300", message, call.span)
     return tuple(fit(a, p, e.span) for a, p, e in zip(arguments, parameters, call.arguments, strict=True))
 
 
-def _binary(operator: str, left: Expression, right: Expression, span: Span, scope: Scope) -> Term:
+def _binary(operator: str, left: syntax.Expression, right: syntax.Expression, span: Span, scope: Scope) -> Term:
     if operator in {"and", "or", "->", "<=>"}:
         one, other = formula(left, scope), formula(right, scope)
         match operator:
@@ -288,7 +273,7 @@ def _number(given: Term, span: Span | None) -> Term:
     return given
 
 
-def _quantified(expression: Quantification, scope: Scope) -> Term:
+def _quantified(expression: syntax.Quantification, scope: Scope) -> Term:
     if not scope.quantifiers:
         raise rejected("HOARE300", f"a program cannot compute {expression.quantifier}", expression.span)
     local = dict(scope.local)

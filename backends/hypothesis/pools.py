@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from avow.backend_kit.programs.samples import worked_out
 from avow.base.plain import LOOK
-from avow.evaluation.linear import Linear
+from avow.evaluation.linear_search import Linear
 from avow.formulas.values import Element, Value
 from avow.language.bounds import constant
 from avow.language.sorts import (

@@ -7,25 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .program import (
-    Binary,
-    Choice,
-    Comparison,
-    Const,
-    Convert,
-    Expr,
-    Extreme,
-    Inlined,
-    Item,
-    Junction,
-    Kind,
-    Length,
-    Name,
-    Scalar,
-    Unary,
-    View,
-    parts,
-)
+from . import program
+from .program import Expr, Kind, Scalar, parts
 from .whole_file import Parts, Refusal
 
 if TYPE_CHECKING:
@@ -96,10 +79,10 @@ class Expressions:
             case ast.Attribute(value=ast.Name(id=receiver), attr=attribute) if self.is_object(receiver):
                 return self.attribute(attribute, line)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return Unary("not", self.truth(operand), Kind.BOOL)
+                return program.Unary("not", self.truth(operand), Kind.BOOL)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 body = self.number(operand)
-                return Unary("-", body, body.kind)
+                return program.Unary("-", body, body.kind)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.number(operand)
             case ast.BinOp(left=left, op=op, right=right):
@@ -109,13 +92,13 @@ class Expressions:
                 rest = [self.under_condition(value) for value in values[1:]]
                 if any(item.kind is not Kind.BOOL for item in rest):
                     raise Refusal(line, "and/or of what are no truth values gives one of them")
-                return Junction("and" if isinstance(op, ast.And) else "or", (first, *rest))
+                return program.Junction("and" if isinstance(op, ast.And) else "or", (first, *rest))
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 return self.comparison(left, ops, comparators, line)
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 condition = self.truth(test)
                 then, otherwise = self.alike([self.under_condition(body), self.under_condition(orelse)], line, "if")
-                return Choice(condition, then, otherwise, then.kind)
+                return program.Choice(condition, then, otherwise, then.kind)
             case ast.Call(func=func, args=arguments, keywords=[]):
                 return self.call(func, arguments, line)
             case ast.Subscript(slice=index):
@@ -143,7 +126,7 @@ class Expressions:
     def name(self, name: str, line: int) -> Expr:
         full = f"{name}{self.scope.suffix}"
         if name in self.scope.bound:
-            return Name(full, self.kinds[full])
+            return program.Name(full, self.kinds[full])
         if name in self.scope.own:
             raise Refusal(line, f"{name} has no value on some path to here")
         if name in self.scope.sequences:
@@ -154,7 +137,7 @@ class Expressions:
         full = f"self.{attribute}"
         if full not in self.kinds or (attribute in self.parts.methods):
             raise Refusal(line, f"{full} is not a number, truth value or text that __init__ sets")
-        return Name(full, self.kinds[full])
+        return program.Name(full, self.kinds[full])
 
     def constant(self, node: ast.expr) -> Any:
         """A value that is the same at every step and written down: a literal, a name of the module or the class, a
@@ -228,7 +211,7 @@ class Expressions:
         if one.kind is not other.kind:
             one, other = _floating(one, line), _floating(other, line)
         kind = Kind.FLOAT if operator == "/" else one.kind
-        return Binary(operator, one, other, kind, line)
+        return program.Binary(operator, one, other, kind, line)
 
     def comparison(self, left: ast.expr, ops: Sequence[ast.cmpop], comparators: Sequence[ast.expr], line: int) -> Expr:
         found: list[Expr] = []
@@ -239,31 +222,33 @@ class Expressions:
                 and len(ops) == 1
                 and isinstance(node, ast.Tuple | ast.List | ast.Set)
             ):
-                if any(isinstance(p, Inlined) for p in parts(one)):
+                if any(isinstance(p, program.Inlined) for p in parts(one)):
                     raise Refusal(line, "a call that is looked for among values")
                 looked = [self.expression(item) for item in node.elts]
-                if not all(isinstance(p, Const | Name | Unary) for item in looked for p in parts(item)):
+                if not all(
+                    isinstance(p, program.Const | program.Name | program.Unary) for item in looked for p in parts(item)
+                ):
                     raise Refusal(line, "values looked among have to be constants or names: Python evaluates them all")
                 members = [self.equated("==", one, item, line) for item in looked]
                 if members:
-                    among: Expr = Junction("or", tuple(members)) if len(members) > 1 else members[0]
-                    return among if isinstance(op, ast.In) else Unary("not", among, Kind.BOOL)
+                    among: Expr = program.Junction("or", tuple(members)) if len(members) > 1 else members[0]
+                    return among if isinstance(op, ast.In) else program.Unary("not", among, Kind.BOOL)
             operator = _COMPARED.get(type(op))
             if operator is None:
                 raise Refusal(line, f"the comparison {type(op).__name__} is not in the subset here")
             other = self.expression(node) if k == 0 else self.under_condition(node)
-            if len(ops) > 1 and any(isinstance(p, Inlined) for p in parts(other)):
+            if len(ops) > 1 and any(isinstance(p, program.Inlined) for p in parts(other)):
                 raise Refusal(line, "a call between two comparisons")
             found.append(self.equated(operator, one, other, line))
             one = other
-        return found[0] if len(found) == 1 else Junction("and", tuple(found))
+        return found[0] if len(found) == 1 else program.Junction("and", tuple(found))
 
     def equated(self, operator: str, one: Expr, other: Expr, line: int) -> Expr:
         numbers = one.kind in _NUMBERS and other.kind in _NUMBERS
         alike = one.kind is other.kind and operator in ("==", "!=")
         if not numbers and not alike:
             raise Refusal(line, f"{_a(one)} {operator} {_a(other)} is not in the subset")
-        return Comparison(operator, one, other)
+        return program.Comparison(operator, one, other)
 
     def alike(self, items: Sequence[Expr], line: int, what: str) -> list[Expr]:
         if len({item.kind for item in items}) > 1:
@@ -279,10 +264,10 @@ class Expressions:
                 raise Refusal(line, f"{name} is called, and is a local name")
             case ast.Name(id="min" | "max" as name) if len(arguments) >= 2:
                 items = self.alike([self.number(a) for a in arguments], line, name)
-                return Extreme(name, tuple(items), items[0].kind)
+                return program.Extreme(name, tuple(items), items[0].kind)
             case ast.Name(id="abs") if len(arguments) == 1:
                 body = self.number(arguments[0])
-                return Unary("abs", body, body.kind)
+                return program.Unary("abs", body, body.kind)
             case ast.Name(id="float") if len(arguments) == 1:
                 return _floating(self.number(arguments[0]), line)
             case ast.Name(id="bool") if len(arguments) == 1:
@@ -290,16 +275,16 @@ class Expressions:
             case ast.Name(id="len") if len(arguments) == 1:
                 view = self.view(arguments[0])
                 if view is not None:
-                    return Length(view)
+                    return program.Length(view)
             case ast.Attribute(value=ast.Name(id="math"), attr="fabs") if self.is_module("math"):
                 if len(arguments) == 1:
-                    return Unary("abs", _floating(self.number(arguments[0]), line), Kind.FLOAT)
+                    return program.Unary("abs", _floating(self.number(arguments[0]), line), Kind.FLOAT)
             case ast.Attribute(value=ast.Name(id="math"), attr=name) if name in _FINITE and self.is_module("math"):
                 if len(arguments) == 1:
                     asked = self.number(arguments[0])
-                    if not isinstance(asked, Const | Name) or asked.kind is not Kind.FLOAT:
+                    if not isinstance(asked, program.Const | program.Name) or asked.kind is not Kind.FLOAT:
                         raise Refusal(line, f"{name} is asked of something else than a float's name")
-                    return Const(_FINITE[name], Kind.BOOL)
+                    return program.Const(_FINITE[name], Kind.BOOL)
             case ast.Name(id=name) if name in self.parts.functions:
                 return self.inline(self.parts.functions[name], arguments, False, line)
             case ast.Attribute(value=ast.Name(id=receiver), attr=name) if (
@@ -308,7 +293,7 @@ class Expressions:
                 return self.inline(self.parts.methods[name], arguments, True, line)
         raise Refusal(line, f"the call of {ast.unparse(func)[:60]} is not in the subset")
 
-    def view(self, node: ast.expr) -> View | None:
+    def view(self, node: ast.expr) -> program.View | None:
         """An input sequence or a part of it; None where it is none. Raises Refusal."""
         match node:
             case ast.Name(id=name) if name in self.scope.sequences:
@@ -323,42 +308,42 @@ class Expressions:
                 for end, given in zip((lower, upper), ends, strict=True):
                     if end is not None and (type(given) is not int or given < 0):
                         raise Refusal(node.lineno, "a part whose ends are not written as numbers from 0")
-                return View(whole.sequence, ends[0] or 0, ends[1])
+                return program.View(whole.sequence, ends[0] or 0, ends[1])
         return None
 
-    def item(self, view: View, index: ast.expr, line: int) -> Expr:
+    def item(self, view: program.View, index: ast.expr, line: int) -> Expr:
         at = self.expression(index)
         if at.kind is not Kind.INT:
             raise Refusal(line, f"{_a(at)} is an index")
-        if (isinstance(at, Const) and int(at.value) < 0) or isinstance(index, ast.UnaryOp):
+        if (isinstance(at, program.Const) and int(at.value) < 0) or isinstance(index, ast.UnaryOp):
             raise Refusal(line, "a negative index counts from the end")
-        return Item(view, at, self.items[view.sequence], line)
+        return program.Item(view, at, self.items[view.sequence], line)
 
 
-def _const(value: Scalar, line: int) -> Const:
+def _const(value: Scalar, line: int) -> program.Const:
     match value:
         case bool():
-            return Const(value, Kind.BOOL)
+            return program.Const(value, Kind.BOOL)
         case int():
-            return Const(value, Kind.INT)
+            return program.Const(value, Kind.INT)
         case float():
             if not math.isfinite(value):
                 raise Refusal(line, f"{value} is no REAL")
-            return Const(value, Kind.FLOAT)
+            return program.Const(value, Kind.FLOAT)
         case str():
-            return Const(value, Kind.TEXT)
+            return program.Const(value, Kind.TEXT)
 
 
 def _floating(value: Expr, line: int) -> Expr:
     """A number as a float, as Python makes one of an int where it meets a float."""
     if value.kind is Kind.FLOAT:
         return value
-    if isinstance(value, Const):
+    if isinstance(value, program.Const):
         try:
-            return Const(float(value.value), Kind.FLOAT)
+            return program.Const(float(value.value), Kind.FLOAT)
         except OverflowError:
             raise Refusal(line, f"{value.value} is too large for a float") from None
-    return Convert(value, line)
+    return program.Convert(value, line)
 
 
 def _a(value: Expr) -> str:

@@ -32,29 +32,8 @@ from avow.language.terms import (
     Widen,
 )
 
-from .program import (
-    Assign,
-    Binary,
-    Choice,
-    Comparison,
-    Const,
-    Convert,
-    Expr,
-    Extreme,
-    For,
-    Give,
-    If,
-    Inlined,
-    Item,
-    Junction,
-    Leave,
-    Length,
-    Name,
-    Statement,
-    Step,
-    Unary,
-    assigned,
-)
+from . import program
+from .program import Expr, assigned
 from .rounding import finite, gaps, no_overflow, rounded
 from .tuning import BESIDE, MOST_NAMES, UNROLLED
 
@@ -90,7 +69,7 @@ class Turn:
     values: Mapping[str, Term]
     done: Term
     entry: Mapping[str, Term]
-    loop: For
+    loop: program.For
     carried: tuple[str, ...]
 
 
@@ -118,7 +97,7 @@ class TooMuch(Exception):  # noqa: N818 - it names what happened
 class Run:
     """One symbolic run of a step."""
 
-    step: Step
+    step: program.Step
     sorts: Mapping[str, EnumSort]
     """Element → its enumeration."""
     exact: bool
@@ -131,7 +110,7 @@ class Run:
     facts: list[Term] = field(default_factory=list)
     checks: list[Check] = field(default_factory=list)
     ends: list[End] = field(default_factory=list)
-    loops: list[tuple[For, Turn]] = field(default_factory=list)
+    loops: list[tuple[program.For, Turn]] = field(default_factory=list)
     rounds: list[int] = field(default_factory=list)
     """Lines where something is rounded."""
     _doubles: list[Term] = field(default_factory=list)
@@ -182,7 +161,7 @@ class Run:
         if not self.exact:
             self.facts += [finite(term), *gaps(term, self.gaps)]
 
-    def block(self, body: Sequence[Statement], state: State, top: bool = False) -> State | None:
+    def block(self, body: Sequence[program.Statement], state: State, top: bool = False) -> State | None:
         """The state after the statements; None where no path comes there."""
         current: State | None = state
         for statement in body:
@@ -191,20 +170,20 @@ class Run:
             current = self.statement(statement, current, top)
         return current
 
-    def statement(self, statement: Statement, state: State, top: bool) -> State | None:
+    def statement(self, statement: program.Statement, state: State, top: bool) -> State | None:
         match statement:
-            case Assign(name=name, value=value):
+            case program.Assign(name=name, value=value):
                 found = self.named(name, self.value(value, state))
                 state.values[name] = found
                 return state
-            case If(test=test, then=then, otherwise=otherwise):
+            case program.If(test=test, then=then, otherwise=otherwise):
                 condition = self.named("test", self.value(test, state))
                 yes = self.block(then, self.split(state, condition), top)
                 no = self.block(otherwise, self.split(state, negation(condition)), top)
                 return self.meet(yes, no)
-            case For():
+            case program.For():
                 return self.loop(statement, state, top)
-            case Give(values=values, line=line):
+            case program.Give(values=values, line=line):
                 given = {name: self.named("result", self.value(v, state)) for name, v in values}
                 if top:
                     outputs = {f"out.{name}": term for name, term in given.items()}
@@ -214,7 +193,7 @@ class Run:
                 else:
                     self._exits[-1].append((state, given[""]))
                 return None
-            case Leave(word=word):
+            case program.Leave(word=word):
                 self._left[-1].append((state, word))
                 return None
 
@@ -233,9 +212,11 @@ class Run:
 
     # -- loops -------------------------------------------------------------------------------------------
 
-    def loop(self, loop: For, state: State, top: bool) -> State | None:
-        if isinstance(loop.count, Extreme) and all(isinstance(item, Const) for item in loop.count.items):
-            turns = max(int(item.value) for item in loop.count.items if isinstance(item, Const))
+    def loop(self, loop: program.For, state: State, top: bool) -> State | None:
+        if isinstance(loop.count, program.Extreme) and all(
+            isinstance(item, program.Const) for item in loop.count.items
+        ):
+            turns = max(int(item.value) for item in loop.count.items if isinstance(item, program.Const))
             if turns <= UNROLLED:
                 return self.unrolled(loop, turns, state, top)
         count = self.named("count", self.value(loop.count, state))
@@ -284,7 +265,7 @@ class Run:
                 result = self.meet(result, gone)
         return result
 
-    def unrolled(self, loop: For, turns: int, state: State, top: bool) -> State | None:
+    def unrolled(self, loop: program.For, turns: int, state: State, top: bool) -> State | None:
         """A loop whose turns are counted in the text: one after the other."""
         names = tuple(state.values)
         current: State | None = state
@@ -320,40 +301,40 @@ class Run:
 
     def value(self, expression: Expr, state: State) -> Term:
         match expression:
-            case Const(value=value):
+            case program.Const(value=value):
                 return self.constant(value)
-            case Name(name=name):
+            case program.Name(name=name):
                 return state.values[name]
-            case Convert(body=body, line=line):
+            case program.Convert(body=body, line=line):
                 return self.rounded(Widen(self.value(body, state), REAL), (), False, state, line)
-            case Unary(operator="-", body=body):
+            case program.Unary(operator="-", body=body):
                 term = self.value(body, state)
                 return Negative(term, INTEGER if term.sort == NATURAL else term.sort)
-            case Unary(operator="abs", body=body):
+            case program.Unary(operator="abs", body=body):
                 term = self.named("value", self.value(body, state))
                 return Conditional(Compare("<", term, zero(term)), Negative(term, term.sort), term, term.sort)
-            case Unary(body=body):
+            case program.Unary(body=body):
                 return negation(self.value(body, state))
-            case Binary():
+            case program.Binary():
                 return self.arithmetic(expression, state)
-            case Comparison(operator=operator, left=left, right=right):
+            case program.Comparison(operator=operator, left=left, right=right):
                 one, other = self.value(left, state), self.value(right, state)
                 return self.compared(operator, one, other)
-            case Junction(operator=operator, items=items):
+            case program.Junction(operator=operator, items=items):
                 return self.junction(operator, items, state)
-            case Choice(test=test, then=then, otherwise=otherwise):
+            case program.Choice(test=test, then=then, otherwise=otherwise):
                 condition = self.named("test", self.value(test, state))
                 yes = self.value(then, self.split(state, condition))
                 no = self.value(otherwise, self.split(state, negation(condition)))
                 return Conditional(condition, yes, no, wider(yes.sort, no.sort))
-            case Extreme(operator=operator, items=items):
+            case program.Extreme(operator=operator, items=items):
                 found = [self.named("value", self.value(item, state)) for item in items]
                 best = found[0]
                 for item in found[1:]:
                     nearer = Compare("<" if operator == "min" else ">", item, best)
                     best = self.named(operator, Conditional(nearer, item, best, wider(item.sort, best.sort)))
                 return best
-            case Length(view=view):
+            case program.Length(view=view):
                 whole = state.values[f"in.{view.sequence}#"]
                 if view.stop is not None:
                     stop = Literal(view.stop, INTEGER)
@@ -362,9 +343,9 @@ class Run:
                     return whole
                 rest = self.named("rest", Arithmetic("-", whole, Literal(view.start, INTEGER), INTEGER))
                 return Conditional(Compare("<", rest, ZERO), ZERO, rest, INTEGER)
-            case Item(view=view, index=index, line=line):
+            case program.Item(view=view, index=index, line=line):
                 at = self.named("index", self.value(index, state))
-                size = self.value(Length(view), state)
+                size = self.value(program.Length(view), state)
                 inside = conjunction((Compare("<=", ZERO, at), Compare("<", at, size)))
                 self.check(state, inside, "the index lies in the sequence", line)
                 place = Arithmetic("+", Literal(view.start, INTEGER), at, INTEGER) if view.start else at
@@ -378,10 +359,10 @@ class Run:
                     self.facts.append(Compare(">=", item, ZERO))
                 self.facts[before:] = [Implies(inside, fact) for fact in self.facts[before:]]
                 return item
-            case Inlined(body=body):
+            case program.Inlined(body=body):
                 return self.inlined(body, state)
 
-    def inlined(self, body: Sequence[Statement], state: State) -> Term:
+    def inlined(self, body: Sequence[program.Statement], state: State) -> Term:
         self._exits.append([])
         inside = State(state.path, dict(state.values))
         self.block(body, inside)
@@ -420,7 +401,7 @@ class Run:
             one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
         return Compare(operator, one, other)
 
-    def arithmetic(self, expression: Binary, state: State) -> Term:
+    def arithmetic(self, expression: program.Binary, state: State) -> Term:
         one = self.named("left", self.value(expression.left, state))
         other = self.named("right", self.value(expression.right, state))
         operator, line = expression.operator, expression.line

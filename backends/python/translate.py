@@ -29,30 +29,9 @@ from avow.language.sorts import (
     TupleSort,
 )
 
+from . import program
 from .expressions import Expressions
-from .program import (
-    Assign,
-    Binary,
-    Const,
-    Expr,
-    Extreme,
-    Failed,
-    For,
-    Give,
-    If,
-    Inlined,
-    Item,
-    Kind,
-    Leave,
-    Length,
-    Name,
-    Scalar,
-    Statement,
-    Step,
-    View,
-    assigned,
-    run_block,
-)
+from .program import Expr, Kind, Scalar, assigned
 from .tuning import INLINED_DEPTH
 from .whole_file import Parts, Refusal, bound_names, plain_arguments
 
@@ -84,7 +63,7 @@ class Scope:
     receiver: str
     """What the method calls its object."""
     bound: set[str] = field(default_factory=set)
-    sequences: dict[str, View] = field(default_factory=dict)
+    sequences: dict[str, program.View] = field(default_factory=dict)
     aliases: dict[str, Any] = field(default_factory=dict)
     """Names that stand for a constant mapping: the parameters."""
 
@@ -104,7 +83,7 @@ class Translator(Expressions):
         self.branches = 0
         """Conditions and loops around the statement that is read."""
 
-    def step(self) -> Step:
+    def step(self) -> program.Step:
         """The whole class."""
         start = self._start()
         sequences = self._inputs()
@@ -125,7 +104,7 @@ class Translator(Expressions):
         if unknown:
             line = self.changed[unknown[0]]
             raise Refusal(line, f"self.{unknown[0]} is changed by a step and is not among the node's memory")
-        return Step(body, start, dict(self.memory), sequences, self.lines)
+        return program.Step(body, start, dict(self.memory), sequences, self.lines)
 
     # -- the object --------------------------------------------------------------------------------------
 
@@ -147,8 +126,8 @@ class Translator(Expressions):
             raise Refusal(init.lineno, "__init__ returns something, or never ends")
         values: dict[str, Any] = {}
         try:
-            run_block(body, values)
-        except Failed as fault:
+            program.run_block(body, values)
+        except program.Failed as fault:
             raise Refusal(init.lineno, f"__init__ ends in {fault}") from None
         found = {name.removeprefix("self."): v for name, v in values.items() if name.startswith("self.")}
         for name in [n for n in self.kinds if n.startswith("self.")]:
@@ -188,7 +167,7 @@ class Translator(Expressions):
 
     # -- methods -----------------------------------------------------------------------------------------
 
-    def _method(self, name: str) -> tuple[Statement, ...]:
+    def _method(self, name: str) -> tuple[program.Statement, ...]:
         method = self.parts.methods[name]
         arguments = plain_arguments(method)
         if not arguments:
@@ -197,15 +176,15 @@ class Translator(Expressions):
         if arguments[0] in scope.own:
             raise Refusal(method.lineno, f"{arguments[0]} is bound anew in {name}")
         self.scope = scope
-        first: list[Statement] = []
+        first: list[program.Statement] = []
         for argument in arguments[1:]:
             if argument in self.items:
                 if argument in scope.own:
                     raise Refusal(method.lineno, f"the sequence {argument} is bound anew")
-                scope.sequences[argument] = View(argument)
+                scope.sequences[argument] = program.View(argument)
             else:
                 kind = self.kinds[f"in.{argument}"]
-                first.append(self.assign(argument, Name(f"in.{argument}", kind), method.lineno))
+                first.append(self.assign(argument, program.Name(f"in.{argument}", kind), method.lineno))
         self.calls.append(name)
         body, completes = self.block(method.body)
         self.calls.pop()
@@ -228,7 +207,7 @@ class Translator(Expressions):
         scope = Scope(f"@{self.made}", bound_names(definition), receiver)
         if receiver in scope.own:
             raise Refusal(definition.lineno, f"{receiver} is bound anew in {name}")
-        first: list[Statement] = []
+        first: list[program.Statement] = []
         caller = self.scope
         for argument, value in zip(names, arguments, strict=True):
             view = self.view(value)
@@ -254,16 +233,16 @@ class Translator(Expressions):
             raise Refusal(definition.lineno, f"{name} can end without a return: it then gives None")
         if len(set(results)) > 1:
             raise Refusal(definition.lineno, f"{name} returns {' or '.join(sorted(map(_a, set(results))))}")
-        inlined = Inlined((*first, *body), results[0])
+        inlined = program.Inlined((*first, *body), results[0])
         if self.conditional and any(n.startswith("self.") for n in assigned(inlined.body)):
             raise Refusal(line, f"{name} changes an attribute, and is called only under a condition here")
         return inlined
 
     # -- statements --------------------------------------------------------------------------------------
 
-    def block(self, statements: Sequence[ast.stmt]) -> tuple[tuple[Statement, ...], bool]:
+    def block(self, statements: Sequence[ast.stmt]) -> tuple[tuple[program.Statement, ...], bool]:
         """The statements, and whether one can come to their end."""
-        found: list[Statement] = []
+        found: list[program.Statement] = []
         for statement in statements:
             made, completes = self.statement(statement)
             found += made
@@ -271,7 +250,7 @@ class Translator(Expressions):
                 return tuple(found), False  # what stands below is never reached
         return tuple(found), True
 
-    def statement(self, statement: ast.stmt) -> tuple[list[Statement], bool]:
+    def statement(self, statement: ast.stmt) -> tuple[list[program.Statement], bool]:
         line = statement.lineno
         match statement:
             case ast.Pass() | ast.Expr(value=ast.Constant()):
@@ -292,28 +271,28 @@ class Translator(Expressions):
             case ast.Return(value=value):
                 return [self.give(value, line)], False
             case ast.Break():
-                return [Leave("break", line)], False
+                return [program.Leave("break", line)], False
             case ast.Continue():
-                return [Leave("continue", line)], False
+                return [program.Leave("continue", line)], False
             case ast.Assert():
                 raise Refusal(line, "assert is not checked where Python runs with -O")
         raise Refusal(line, f"{_word(statement)} is not in the subset")
 
-    def together(self, targets: Sequence[ast.expr], values: Sequence[ast.expr], line: int) -> list[Statement]:
+    def together(self, targets: Sequence[ast.expr], values: Sequence[ast.expr], line: int) -> list[program.Statement]:
         """``a, b = b, a``: every value is found before anything is bound, from left to right."""
         if len(targets) != len(values):
             raise Refusal(line, "names and values that are not as many")
-        found: list[Statement] = []
+        found: list[program.Statement] = []
         for value in values:
             given = self.expression(value)
             self.made += 1
-            found.append(Assign(f"#value{self.made}", given, line))
+            found.append(program.Assign(f"#value{self.made}", given, line))
         for target, first in zip(targets, list(found), strict=True):
-            assert isinstance(first, Assign)
-            found.append(self.bind(target, Name(first.name, first.value.kind), line))
+            assert isinstance(first, program.Assign)
+            found.append(self.bind(target, program.Name(first.name, first.value.kind), line))
         return found
 
-    def bind(self, target: ast.expr, value: Expr, line: int) -> Statement:
+    def bind(self, target: ast.expr, value: Expr, line: int) -> program.Statement:
         match target:
             case ast.Name(id=name):
                 return self.assign(name, value, line)
@@ -323,7 +302,7 @@ class Translator(Expressions):
                 return self.set_attribute(attribute, value, line)
         raise Refusal(line, "only a name, or an attribute of the object itself, is assigned to")
 
-    def binding(self, target: ast.expr, value: ast.expr, line: int) -> Statement:
+    def binding(self, target: ast.expr, value: ast.expr, line: int) -> program.Statement:
         match target:
             case ast.Name():
                 if isinstance(self.constant(value), Mapping):
@@ -334,23 +313,23 @@ class Translator(Expressions):
                     if self.branches or attribute in self.mappings:
                         raise Refusal(line, f"self.{attribute} is a mapping, and bound under a condition or twice")
                     self.mappings[attribute] = constant
-                    return If(Const(True, Kind.BOOL), (), (), line)
+                    return program.If(program.Const(True, Kind.BOOL), (), (), line)
             case _:  # `bind` refuses it
                 pass
         return self.bind(target, self.expression(value), line)
 
-    def assign(self, name: str, value: Expr, line: int) -> Statement:
+    def assign(self, name: str, value: Expr, line: int) -> program.Statement:
         full = f"{name}{self.scope.suffix}"
         self.same_kind(full, name, value.kind, line)
         self.scope.bound.add(name)
-        return Assign(full, value, line)
+        return program.Assign(full, value, line)
 
-    def set_attribute(self, attribute: str, value: Expr, line: int) -> Statement:
+    def set_attribute(self, attribute: str, value: Expr, line: int) -> program.Statement:
         full = f"self.{attribute}"
         if attribute in self.mappings:
             raise Refusal(line, f"{full} is a mapping and a value")
         self.same_kind(full, full, value.kind, line)
-        return Assign(full, value, line)
+        return program.Assign(full, value, line)
 
     def same_kind(self, full: str, name: str, kind: Kind, line: int) -> None:
         known = self.kinds.setdefault(full, kind)
@@ -361,7 +340,7 @@ class Translator(Expressions):
 
     def branch(
         self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt], line: int
-    ) -> tuple[list[Statement], bool]:
+    ) -> tuple[list[program.Statement], bool]:
         condition = self.truth(test)
         before = set(self.scope.bound)
         self.branches += 1
@@ -377,12 +356,12 @@ class Translator(Expressions):
                 self.scope.bound = after
             case _:  # what the second branch has bound, or nothing that matters
                 pass
-        return [If(condition, then, otherwise, line)], one or other
+        return [program.If(condition, then, otherwise, line)], one or other
 
-    def loop(self, statement: ast.For) -> Statement:
+    def loop(self, statement: ast.For) -> program.Statement:
         line = statement.lineno
         self.made += 1
-        counter = Name(f"#{self.made}", Kind.INT)
+        counter = program.Name(f"#{self.made}", Kind.INT)
         count, first, position = self.iterated(statement, counter, line)
         before = set(self.scope.bound)
         head = [self.assign(name, value, line) for name, value in first]
@@ -392,17 +371,17 @@ class Translator(Expressions):
         self.scope.bound = before  # a loop may have no turn
         here = range(line - 2, max(line, statement.end_lineno or line))
         comments = tuple((k + 1, text) for k in here if (text := _invariant(self.lines, k)))
-        return For(counter.name, count, (*head, *body), line, comments, position)
+        return program.For(counter.name, count, (*head, *body), line, comments, position)
 
     def iterated(
-        self, statement: ast.For, counter: Name, line: int
-    ) -> tuple[Expr, list[tuple[str, Expr]], Name | None]:
+        self, statement: ast.For, counter: program.Name, line: int
+    ) -> tuple[Expr, list[tuple[str, Expr]], program.Name | None]:
         """How often, what each turn begins with, and the loop's own name of its position."""
         target, source = statement.target, statement.iter
         view = self.view(source)
         if view is not None and isinstance(target, ast.Name):
-            item = Item(view, counter, self.items[view.sequence], line)
-            return Length(view), [(target.id, item)], None
+            item = program.Item(view, counter, self.items[view.sequence], line)
+            return program.Length(view), [(target.id, item)], None
         match source:
             case ast.Call(func=ast.Name(id="range"), args=[*arguments], keywords=[]) if (
                 isinstance(target, ast.Name) and 1 <= len(arguments) <= 2 and "range" not in self.scope.own
@@ -410,24 +389,24 @@ class Translator(Expressions):
                 ends = [self.expression(a) for a in arguments]
                 if any(e.kind is not Kind.INT for e in ends):
                     raise Refusal(line, "range of what is no int")
-                zero = Const(0, Kind.INT)
+                zero = program.Const(0, Kind.INT)
                 low, high = (zero, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
-                if not isinstance(low, Const):
+                if not isinstance(low, program.Const):
                     raise Refusal(line, "range that starts at what is no constant")
-                size = high if low == zero else Binary("-", high, low, Kind.INT, line)
-                at: Expr = counter if low == zero else Binary("+", low, counter, Kind.INT, line)
-                name = Name(f"{target.id}{self.scope.suffix}", Kind.INT)
-                return Extreme("max", (zero, size), Kind.INT), [(target.id, at)], name if low == zero else None
+                size = high if low == zero else program.Binary("-", high, low, Kind.INT, line)
+                at: Expr = counter if low == zero else program.Binary("+", low, counter, Kind.INT, line)
+                name = program.Name(f"{target.id}{self.scope.suffix}", Kind.INT)
+                return program.Extreme("max", (zero, size), Kind.INT), [(target.id, at)], name if low == zero else None
             case ast.Call(func=ast.Name(id="enumerate"), args=[inner], keywords=[]):
                 view = self.view(inner)
                 match target:
                     case ast.Tuple(elts=[ast.Name(id=index), ast.Name(id=each)]) if view is not None and index != each:
-                        item = Item(view, counter, self.items[view.sequence], line)
-                        name = Name(f"{index}{self.scope.suffix}", Kind.INT)
-                        return Length(view), [(index, counter), (each, item)], name
+                        item = program.Item(view, counter, self.items[view.sequence], line)
+                        name = program.Name(f"{index}{self.scope.suffix}", Kind.INT)
+                        return program.Length(view), [(index, counter), (each, item)], name
         raise Refusal(line, "a loop over something else than an input sequence, its part, range or enumerate")
 
-    def give(self, value: ast.expr | None, line: int) -> Statement:
+    def give(self, value: ast.expr | None, line: int) -> program.Statement:
         if self.making:
             raise Refusal(line, "__init__ returns early")
         if len(self.calls) > 1 or self.calls[-1] != "step":
@@ -435,7 +414,7 @@ class Translator(Expressions):
                 raise Refusal(line, f"{self.calls[-1]} returns None")
             found = self.expression(value)
             self.results.append(found.kind)
-            return Give((("", found),), line)
+            return program.Give((("", found),), line)
         outputs = {p.name: p for p in self.node.outputs if p.name not in self.memory}
         given: dict[str, ast.expr] = {}
         match value:
@@ -452,7 +431,7 @@ class Translator(Expressions):
                 raise Refusal(line, f"a step returns {to_return(outputs)}")
         if set(given) != set(outputs):
             raise Refusal(line, f"a step returns {to_return(outputs)}, here {', '.join(sorted(given)) or '{}'}")
-        return Give(tuple((name, self.output(name, part, line)) for name, part in given.items()), line)
+        return program.Give(tuple((name, self.output(name, part, line)) for name, part in given.items()), line)
 
     def output(self, name: str, value: ast.expr, line: int) -> Expr:
         found, wanted = self.expression(value), kind_of(self.node.output(name).sort)

@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import pytest
 
+from avow.backends.hoare import syntax
 from avow.backends.hoare.parser import parse_program
-from avow.backends.hoare.syntax import AssignStatement, Binary, IfStatement, MatchStatement, Source, WhileStatement
 from avow.backends.hoare.tuning import NESTING
 from avow.base.diagnostics import Diagnostic, Rejected
 
@@ -22,7 +22,7 @@ ELSE
 """  # noqa: W291 - as the paper prints it
 
 
-def parse(text: str) -> Source:
+def parse(text: str) -> syntax.Source:
     return parse_program(text, "p.imp")
 
 
@@ -35,12 +35,12 @@ def fault(text: str) -> Diagnostic:
 
 def test_the_papers_listing_parses_as_printed() -> None:
     assign, branch = parse(PAPER).body
-    assert isinstance(assign, AssignStatement)
-    assert isinstance(branch, IfStatement)
+    assert isinstance(assign, syntax.Assign)
+    assert isinstance(branch, syntax.If)
     (inner,) = branch.otherwise
-    assert isinstance(inner, IfStatement)
-    assert [s.value for s in inner.otherwise if isinstance(s, AssignStatement)] == [  # type: ignore[comparison-overlap]
-        s.value for s in parse("x := red").body if isinstance(s, AssignStatement)
+    assert isinstance(inner, syntax.If)
+    assert [s.value for s in inner.otherwise if isinstance(s, syntax.Assign)] == [  # type: ignore[comparison-overlap]
+        s.value for s in parse("x := red").body if isinstance(s, syntax.Assign)
     ]
 
 
@@ -67,8 +67,8 @@ def test_layouts_of_one_program(text: str) -> None:
 def test_else_belongs_to_the_if_of_its_column() -> None:
     outer = parse("IF a THEN\n  IF b THEN\n    x := 1\nELSE\n  y := 2").body[0]
     inner = parse("IF a THEN\n  IF b THEN\n    x := 1\n  ELSE\n    y := 2").body[0]
-    assert isinstance(outer, IfStatement)
-    assert isinstance(inner, IfStatement)
+    assert isinstance(outer, syntax.If)
+    assert isinstance(inner, syntax.If)
     assert outer.otherwise
     assert not inner.otherwise
 
@@ -77,9 +77,9 @@ def test_a_chain_of_else_if() -> None:
     body = parse("IF a THEN\n  x := 1\nELSE IF b THEN\n  x := 2\nELSE\n  x := 3\ny := 4").body
     assert len(body) == 2
     first = body[0]
-    assert isinstance(first, IfStatement)
+    assert isinstance(first, syntax.If)
     second = first.otherwise[0]
-    assert isinstance(second, IfStatement)
+    assert isinstance(second, syntax.If)
     assert second.otherwise
 
 
@@ -88,7 +88,7 @@ def test_a_long_chain_of_else_if() -> None:
     body = parse(text + "ELSE\n  x := 99\nz := 1").body
     assert len(body) == 2
     depth, at = 0, body[0]
-    while isinstance(at, IfStatement):
+    while isinstance(at, syntax.If):
         depth, at = depth + 1, at.otherwise[0]
     assert depth == 20
 
@@ -102,16 +102,16 @@ def test_match_while_maps_and_declarations() -> None:
     assert [d.is_input for d in source.declarations] == [False, True]
     assert source.declarations[1].parameters == ("NATURAL", "REAL")
     match, loop = source.body[1:]
-    assert isinstance(match, MatchStatement)
+    assert isinstance(match, syntax.Match)
     assert [v.name for v in match.variables] == ["a", "b"]
-    assert isinstance(loop, WhileStatement)
+    assert isinstance(loop, syntax.While)
     assert loop.variant is not None
 
 
 def test_precedence_and_numbers() -> None:
     (statement,) = parse("x := a + 2.50 * b < c and not d or e").body
-    assert isinstance(statement, AssignStatement)
-    assert isinstance(statement.value, Binary)
+    assert isinstance(statement, syntax.Assign)
+    assert isinstance(statement.value, syntax.Binary)
     assert statement.value.operator == "or"
     assert Fraction("2.50") == Fraction(5, 2)
 
