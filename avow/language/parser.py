@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple, TypeVar, overload
 
 from avow.base.grammars import lark_of
@@ -164,206 +165,132 @@ def _accepted(start: str, tokens: Iterable[Token], bad: Token) -> frozenset[str]
     return frozenset(machine.accepts())
 
 
+def _callbacks() -> SimpleNamespace:
+    return SimpleNamespace(**_CALLBACKS)
+
+
 def _lark() -> Any:
-    return lark_of(Path(__file__).with_name("grammar.lark"), "rcl", STARTS, _Build, maybe_placeholders=False)
+    return lark_of(Path(__file__).with_name("grammar.lark"), "rcl", STARTS, _callbacks, maybe_placeholders=False)
 
 
-def _deepest(parts: Iterable[Any]) -> int:
-    deepest: int = max([part.depth for part in parts])
-    return deepest + 1
-
-
-def _chain_depth(operands: Sequence[Any]) -> int:
-    """A chain of operators counts as deep as its term becomes."""
-    return _deepest(operands) - 1 + min(len(operands) - 1, CHAIN)
-
-
-_Binders = tuple[syntax.Binder, ...]
 _Made = TypeVar("_Made")
-_Callback = Callable[["_Build", list[Any]], _Made]
 
 
-def _word(kind: Callable[[int, int, int, str], _Made]) -> _Callback[_Made]:
+def _made(kind: Callable[..., _Made], c: Sequence[Any], *fields: Any) -> _Made:
+    """A piece of syntax from the first of a rule's tokens and trees to the last, a level above the deepest of them."""
+    depth = max([part.depth for part in c if type(part) is not Token], default=0)
+    return kind(c[0].start, c[-1].end, depth + 1, *fields)
+
+
+def _word(kind: Callable[[int, int, int, str], _Made]) -> Callable[[list[Any]], _Made]:
     """What one word says by its text."""
-    return lambda _, c: kind(c[0].start, c[0].end, 1, c[0].text)
+    return lambda c: kind(c[0].start, c[0].end, 1, c[0].text)
 
 
-def _listed(kind: Callable[[int, int, int, tuple[Any, ...]], _Made]) -> _Callback[_Made]:
+def _chain(kind: Callable[..., _Made], c: list[Any], *fields: Any) -> _Made:
+    """Operands with signs between them, which count as deep as their term becomes."""
+    depth = max([part.depth for part in c[::2]]) + min(len(c) // 2, CHAIN)
+    return kind(c[0].start, c[-1].end, depth, *fields)
+
+
+def _listed(kind: Callable[..., _Made]) -> Callable[[list[Any]], _Made]:
     """What stands between brackets, with commas."""
-    return lambda _, c: kind(c[0].start, c[-1].end, _deepest(c[1:-1:2]) if c[1:-1] else 1, tuple(c[1:-1:2]))
+    return lambda c: _made(kind, c, tuple(c[1:-1:2]))
 
 
-def _joined(sign: syntax.Sign, depth: Callable[[Sequence[Any]], int]) -> _Callback[syntax.Connective]:
+def _joined(sign: syntax.Sign) -> Callable[[list[Any]], syntax.Connective]:
     """Formulas with a sign between them."""
-    return lambda _, c: syntax.Connective(c[0].start, c[-1].end, depth(c[::2]), sign, tuple(c[::2]))
+    return lambda c: _made(syntax.Connective, c, sign, tuple(c[::2]))
 
 
-class _Build:
-    """A callback per alias of the grammar; its argument is the list of tokens and trees of the rule."""
+def _implied(sign: syntax.Sign) -> Callable[[list[Any]], syntax.Connective]:
+    """As `_joined`, of a sign whose chain is a deep term."""
+    return lambda c: _chain(syntax.Connective, c, sign, tuple(c[::2]))
 
-    # --- declarations ------------------------------------------------------------------------------------------------
 
-    def type_declaration(self, c: list[Any]) -> syntax.TypeDeclaration:
-        return syntax.TypeDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
+def _ports(groups: Iterable[Sequence[syntax.PortDeclaration]]) -> tuple[syntax.PortDeclaration, ...]:
+    return tuple(port for group in groups for port in group)
 
-    def constant_declaration(self, c: list[Any]) -> syntax.ConstantDeclaration:
-        return syntax.ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def plain_definition(self, c: list[Any]) -> syntax.Define:
-        return syntax.Define(c[0].start, c[3].end, c[3].depth + 1, c[1], (), c[3])
+def _port_list(c: list[Any]) -> syntax.PortList:
+    ports = _ports(c[::2])
+    return _made(syntax.PortList, ports, ports) if ports else syntax.PortList(0, 0, 1, ())
 
-    def definition(self, c: list[Any]) -> syntax.Define:
-        return syntax.Define(c[0].start, c[6].end, _deepest((c[3], c[6])), c[1], c[3].items, c[6])
 
-    def ports(self, c: list[Any]) -> syntax.PortList:
-        ports = tuple(port for group in c[::2] for port in group)
-        return (
-            syntax.PortList(ports[0].start, ports[-1].end, _deepest(ports), ports)
-            if c
-            else syntax.PortList(0, 0, 1, ())
-        )
+def _record(c: list[Any]) -> syntax.RecordType:
+    fields = _ports(c[1:-1:2])
+    return _made(syntax.RecordType, (c[0], *fields, c[-1]), fields)
 
-    def port(self, c: list[Any]) -> tuple[syntax.PortDeclaration, ...]:
-        """``a, b : BOOL``: each name with the type."""
-        return tuple(syntax.PortDeclaration(name.start, c[-1].end, c[-1].depth + 1, name, c[-1]) for name in c[:-2:2])
 
-    def topics(self, c: list[Any]) -> syntax.TopicList:
-        return (
-            syntax.TopicList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]))
-            if c
-            else syntax.TopicList(0, 0, 1, ())
-        )
+def _parenthesised(c: list[Any]) -> syntax.Parentheses:
+    inner = c[1].body if type(c[1]) is syntax.Parentheses else c[1]
+    return _made(syntax.Parentheses, c, inner)
 
-    def plain_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
-        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, None)
 
-    def bare_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
-        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, c[4])
+def _limit(c: list[Any]) -> syntax.LimitSyntax:
+    relation = c[1].text if type(c[1]) is Token else ""
+    unit = c[-2] if type(c[-2]) is Token else None
+    return _made(syntax.LimitSyntax, c, relation, c[2] if relation else c[1], unit)
 
-    def matched_topic(self, c: list[Any]) -> syntax.TopicDeclaration:
-        return syntax.TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], c[4].text, c[6])
 
-    def ros_type(self, c: list[Any]) -> syntax.RosType:
-        return syntax.RosType(c[0].start, c[-1].end, 1, tuple(c[::2]))
+def _pace(c: list[Any]) -> syntax.PaceSyntax:
+    length = syntax.Quantity(c[-3].start, c[-2].end, 1, c[-3].text, c[-2])
+    return _made(syntax.PaceSyntax, c, c[0], tuple(c[2:-3]), length)
 
-    # --- types -------------------------------------------------------------------------------------------------------
 
-    def function_type(self, c: list[Any]) -> syntax.FunctionType:
-        return syntax.FunctionType(c[0].start, c[2].end, max(c[0].depth, c[2].depth) + 1, c[0], c[2])
-
-    def product_type(self, c: list[Any]) -> syntax.ProductType:
-        return syntax.ProductType(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
-
-    def unspecified_type(self, c: list[Any]) -> syntax.UnspecifiedType:
-        return syntax.UnspecifiedType(c[0].start, c[1].end, 1)
-
-    def sequence_type(self, c: list[Any]) -> syntax.SequenceType:
-        return syntax.SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
-
-    def record_type(self, c: list[Any]) -> syntax.RecordType:
-        fields = tuple(port for group in c[1:-1:2] for port in group)
-        return syntax.RecordType(c[0].start, c[-1].end, _deepest(fields), fields)
-
-    def plain_element(self, c: list[Any]) -> syntax.Element:
-        return syntax.Element(c[0].start, c[0].end, 1, c[0], ())
-
-    def constructor(self, c: list[Any]) -> syntax.Element:
-        return syntax.Element(c[0].start, c[-1].end, _deepest(c[2:-1:2]), c[0], tuple(c[2:-1:2]))
-
-    # --- formulas and terms ------------------------------------------------------------------------------------------
-
-    iff, implies = _joined(syntax.Sign.IFF, _chain_depth), _joined(syntax.Sign.IMPLIES, _chain_depth)
-    disjunction, conjunction = _joined(syntax.Sign.OR, _deepest), _joined(syntax.Sign.AND, _deepest)
-
-    def negation(self, c: list[Any]) -> syntax.Negation:
-        return syntax.Negation(c[0].start, c[1].end, c[1].depth + 1, c[1])
-
-    def comparison(self, c: list[Any]) -> syntax.Comparison:
-        return syntax.Comparison(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
-
-    def arithmetic(self, c: list[Any]) -> syntax.Calculation:
-        operands = tuple(c[::2])
-        return syntax.Calculation(c[0].start, c[-1].end, _chain_depth(operands), operands, tuple(c[1::2]))
-
-    def negative(self, c: list[Any]) -> syntax.Minus:
-        return syntax.Minus(c[0].start, c[1].end, c[1].depth + 1, c[1])
-
-    def application(self, c: list[Any]) -> syntax.Application:
-        arguments = tuple(c[2:-1:2])
-        return syntax.Application(c[0].start, c[-1].end, _deepest((c[0], *arguments)), c[0], arguments)
-
-    name, builtin, number = _word(syntax.Name), _word(syntax.BuiltinName), _word(syntax.Number)
-    string, named_type, builtin_type = _word(syntax.Text), _word(syntax.NamedType), _word(syntax.BuiltinType)
-
-    def truth(self, c: list[Any]) -> syntax.Truth:
-        return syntax.Truth(c[0].start, c[0].end, 1, c[0].text == "TRUE")
-
-    def port_name(self, c: list[Any]) -> syntax.PortName:
-        return syntax.PortName(c[0].start, c[2].end, 1, c[0].text, c[2].text)
-
-    def node_port(self, c: list[Any]) -> syntax.NodePort:
-        role = c[2].text if len(c) == 5 else None
-        return syntax.NodePort(c[0].start, c[-1].end, 1, c[0].text, role, c[-1].text)
-
-    def field(self, c: list[Any]) -> syntax.FieldOf:
-        return syntax.FieldOf(c[0].start, c[2].end, c[0].depth + 1, c[0], c[2])
-
-    def parenthesised(self, c: list[Any]) -> syntax.Parentheses:
-        inner = c[1].body if type(c[1]) is syntax.Parentheses else c[1]
-        return syntax.Parentheses(c[0].start, c[2].end, c[1].depth + 1, inner)
-
-    tuple, set, sequence = _listed(syntax.TupleDisplay), _listed(syntax.SetDisplay), _listed(syntax.SequenceDisplay)
-    tuple_type, set_type = _listed(syntax.TupleType), _listed(syntax.SetType)
-
-    def range(self, c: list[Any]) -> syntax.RangeDisplay:
-        return syntax.RangeDisplay(c[0].start, c[4].end, max(c[1].depth, c[3].depth) + 1, c[1], c[3])
-
-    def quantified(self, c: list[Any]) -> syntax.Quantification:
-        binders: _Binders = c[2]
-        depth = max(_deepest(binders) + 1, c[4].depth + 1)
-        return syntax.Quantification(c[0].start, c[5].end, depth, QUANTIFIERS[c[0].type], binders, c[4])
-
-    def if_then_else(self, c: list[Any]) -> syntax.IfThenElse:
-        return syntax.IfThenElse(c[0].start, c[5].end, _deepest(c[1::2]), c[1], c[3], c[5])
-
-    def quantity(self, c: list[Any]) -> syntax.Quantity:
-        return syntax.Quantity(c[0].start, c[1].end, 1, c[0].text, c[1])
-
-    def since(self, c: list[Any]) -> syntax.Lasting:
-        return syntax.Lasting(c[0].start, c[2].end, _deepest(c[::2]), c[1].text, c[0], None, c[2])
-
-    until = since
-
-    def ahead(self, c: list[Any]) -> syntax.Ahead:
-        return syntax.Ahead(
-            c[0].start, c[1].end, c[1].depth + 1, syntax.Name(c[0].start, c[0].end, 1, c[0].text), (c[1],)
-        )
-
-    def limited_since(self, c: list[Any]) -> syntax.Lasting:
-        return syntax.Lasting(c[0].start, c[3].end, _deepest((c[0], *c[2:])), c[1].text, c[0], c[2], c[3])
-
-    def limited(self, c: list[Any]) -> syntax.Limited:
-        arguments = tuple(c[3:-1:2])
-        return syntax.Limited(c[0].start, c[-1].end, _deepest((c[1], *arguments)), c[0], c[1], arguments)
-
-    def pace(self, c: list[Any]) -> syntax.PaceSyntax:
-        length = syntax.Quantity(c[-3].start, c[-2].end, 1, c[-3].text, c[-2])
-        return syntax.PaceSyntax(c[0].start, c[-1].end, c[0].depth + 1, c[0], tuple(c[2:-3]), length)
-
-    def plain_limit(self, c: list[Any]) -> syntax.LimitSyntax:
-        return syntax.LimitSyntax(c[0].start, c[2].end, c[1].depth + 1, "", c[1], None)
-
-    def related_limit(self, c: list[Any]) -> syntax.LimitSyntax:
-        return syntax.LimitSyntax(c[0].start, c[3].end, c[2].depth + 1, c[1].text, c[2], None)
-
-    def named_limit(self, c: list[Any]) -> syntax.LimitSyntax:
-        return syntax.LimitSyntax(c[0].start, c[3].end, c[1].depth + 1, "", c[1], c[2])
-
-    def related_named_limit(self, c: list[Any]) -> syntax.LimitSyntax:
-        return syntax.LimitSyntax(c[0].start, c[4].end, c[2].depth + 1, c[1].text, c[2], c[3])
-
-    def binders(self, c: list[Any]) -> _Binders:
-        return tuple(c[::2])
-
-    def binder(self, c: list[Any]) -> syntax.Binder:
-        return syntax.Binder(c[0].start, c[-1].end, c[-1].depth + 1, tuple(c[:-2:2]), c[-1])
+_CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
+    "type_declaration": lambda c: _made(syntax.TypeDeclaration, c, c[0], c[2]),
+    "constant_declaration": lambda c: _made(syntax.ConstantDeclaration, c, c[0], c[2]),
+    "definition": lambda c: _made(syntax.Define, c, c[1], c[3].items if len(c) > 4 else (), c[-1]),
+    "ports": _port_list,
+    "port": lambda c: tuple(_made(syntax.PortDeclaration, (name, c[-1]), name, c[-1]) for name in c[:-2:2]),
+    "topics": lambda c: _made(syntax.TopicList, c, tuple(c[::2])) if c else syntax.TopicList(0, 0, 1, ()),
+    "topic": lambda c: _made(
+        syntax.TopicDeclaration, c, c[0], c[1], c[4].text if len(c) > 6 else None, c[-2] if len(c) > 2 else None
+    ),
+    "ros_type": lambda c: _made(syntax.RosType, c, tuple(c[::2])),
+    # types
+    "function_type": lambda c: _made(syntax.FunctionType, c, c[0], c[2]),
+    "product_type": lambda c: _made(syntax.ProductType, c, tuple(c[::2]), tuple(c[1::2])),
+    "named_type": _word(syntax.NamedType),
+    "builtin_type": _word(syntax.BuiltinType),
+    "unspecified_type": lambda c: _made(syntax.UnspecifiedType, c),
+    "sequence_type": lambda c: _made(syntax.SequenceType, c, c[1]),
+    "record_type": _record,
+    "set_type": _listed(syntax.SetType),
+    "tuple_type": _listed(syntax.TupleType),
+    "element": lambda c: _made(syntax.Element, c, c[0], tuple(c[2:-1:2])),
+    # formulas and terms
+    "iff": _implied(syntax.Sign.IFF),
+    "implies": _implied(syntax.Sign.IMPLIES),
+    "disjunction": _joined(syntax.Sign.OR),
+    "conjunction": _joined(syntax.Sign.AND),
+    "negation": lambda c: _made(syntax.Negation, c, c[1]),
+    "comparison": lambda c: _made(syntax.Comparison, c, tuple(c[::2]), tuple(c[1::2])),
+    "arithmetic": lambda c: _chain(syntax.Calculation, c, tuple(c[::2]), tuple(c[1::2])),
+    "negative": lambda c: _made(syntax.Minus, c, c[1]),
+    "application": lambda c: _made(syntax.Application, c, c[0], tuple(c[2:-1:2])),
+    "name": _word(syntax.Name),
+    "builtin": _word(syntax.BuiltinName),
+    "number": _word(syntax.Number),
+    "string": _word(syntax.Text),
+    "truth": lambda c: _made(syntax.Truth, c, c[0].text == "TRUE"),
+    "port_name": lambda c: _made(syntax.PortName, c, c[0].text, c[2].text),
+    "node_port": lambda c: _made(syntax.NodePort, c, c[0].text, c[2].text if len(c) > 3 else None, c[-1].text),
+    "field": lambda c: _made(syntax.FieldOf, c, c[0], c[2]),
+    "parenthesised": _parenthesised,
+    "tuple": _listed(syntax.TupleDisplay),
+    "set": _listed(syntax.SetDisplay),
+    "sequence": _listed(syntax.SequenceDisplay),
+    "range": lambda c: _made(syntax.RangeDisplay, c, c[1], c[3]),
+    "quantified": lambda c: _made(syntax.Quantification, c, QUANTIFIERS[c[0].type], tuple(c[2:-3:2]), c[-2]),
+    "binder": lambda c: syntax.Binder(c[0].start, c[-1].end, c[-1].depth + 2, tuple(c[:-2:2]), c[-1]),
+    "if_then_else": lambda c: _made(syntax.IfThenElse, c, c[1], c[3], c[5]),
+    "quantity": lambda c: _made(syntax.Quantity, c, c[0].text, c[1]),
+    "lasting": lambda c: _made(syntax.Lasting, c, c[1].text, c[0], c[2] if len(c) > 3 else None, c[-1]),
+    "ahead": lambda c: _made(syntax.Ahead, c, syntax.Name(c[0].start, c[0].end, 1, c[0].text), (c[1],)),
+    "limited": lambda c: _made(syntax.Limited, c, c[0], c[1], tuple(c[3:-1:2])),
+    "limit": _limit,
+    "pace": _pace,
+}
+"""What becomes of the tokens and trees of a rule, by its name in the grammar."""
