@@ -1,14 +1,14 @@
 """The surface syntax of declarations and formulas: what the parser makes of the tokens, before any name is resolved.
 
-A frozen dataclass for each kind of node, and `children`, total over them: whoever walks the tree is told by mypy of a
-kind that it forgets. Names that are only compared are plain strings; those that a diagnostic may point at are tokens.
+A frozen dataclass for each kind of node, its fields in reading order, so that `children` finds the trees in it. Names
+that are only compared are plain strings; those that a diagnostic may point at are tokens.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from enum import StrEnum
-from typing import assert_never
+from typing import Any
 
 from avow.base.records import dataclass
 from avow.language.lexer import Token
@@ -413,57 +413,15 @@ Syntax = (
 
 
 def children(tree: Syntax) -> tuple[Syntax, ...]:
-    """The direct parts that are trees themselves, in reading order."""
-    match tree:
-        case (
-            Name() | BuiltinName() | Number() | Quantity() | Text() | Truth() | PortName() | NodePort()
-            | NamedType() | BuiltinType() | UnspecifiedType() | RosType()
-        ):  # fmt: skip
-            return ()
-        case Connective() | TupleDisplay() | SetDisplay() | SequenceDisplay() | TupleType() | PortList() | TopicList():
-            return tree.items
-        case Negation() | Minus() | FieldOf() | Parentheses():
-            return (tree.body,)
-        case Comparison() | Calculation():
-            return tree.operands
-        case Application():
-            return (tree.function, *tree.arguments)
-        case RangeDisplay():
-            return (tree.low, tree.high)
-        case Binder():
-            return (tree.domain,)
-        case Quantification():
-            return (*tree.binders, tree.body)
-        case IfThenElse():
-            return (tree.condition, tree.then, tree.otherwise)
-        case LimitSyntax():
-            return (tree.amount,)
-        case Limited():
-            return (tree.limit, *tree.arguments)
-        case PaceSyntax():
-            return (tree.head, tree.length)
-        case Lasting():
-            return (tree.left, tree.right) if tree.limit is None else (tree.left, tree.limit, tree.right)
-        case FunctionType():
-            return (tree.parameters, tree.result)
-        case ProductType():
-            return tree.factors
-        case SetType():
-            return tree.elements
-        case RecordType():
-            return tree.fields
-        case Element():
-            return tree.parameters
-        case SequenceType():
-            return (tree.item,)
-        case TypeDeclaration() | PortDeclaration() | TopicDeclaration():
-            return (tree.type,)
-        case ConstantDeclaration():
-            return (tree.value,)
-        case Define():
-            return (*tree.parameters, tree.body)
-        case _:
-            assert_never(tree)
+    """The direct parts that are trees themselves, in reading order, in which the fields of every kind stand."""
+    found: list[Any] = []
+    for name in type(tree).__match_args__[3:]:
+        part = getattr(tree, name)
+        if isinstance(part, _Placed):
+            found.append(part)
+        elif type(part) is tuple:
+            found += [each for each in part if isinstance(each, _Placed)]
+    return tuple(found)
 
 
 def walk(tree: Syntax) -> Iterator[Syntax]:
