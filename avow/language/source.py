@@ -28,6 +28,21 @@ class Source:
 
     def place(self, offset: int) -> tuple[int, int]:
         """The line and column of an offset (counted in characters)."""
+        starts = self.starts
+        row = bisect_right(starts, offset) - 1
+        column = offset - starts[row] + (self.column if row == 0 else 1)
+        return self.line + row, column
+
+    def offset(self, line: int, column: int) -> int:
+        """The offset of a place; the text's end for one behind it."""
+        row = max(line - self.line, 0)
+        if row >= len(self.starts):
+            return len(self.text)
+        return min(self.starts[row] + column - (self.column if row == 0 else 1), len(self.text))
+
+    @property
+    def starts(self) -> list[int]:
+        """The offsets at which lines begin."""
         if self._starts is None:
             starts = [0]
             at = self.text.find("\n")
@@ -35,9 +50,7 @@ class Source:
                 starts.append(at + 1)
                 at = self.text.find("\n", at + 1)
             self._starts = starts
-        row = bisect_right(self._starts, offset) - 1
-        column = offset - self._starts[row] + (self.column if row == 0 else 1)
-        return self.line + row, column
+        return self._starts
 
     def span(self, start: int, end: int) -> Span:
         line, column = self.place(start)

@@ -23,7 +23,7 @@ from avow.language.terms import Quantified, Variable
 from avow.lsp.background import Answer
 from avow.lsp.names import CLAUSES, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
 from avow.lsp.project import Project, about_plan, is_plan, project_of
-from avow.lsp.renaming import all_occurrences, renamed_with
+from avow.lsp.renaming import all_occurrences
 from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
 
 StatusLookup = Callable[[str, str], str | None]
@@ -57,7 +57,8 @@ class Document:
 
     @property
     def taken_apart(self) -> Text:
-        return taken_apart(self.file, self.text)
+        """The contract's text; of a plan, that of none."""
+        return taken_apart(self.file, "" if is_plan(self.file) else self.text)
 
     @property
     def tokens(self) -> tuple[Token, ...]:
@@ -83,8 +84,6 @@ def name_at(document: Document, offset: int) -> Occurrence | None:
 
 
 def _token_at(document: Document, offset: int) -> Token | None:
-    if is_plan(document.file):
-        return None
     touching = [t for t in document.tokens if t.start <= offset <= t.end]
     return touching[-1] if touching else None
 
@@ -136,16 +135,8 @@ def references(document: Document, offset: int, declarations: bool = True) -> tu
     return tuple(o for o in found if declarations or not o.declares)
 
 
-def linked(document: Document, offset: int) -> tuple[Occurrence, ...]:
-    """As `references`, of all that a rename would change: ports of one name are one thing to a system."""
-    name = name_at(document, offset)
-    return tuple(o for o in document.names if name is not None and o.written and renamed_with(name.meaning, o.meaning))
-
-
 def symbols(document: Document) -> tuple[Symbol, ...]:
     """The outline: the context's declarations, the nodes, and their clauses."""
-    if is_plan(document.file):
-        return ()
     source, syntax = Source(document.file, document.text), document.taken_apart.syntax
     found = [
         Symbol(tree.name.text, kind, kind, source.span(tree.start, tree.end))

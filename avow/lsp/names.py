@@ -156,6 +156,14 @@ class Ports:
         return None
 
 
+def declared(environment: Environment, name: str) -> Meaning | None:
+    """What a context makes of a name, but for its definitions. An enumeration that is declared as a constant is a type:
+    it may stand for one."""
+    of = environment
+    kinds = ((What.ELEMENT, of.elements), (What.TYPE, of.types), (What.CONSTANT, of.constants))
+    return next((Meaning(what, name) for what, names in kinds if name in names), None)
+
+
 def _ports(node: NodeSyntax) -> Ports:
     both = (frozenset(p.name.text for p in (t.items if t else ())) for t in (node.inputs, node.outputs))
     return Ports(*both)
@@ -176,15 +184,8 @@ class _Reader:
 
     def global_name(self, name: str) -> Meaning | None:
         """What a name means wherever it stands."""
-        environment = self.environment
-        if name in environment.elements:
-            return Meaning(What.ELEMENT, name)
-        if name in environment.constants:
-            return Meaning(What.CONSTANT, name)
-        for owner in (self.node, ""):
-            if name in self.defined.get(owner, ()):
-                return Meaning(What.DEFINITION, name, owner)
-        return Meaning(What.TYPE, name) if name in environment.types else None
+        owner = next((each for each in (self.node, "") if name in self.defined.get(each, ())), None)
+        return declared(self.environment, name) if owner is None else Meaning(What.DEFINITION, name, owner)
 
     def text(self, text: Text) -> Iterator[Occurrence]:
         self.text_ = text

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from avow.base.diagnostics import Rejected, Span
 from avow.language.contract import Contract
 from avow.language.environment import of_contract
+from avow.language.source import Source
 from avow.language.terms import Role
-from avow.lsp.names import Meaning, Occurrence, Ports, What
+from avow.lsp.names import Meaning, Occurrence, Ports, What, declared
 from avow.system.strict_yaml import Piece, read_yaml
 
 _WORD = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\.")
@@ -62,7 +63,7 @@ class _Region:
 class _Reader:
     def __init__(self, plan: PlanText, contract: Contract) -> None:
         self.plan = plan
-        self.starts = [0, *(m.end() for m in re.finditer("\n", plan.text))]
+        self.source = Source(plan.file, plan.text)
         self.environment = of_contract(contract)
         self.ports = {
             n.name: Ports(frozenset(p.name for p in n.inputs), frozenset(p.name for p in n.outputs))
@@ -79,7 +80,8 @@ class _Reader:
     # -- places --------------------------------------------------------------------------------------------------------
 
     def region(self, span: Span) -> _Region:
-        start, end = (self.starts[line - 1] + column - 1 for line, column in _corners(span))
+        start = self.source.offset(span.line, span.column)
+        end = self.source.offset(span.end_line, span.end_column)
         raw = self.plan.text[start:end]
         if raw[:1] in ("'", '"'):
             return _Region(start + 1, max(end - 1, start + 1))
@@ -115,11 +117,7 @@ class _Reader:
         return lambda name: self.clause(node, What.GUARANTEE, name)
 
     def element(self, name: str) -> Meaning | None:
-        if name in self.environment.elements:
-            return Meaning(What.ELEMENT, name)
-        if name in self.environment.constants:
-            return Meaning(What.CONSTANT, name)
-        return Meaning(What.TYPE, name) if name in self.environment.types else None
+        return declared(self.environment, name)
 
     def port(self, node: str, name: str, role: str | None = None) -> Meaning | None:
         """A port of a node; of any node that has it, where no node is named."""
@@ -263,7 +261,3 @@ def _scalars(piece: Piece) -> Iterator[Piece]:
         yield from _scalars(inner)
     if piece.items is None and piece.entries is None:
         yield piece
-
-
-def _corners(span: Span) -> tuple[tuple[int, int], tuple[int, int]]:
-    return (span.line, span.column), (span.end_line, span.end_column)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from lsprotocol import types
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.language.source import Source
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
 from avow.lsp.background import Answer
 from avow.lsp.completion import Offer, Signature
@@ -52,24 +52,16 @@ class Lines:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.starts = [0]
-        at = text.find("\n")
-        while at >= 0:
-            self.starts.append(at + 1)
-            at = text.find("\n", at + 1)
+        self.source = Source("", text)
 
     def position(self, offset: int) -> types.Position:
         """The position of an offset."""
-        line = bisect_right(self.starts, offset) - 1
-        return types.Position(line, units(self.text[self.starts[line] : offset]))
+        line, column = self.source.place(offset)
+        return types.Position(line - 1, units(self.text[offset - column + 1 : offset]))
 
     def offset(self, position: types.Position) -> int:
         """The offset of a position; what is beyond a line's end is that end."""
-        if position.line >= len(self.starts):
-            return len(self.text)
-        at: int = self.starts[position.line]
-        end = self.text.find("\n", at)
-        end = len(self.text) if end < 0 else end
+        at, end = self._line(position.line + 1)
         left: int = position.character
         while at < end and left > 0:
             left -= units(self.text[at])
@@ -83,12 +75,14 @@ class Lines:
         return types.Range(self._of(span.line, span.column), self._of(span.end_line, span.end_column))
 
     def _of(self, line: int, column: int) -> types.Position:
-        if not 0 < line <= len(self.starts):
-            return types.Position(max(line - 1, 0), 0)
-        start = self.starts[line - 1]
+        start, end = self._line(line)
+        return types.Position(max(line - 1, 0), units(self.text[start : min(start + max(column - 1, 0), end)]))
+
+    def _line(self, line: int) -> tuple[int, int]:
+        """Where a line begins and ends, counted from 1; the text's end for one behind it."""
+        start = self.source.offset(line, 1)
         end = self.text.find("\n", start)
-        end = len(self.text) if end < 0 else end
-        return types.Position(line - 1, units(self.text[start : min(start + max(column - 1, 0), end)]))
+        return start, len(self.text) if end < 0 else end
 
 
 def units(text: str) -> int:

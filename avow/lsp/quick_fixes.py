@@ -13,8 +13,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
-from avow.base.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic
 from avow.base.tuning.running import FIXES_TRIED
+from avow.language.source import Source
 
 _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
 _MEANT = re.compile(r"did you mean `([^`\n]+)`\?")
@@ -38,7 +39,8 @@ def fixes(diagnostic: Diagnostic, text: str, check: Check, most: int = 3) -> tup
     """The fixes of one message about a text; none where its hint proposes nothing that helps."""
     if diagnostic.span is None or not diagnostic.hint:
         return ()
-    start, end = _offset(text, diagnostic.span.line, diagnostic.span.column), _end(text, diagnostic.span)
+    source, span = Source("", text), diagnostic.span
+    start, end = source.offset(span.line, span.column), source.offset(span.end_line, span.end_column)
     before = check(text)
     good: dict[str, Fix] = {}
     for fix in islice(_candidates(diagnostic, text, start, end), FIXES_TRIED):
@@ -70,7 +72,7 @@ def _candidates(diagnostic: Diagnostic, text: str, start: int, end: int) -> Iter
         yield Fix("Write `;`", end, end, ";")
         return
     if "close it with" in hint:
-        yield from _closed(diagnostic, hint, text)
+        yield from _closed(diagnostic, hint, text, start)
         return
     for match in _QUOTED.finditer(hint):
         proposal = match[1] or match[2] or match[3]
@@ -98,33 +100,17 @@ def _instead(proposal: str, text: str, start: int, end: int) -> Iterator[Fix]:
         yield Fix(title, word.start(), word.end(), proposal)
 
 
-def _closed(diagnostic: Diagnostic, hint: str, text: str) -> Iterator[Fix]:
+def _closed(diagnostic: Diagnostic, hint: str, text: str, start: int) -> Iterator[Fix]:
     """What is missing, put where the message says that it should be, or at the end of the line or the text."""
     sign = next((m[1] or m[2] for m in _QUOTED.finditer(hint)), "")
     title = f"Close it with `{sign}`"
     for _, span in diagnostic.notes:
         if span is not None:
-            at = _offset(text, span.line, span.column)
-            at = len(text[:at].rstrip())
+            at = len(text[: Source("", text).offset(span.line, span.column)].rstrip())
             yield Fix(title, at, at, f" {sign}")
-    if diagnostic.span is not None:
-        line_end = text.find("\n", _offset(text, diagnostic.span.line, diagnostic.span.column))
-        at = line_end if line_end >= 0 else len(text)
-        yield Fix(title, at, at, sign)
+    line_end = text.find("\n", start)
+    at = line_end if line_end >= 0 else len(text)
+    yield Fix(title, at, at, sign)
     at = len(text.rstrip())
     yield Fix(title, at, at, f"\n{sign}" if sign == "}" else f" {sign}")
     yield Fix(title, at, at, f"\n{sign}\n")
-
-
-def _offset(text: str, line: int, column: int) -> int:
-    at = 0
-    for _ in range(line - 1):
-        found = text.find("\n", at)
-        if found < 0:
-            return len(text)
-        at = found + 1
-    return min(at + column - 1, len(text))
-
-
-def _end(text: str, span: Span) -> int:
-    return _offset(text, span.end_line, span.end_column)

@@ -153,7 +153,7 @@ def _compare(project: Project, after: Project, before: Sequence[Occurrence], mea
     now = [_bare(o.meaning) for o in all_occurrences(after)]
     if now != [to(o.meaning) for o in before]:
         raise Refused(f"`{new}` would stand for something else in another place")
-    if _flat(_with_name(project.contract, meaning, new), meaning, new) != _flat(after.contract, None, ""):
+    if _flat(project.contract, meaning, new) != _flat(after.contract, None, ""):
         raise Refused(f"with `{new}` the contract would say something else")
     if meaning.what is What.VARIABLE:
         clauses = zip(_clauses(project.contract), _clauses(after.contract), strict=True)
@@ -181,33 +181,9 @@ def _new_faults(project: Project, after: Project) -> list[Diagnostic]:
 # --- the same contract but for a name --------------------------------------------------------------------------------
 
 
-def _with_name(contract: Contract, meaning: Meaning, new: str) -> Contract:
-    """The contract with the name changed where it is the name of a part of it."""
-    nodes = tuple(_node_with(node, meaning, new) for node in contract.nodes)
-    if meaning.what is What.TYPE:
-        types = tuple((new if name == meaning.name else name, sort) for name, sort in contract.types)
-        return replace(contract, nodes=nodes, types=types)
-    if meaning.what is What.CONSTANT:
-        constants = tuple((new if name == meaning.name else name, term) for name, term in contract.constants)
-        return replace(contract, nodes=nodes, constants=constants)
-    return replace(contract, nodes=nodes)
-
-
-def _node_with(node: Node, meaning: Meaning, new: str) -> Node:
-    if meaning.what is What.NODE and node.name == meaning.name:
-        return replace(node, name=new)
-    if meaning.what in CLAUSES and node.name == meaning.owner:
-        assumptions, guarantees = (
-            tuple(replace(c, name=new) if c.name == meaning.name else c for c in each)
-            for each in (node.assumptions, node.guarantees)
-        )
-        return replace(node, assumptions=assumptions, guarantees=guarantees)
-    return node
-
-
 def _flat(value: object, meaning: Meaning | None, new: str) -> list[object]:
-    """Everything that a contract says, in one list, with the name of a port, element or type changed on the way. Names
-    of quantified variables are left out (a digest compares them), and types as they are written."""
+    """Everything that a contract says, in one list, with the name of what is meant changed on the way. Names of
+    quantified variables are left out (a digest compares them), and types as they are written."""
     out: list[object] = []
     stack: list[object] = [value]
     while stack:
@@ -239,10 +215,21 @@ def _is_left_out(part: object, name: str) -> bool:
             return False
 
 
+_NAMED = ("types", "constants")
+"""Parts of a contract whose items are a name, and what has it: an enumeration may be of both."""
+_CLAUSES = ("assumptions", "guarantees")
+
+
 def _changed(part: object, name: str, value: object, meaning: Meaning | None, new: str) -> object:
     if meaning is None:
         return value
     match part:
+        case Contract() if name in _NAMED and meaning.what in (What.TYPE, What.CONSTANT) and isinstance(value, tuple):
+            return tuple((new if own == meaning.name else own, said) for own, said in value)
+        case Node(name=meaning.name) if name == "name" and meaning.what is What.NODE:
+            return new
+        case Node(name=meaning.owner) if name in _CLAUSES and meaning.what in CLAUSES and isinstance(value, tuple):
+            return tuple(replace(clause, name=new) if clause.name == meaning.name else clause for clause in value)
         case Port() | Variable() if name == "name" and meaning.what in PORTS and value == meaning.name:
             return new
         case TupleSort() if name == "labels" and meaning.what is What.FIELD and isinstance(value, tuple):

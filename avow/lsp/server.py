@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from avow.lsp.plan_names import PlanText
 from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
 from avow.lsp.quick_fixes import fixes
-from avow.lsp.renaming import Refused, elsewhere, is_renameable, rename
+from avow.lsp.renaming import Edit, Refused, elsewhere, is_renameable, rename
 
 
 def _nothing(file: str) -> StatusLookup:
@@ -163,9 +164,8 @@ class Server:
             found += [protocol.refuted(a, place) for a in answered if a.is_bad and a.severity != "note"]
         self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=found))
 
-    def inlay_hints(self, params: types.InlayHintParams) -> list[types.InlayHint]:
-        document = self.current(params.text_document.uri)
-        lines, found = Lines(document.text), []
+    def inlay_hints(self, document: Document, lines: Lines, params: types.InlayHintParams) -> list[types.InlayHint]:
+        found = []
         for name, answered in self.sane(document):
             place = lines.position(name.end if name.written else name.start)
             if not params.range.start.line <= place.line <= params.range.end.line:
@@ -178,69 +178,63 @@ class Server:
 
     # -- questions -----------------------------------------------------------------------------------------------------
 
-    def hover(self, params: types.HoverParams) -> types.Hover | None:
-        document = self.current(params.text_document.uri)
-        offset = Lines(document.text).offset(params.position)
+    def hover(self, document: Document, lines: Lines, params: types.HoverParams) -> types.Hover | None:
+        offset = lines.offset(params.position)
         said = features.hover(document, offset, self.status(document.file), self.asked.of)
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
-    def definition(self, params: types.DefinitionParams) -> list[types.Location]:
-        document = self.current(params.text_document.uri)
-        found = features.definition(document, Lines(document.text).offset(params.position))
-        return list(self.locations(document, found))
+    def definition(self, document: Document, lines: Lines, params: types.DefinitionParams) -> list[types.Location]:
+        found = features.definition(document, lines.offset(params.position))
+        return [types.Location(*place) for place in self.places(document, found)]
 
-    def references(self, params: types.ReferenceParams) -> list[types.Location]:
-        document = self.current(params.text_document.uri)
-        offset = Lines(document.text).offset(params.position)
-        return list(self.locations(document, features.references(document, offset, params.context.include_declaration)))
+    def references(self, document: Document, lines: Lines, params: types.ReferenceParams) -> list[types.Location]:
+        offset = lines.offset(params.position)
+        found = features.references(document, offset, params.context.include_declaration)
+        return [types.Location(*place) for place in self.places(document, found)]
 
-    def highlights(self, params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
-        document = self.current(params.text_document.uri)
-        lines = Lines(document.text)
+    def highlights(
+        self, document: Document, lines: Lines, params: types.DocumentHighlightParams
+    ) -> list[types.DocumentHighlight]:
         found = features.references(document, lines.offset(params.position))
         return [types.DocumentHighlight(lines.range(o.start, o.end)) for o in found if o.file == document.file]
 
-    def locations(self, document: Document, found: Sequence[Occurrence]) -> Iterator[types.Location]:
+    def places(self, document: Document, found: Sequence[Occurrence | Edit]) -> Iterator[tuple[str, types.Range]]:
+        """Where in which document of a system each of these is."""
         lines = {file: Lines(document.project.text_of(file)) for file in {o.file for o in found}}
         for one in found:
-            shown = lines[one.file].range(one.start, one.end)
-            yield types.Location(self.uri_of(one.file), shown)
+            yield self.uri_of(one.file), lines[one.file].range(one.start, one.end)
 
     def uri_of(self, file: str) -> str:
         """The URI by which an editor knows a file."""
         open_ = next((uri for uri, d in self.documents.items() if d.file == file), None)
         return open_ if open_ is not None else Path(file).resolve().as_uri()
 
-    def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
-        document = self.current(params.text_document.uri)
-        lines = Lines(document.text)
+    def prepare_rename(
+        self, document: Document, lines: Lines, params: types.PrepareRenameParams
+    ) -> types.PrepareRenamePlaceholder | None:
         name = features.name_at(document, lines.offset(params.position))
         if name is None or not is_renameable(document.project, name.meaning):
             return None
         return types.PrepareRenamePlaceholder(lines.range(name.start, name.end), name.meaning.name)
 
-    def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
-        document = self.current(params.text_document.uri)
-        name = features.name_at(document, Lines(document.text).offset(params.position))
+    def rename(self, document: Document, lines: Lines, params: types.RenameParams) -> types.WorkspaceEdit | None:
+        name = features.name_at(document, lines.offset(params.position))
         if name is None:
             return None
         try:
             edits = rename(document.project, name.meaning, params.new_name)
         except Refused as refused:
             raise JsonRpcInvalidRequest(str(refused)) from None
-        lines = {file: Lines(document.project.text_of(file)) for file in {e.file for e in edits}}
         changes: dict[str, list[types.TextEdit]] = {}
-        for edit in edits:
-            shown = lines[edit.file].range(edit.start, edit.end)
-            changes.setdefault(self.uri_of(edit.file), []).append(types.TextEdit(shown, edit.text))
+        for edit, (uri, place) in zip(edits, self.places(document, edits), strict=True):
+            changes.setdefault(uri, []).append(types.TextEdit(place, edit.text))
         if left := elsewhere(document.project, name.meaning):
             told = f"`{name.meaning.name}` also stands in {', '.join(left)}: avow does not change these"
             self.server.window_show_message(types.ShowMessageParams(types.MessageType.Warning, told))
         return types.WorkspaceEdit(changes)
 
-    def completion(self, params: types.CompletionParams) -> types.CompletionList:
-        document = self.current(params.text_document.uri)
-        offset, contract = Lines(document.text).offset(params.position), document.project.contract
+    def completion(self, document: Document, lines: Lines, params: types.CompletionParams) -> types.CompletionList:
+        offset, contract = lines.offset(params.position), document.project.contract
         if is_plan(document.file):
             found = plan_offers(document.text, contract, offset)
         else:
@@ -249,19 +243,16 @@ class Server:
         items = [protocol.completion_item(offer, k, snippets) for k, offer in enumerate(found)]
         return types.CompletionList(is_incomplete=False, items=items)
 
-    def signature_help(self, params: types.SignatureHelpParams) -> types.SignatureHelp | None:
-        document = self.current(params.text_document.uri)
-        if is_plan(document.file):
-            return None
-        offset = Lines(document.text).offset(params.position)
-        found = signature(document.taken_apart, document.project.contract, offset)
+    def signature_help(
+        self, document: Document, lines: Lines, params: types.SignatureHelpParams
+    ) -> types.SignatureHelp | None:
+        found = signature(document.taken_apart, document.project.contract, lines.offset(params.position))
         return protocol.signature_help(found) if found is not None else None
 
-    def code_actions(self, params: types.CodeActionParams) -> list[types.CodeAction]:
-        document = self.current(params.text_document.uri)
+    def code_actions(self, document: Document, lines: Lines, params: types.CodeActionParams) -> list[types.CodeAction]:
         if not document.project.sources:
             return []
-        lines, found = Lines(document.text), []
+        found = []
 
         def check(text: str) -> tuple[Diagnostic, ...]:
             if is_plan(document.file):
@@ -287,16 +278,10 @@ class Server:
                 )
         return found
 
-    def outline(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        document = self.current(params.text_document.uri)
-        lines = Lines(document.text)
+    def outline(self, document: Document, lines: Lines, _: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
         return [protocol.symbol(s, lines) for s in features.symbols(document)]
 
-    def folding(self, params: types.FoldingRangeParams) -> list[types.FoldingRange]:
-        document = self.current(params.text_document.uri)
-        if is_plan(document.file):
-            return []
-        lines = Lines(document.text)
+    def folding(self, document: Document, lines: Lines, _: types.FoldingRangeParams) -> list[types.FoldingRange]:
         return [
             types.FoldingRange(
                 lines.position(f.start).line, lines.position(f.end).line, kind=types.FoldingRangeKind(f.kind)
@@ -304,14 +289,10 @@ class Server:
             for f in folds(document.taken_apart)
         ]
 
-    def semantic_tokens(self, params: types.SemanticTokensParams) -> types.SemanticTokens:
-        document = self.current(params.text_document.uri)
-        if is_plan(document.file):
-            return types.SemanticTokens([])
-        return protocol.semantic_tokens(coloured(document.taken_apart, document.names), Lines(document.text))
+    def semantic_tokens(self, document: Document, lines: Lines, _: types.SemanticTokensParams) -> types.SemanticTokens:
+        return protocol.semantic_tokens(coloured(document.taken_apart, document.names), lines)
 
-    def formatting(self, params: types.DocumentFormattingParams) -> list[types.TextEdit]:
-        document = self.current(params.text_document.uri)
+    def formatting(self, document: Document, lines: Lines, _: types.DocumentFormattingParams) -> list[types.TextEdit]:
         if is_plan(document.file):
             return []
         try:
@@ -352,12 +333,14 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
         "avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental
     )
     server = Server(language_server, status)
-    registered: tuple[tuple[str, Callable[[Any], Any], Any], ...] = (
-        (types.TEXT_DOCUMENT_DID_OPEN, server.opened, None),
-        (types.TEXT_DOCUMENT_DID_CHANGE, server.changed, None),
-        (types.TEXT_DOCUMENT_DID_SAVE, server.saved, None),
-        (types.TEXT_DOCUMENT_DID_CLOSE, server.closed, None),
-        (types.SHUTDOWN, server.stopped, None),
+    heard: tuple[tuple[str, Callable[[Any], None]], ...] = (
+        (types.TEXT_DOCUMENT_DID_OPEN, server.opened),
+        (types.TEXT_DOCUMENT_DID_CHANGE, server.changed),
+        (types.TEXT_DOCUMENT_DID_SAVE, server.saved),
+        (types.TEXT_DOCUMENT_DID_CLOSE, server.closed),
+        (types.SHUTDOWN, server.stopped),
+    )
+    asked: tuple[tuple[str, Callable[[Document, Lines, Any], Any], Any], ...] = (
         (types.TEXT_DOCUMENT_HOVER, server.hover, None),
         (types.TEXT_DOCUMENT_DEFINITION, server.definition, None),
         (types.TEXT_DOCUMENT_REFERENCES, server.references, None),
@@ -381,10 +364,13 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
         (types.TEXT_DOCUMENT_INLAY_HINT, server.inlay_hints, None),
         (types.TEXT_DOCUMENT_FORMATTING, server.formatting, None),
     )
-    for feature, answer, options in registered:
+    for feature, told in heard:
+        language_server.feature(feature)(functools.partial(told))  # a method cannot bear the library's marks
+    for feature, answer, options in asked:
 
-        def answering(params: Any, answer: Callable[[Any], Any] = answer) -> Any:
-            return answer(params)
+        def answering(params: Any, answer: Callable[[Document, Lines, Any], Any] = answer) -> Any:
+            document = server.current(params.text_document.uri)
+            return answer(document, Lines(document.text), params)
 
         language_server.feature(feature, options)(answering)
     return language_server

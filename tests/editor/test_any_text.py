@@ -13,10 +13,11 @@ from editor.test_client import CONTRACT, PLAN
 
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, coloured, folds
 from avow.lsp.completion import offers, signature
-from avow.lsp.features import Document, analyse, definition, hover, linked, name_at, references, symbols
+from avow.lsp.features import Document, analyse, definition, hover, name_at, references, symbols
 from avow.lsp.plan_completion import plan_offers
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.protocol import Lines, semantic_tokens, signature_help
+from avow.lsp.renaming import renamed_with
 
 PIECES = (
     "(",
@@ -92,7 +93,7 @@ def check(document: Document, places: range) -> None:
         name = name_at(document, offset)
         if name is not None:
             assert name in references(document, offset)
-            assert set(references(document, offset)) <= set(linked(document, offset))
+            assert all(renamed_with(name.meaning, one.meaning) for one in references(document, offset))
 
 
 def test_any_contract() -> None:

@@ -79,3 +79,15 @@ def test_it_knows_fields() -> None:
     assert offered("in.at.") == ["one", "id"]
     assert offered("in.at.one.") == ["px", "py"]
     assert set(offered("| p.")) == {"px", "py", "one", "id"}
+
+
+def test_an_enumeration_declared_as_a_constant_is_one_thing() -> None:
+    """Its name stands for a type and for the set of its elements: a type of a port did not lead to its declaration."""
+    text = (
+        "context { Mode = {slow, fast}; }\n"
+        "node n { inputs( m : Mode ) outputs( y : BOOL ) topics() guarantee( y <=> m in Mode ) }\n"
+    )
+    document = analyse(text, "n.rcl")
+    places = [at for at in range(len(text)) if text.startswith("Mode", at)]
+    assert all([o.start for o in definition(document, at)] == places[:1] for at in places)
+    assert [o.start for o in references(document, places[1])] == places

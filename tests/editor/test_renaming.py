@@ -22,7 +22,7 @@ from avow.system.load import load_system
 CONTRACT = """\
 context {
   Colour : {red, green}; Way : { go(REAL), stop }; Limit = 3; define over(a : REAL) = a > Limit;
-  Map : REAL x REAL --> BOOL; Same = (Limit); Pose : [px, py : REAL];
+  Map : REAL x REAL --> BOOL; Same = (Limit); Mode = {slow, fast}; Pose : [px, py : REAL];
 }
 node one {
   inputs( r : REAL, seen : Map )
@@ -35,10 +35,10 @@ node one {
   guarantee r3 ( most and colour in Colour )
 }
 node two {
-  inputs( colour : Colour, r2 : REAL )
+  inputs( colour : Colour, r2 : REAL, mode : Mode )
   outputs( r : REAL, way : Way )
   topics( string c matches(in.colour), float64 d matches(in.r2), float64 r matches(out.r), string w matches(way) )
-  guarantee low ( way == go(r2) or (way == stop and out.r == Same) )
+  guarantee low ( way == go(r2) or (way == stop and out.r == Same and mode in Mode) )
 }
 """
 PLAN = """\
