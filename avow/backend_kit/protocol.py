@@ -345,7 +345,7 @@ class Backend(ABC):
     def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
         """The contract's word on whole runs of messages on the node's topics: events as recordings have them (`topic`,
         `time` in seconds, fields; at the end one without a topic says how long it was). Of the method's options those
-        in `avow.backend_kit.reading` count. Raises Rejected where they are at fault."""
+        in `avow.backend_kit.given.READING` count. Raises Rejected where they are at fault."""
         raise NotImplementedError(self.name)
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from avow.base.files import digest_file, identity, sha256, text_or_nothing
 from avow.base.module_path import absolute_only
-from avow.base.programs import program_digest
+from avow.base.tools import program_digest
 from avow.base.tuning.sizes import FOLDED
 from avow.base.verdict import Isolation
 from avow.isolation.level import Unavailable, available, wanted

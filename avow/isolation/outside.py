@@ -16,8 +16,7 @@ from pathlib import Path
 
 from avow.base import process
 from avow.base.process import Completed, ToolMissing
-from avow.base.programs import program_files, program_folders
-from avow.base.tools import Tool
+from avow.base.tools import Tool, program_files, program_folders
 from avow.isolation.observed import Observed, Seen, as_here, folded, recorded, untold
 from avow.isolation.tracing import Trace, traces
 

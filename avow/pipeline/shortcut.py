@@ -23,9 +23,8 @@ from pathlib import Path
 import avow.backends
 from avow.base.files import identity, read_regular
 from avow.base.notes import read_note, write_note
-from avow.base.programs import program_files
 from avow.base.records import dataclass
-from avow.base.tools import LIBRARIES, package_digest
+from avow.base.tools import LIBRARIES, package_digest, program_files
 from avow.base.tuning.running import TICK_SECONDS
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX

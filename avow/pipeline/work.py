@@ -18,10 +18,9 @@ from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_or_missing, sha256
-from avow.base.programs import program_digest
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, by_identity
-from avow.base.tools import libraries, package_digest
+from avow.base.tools import libraries, package_digest, program_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
 from avow.formulas.finite import Ranges
 from avow.formulas.formula import digest, node_digest, sort_digest

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, sha256
@@ -361,18 +361,8 @@ class _PlanReader:
             if found is not None and is_wild(texts["obligation"]):
                 message = f"{key}: {texts['obligation']!r} may stand for several, and  found  marks one finding"
                 self.fault("PLAN110", message, found.span, hint="name each obligation by itself")
-            yield Finding(
-                texts["obligation"],
-                unsaid(texts["verdict"]),
-                texts.get("reason"),
-                texts.get("who"),
-                texts.get("date"),
-                texts.get("expires"),
-                texts.get("method"),
-                piece.span,
-                piece.texts("matched"),
-                texts.get("found", ""),
-            )
+            said: dict[str, Any] = {"verdict": unsaid(texts.pop("verdict")), "matched": piece.texts("matched")}
+            yield Finding(**{**texts, **said}, span=piece.span)
 
 
 def _endpoint(text: str) -> Endpoint:

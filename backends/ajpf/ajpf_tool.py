@@ -15,9 +15,8 @@ from pathlib import Path
 from avow.base.files import read_regular
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
-from avow.base.programs import program_digest
 from avow.base.records import dataclass
-from avow.base.tools import Tool
+from avow.base.tools import Tool, program_digest
 from avow.base.tuning.running import VERSION_SECONDS
 from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside

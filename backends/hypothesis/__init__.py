@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
-from avow.backend_kit.given import file, schema, whole_number
+from avow.backend_kit.given import READING, file, schema, whole_number
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
-from avow.backend_kit.reading import READING
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node

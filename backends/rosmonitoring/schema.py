@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from avow.backend_kit.given import schema, text
-from avow.backend_kit.reading import DURATION, READING
+from avow.backend_kit.given import DURATION, READING, schema, text
 
 SCHEMA = schema(
     {

@@ -23,7 +23,7 @@ from avow.backends.ajpf.options import Setup
 from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
-from avow.base import programs
+from avow.base import tools
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
 from avow.isolation.tracing import traces
@@ -146,7 +146,7 @@ def test_answers_are_kept_and_asked_again_when_anything_changes(lift, tmp_path, 
     assert asked(files={program: text + "+new : { True } <- act;\n"})[0] == 3, "another program"
     (tmp_path / "mcapl" / "bin" / "a.class").write_text("another build")
     ajpf_tool._find.cache_clear()
-    programs.program_files.cache_clear()
+    tools.program_files.cache_clear()
     assert asked()[0] == 3, "another MCAPL"
     for note in (tmp_path / "cache" / "avow" / "ajpf").glob("*.json"):
         note.write_text(

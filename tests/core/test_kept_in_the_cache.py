@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.base import programs, tools
+from avow.base import tools
 from avow.base.grammars import lark_of
 from avow.base.notes import cache_folder, read_note, write_note
 
@@ -121,7 +121,7 @@ def test_a_version_is_asked_again_when_any_part_of_the_program_is_another(
     monkeypatch.setenv("PATH", str(tmp_path / "made"), prepend=":")
 
     def version() -> str | None:
-        for known in (tools.find_tool, programs.program_files):
+        for known in (tools.find_tool, tools.program_files):
             known.cache_clear()
         return tools.find_tool("madetool", install="", pattern=r"\d[\d.]+|b").version
 

@@ -18,7 +18,7 @@ from avow.backends.ajpf.ajpf_tool import Answer
 from avow.backends.fuzz import runner
 from avow.backends.hypothesis import exchange
 from avow.base.codec import Foreign, Unreadable, canonical, from_json, from_text, to_json
-from avow.base.programs import _Digest
+from avow.base.tools import _Digest
 from avow.cli.recheck import _Report
 from avow.evidence.envelope import _Envelope
 from avow.evidence.heads import Line

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers import some
 
-from avow.base import programs
+from avow.base import tools
 from avow.base.process import ToolMissing
 from avow.base.tools import Tool
 from avow.isolation import outside, tracing
@@ -54,7 +54,7 @@ def there(tmp_path: Path) -> Path:
 
 
 def ran(there: Path, tmp_path: Path) -> tuple[str, tuple[Observed, ...]]:
-    programs.program_files.cache_clear()
+    tools.program_files.cache_clear()
     run = Outside((Tool("tool", "1", str(there / "bin" / "tool"), ""),))
     folder = tmp_path / "made"
     folder.mkdir(exist_ok=True)

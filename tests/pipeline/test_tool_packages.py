@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from helpers import avow
 
-from avow.base import process, programs, tools
+from avow.base import process, tools
 from avow.base.notes import cache_folder
 from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
@@ -97,11 +97,11 @@ def test_a_launcher_counts_with_all_that_it_launches(tmp_path: Path, monkeypatch
     (engine.parent / "shared.dll").symlink_to(elsewhere)
     launcher = _program(tmp_path / "bin" / "made", f'#!/bin/sh\nexec {engine} "$@"\n')
     _program(launcher.with_name("neighbour"), "a program of its own")
-    assert not {p.name for p in programs.program_files(str(launcher))} & {"neighbour"}
+    assert not {p.name for p in tools.program_files(str(launcher))} & {"neighbour"}
 
     def now() -> str:
-        programs.program_files.cache_clear()
-        return programs.program_digest((str(launcher),))
+        tools.program_files.cache_clear()
+        return tools.program_digest((str(launcher),))
 
     known = [now()]
     assert now() == known[0]
@@ -112,7 +112,7 @@ def test_a_launcher_counts_with_all_that_it_launches(tmp_path: Path, monkeypatch
 
 
 def test_a_binary_counts_with_its_libraries() -> None:
-    files = programs.program_files(os.path.realpath("/bin/sh"))
+    files = tools.program_files(os.path.realpath("/bin/sh"))
     if not Path("/usr/bin/ldd").exists():
         pytest.skip("no ldd")
     assert any(p.name.startswith("libc.") for p in files)
@@ -128,8 +128,8 @@ def test_a_binarys_libraries_are_asked_for_once(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(process, "run", counted)
     program = os.path.realpath("/bin/sh")
-    programs.program_files.cache_clear()
-    assert len(programs.program_files(program)) > 1 or not Path("/usr/bin/ldd").exists()
+    tools.program_files.cache_clear()
+    assert len(tools.program_files(program)) > 1 or not Path("/usr/bin/ldd").exists()
     assert asked == [program], "what ldd lists has the libraries of libraries in it"
 
 
