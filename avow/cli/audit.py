@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
 import click
 
 from avow.base.codec import document
-from avow.cli.options import json_option
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.persons import unreadable
+from avow.base.plain import invisible, is_blank
+from avow.base.suggestions import did_you_mean, suggest
+from avow.base.workspace import Workspace, name_of, workspace
+from avow.cli.options import PathArgument, json_option
+from avow.evidence.audit import Discrepancy, Fault
+from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
+from avow.evidence.ledger import Ledger, readable
+from avow.evidence.signing import Signed, new_key_pair, sign, signature_path, verify_signature
+from avow.pipeline.integrity import confirm, discrepancies, reported_heads, settle_losses
+from avow.pipeline.workload import Survey, survey
 
 
 @click.command()
 @click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
 @json_option()
 @click.option(
-    "--sign", type=click.Path(exists=True, dir_okay=False), help="Sign each ledger's head with this private key."
+    "--sign",
+    "private",
+    type=PathArgument(exists=True, dir_okay=False),
+    help="Sign each ledger's head with this private key.",
 )
-@click.option("--key", type=click.Path(exists=True, dir_okay=False), help="Check signatures against this public key.")
+@click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Check signatures against this public key.")
 @click.option(
     "--against",
-    type=click.Path(exists=True),
+    type=PathArgument(exists=True),
     help="A report, an attestation or a folder of reports, kept elsewhere: the ledgers must hold what it names.",
 )
-@click.option("--new-key", type=click.Path(dir_okay=False), help="Make a key pair: FILE, and FILE.pub.")
+@click.option("--new-key", type=PathArgument(dir_okay=False), help="Make a key pair: FILE, and FILE.pub.")
 @click.option(
     "--acknowledge", metavar="REASON", help="You have seen what is lost or damaged of these ledgers: no longer open."
 )
@@ -28,10 +45,10 @@ from avow.cli.options import json_option
 def command(
     systems: tuple[str, ...],
     as_json: bool,
-    sign: str | None,
-    key: str | None,
-    against: str | None,
-    new_key: str | None,
+    private: Path | None,
+    key: Path | None,
+    against: Path | None,
+    new_key: Path | None,
     acknowledge: str | None,
     who: str | None,
 ) -> int:
@@ -42,18 +59,8 @@ def command(
     A ledger that was cut, rolled back, rewritten or begun anew fails the gate *integrity* until a person, by name,
     says with --acknowledge that it was seen and why it happened.
     """
-    from pathlib import Path
-
-    from avow.base.persons import unreadable
-    from avow.base.plain import invisible, is_blank
-    from avow.base.workspace import workspace
-    from avow.cli.ledgers import audit_index, audit_system, ledger_names, outside_heads, sign_all
-    from avow.pipeline.integrity import reported_heads, settle_losses
-
     if new_key:
-        from avow.evidence.signing import new_key_pair
-
-        public = new_key_pair(Path(new_key))
+        public = new_key_pair(new_key)
         click.echo(f"private key {new_key} (keep it), public key {public}")
         return 0
     place = workspace()
@@ -64,15 +71,15 @@ def command(
             )
         assert acknowledge is not None
         assert who is not None
-        for name in ledger_names(place, systems, reported_heads(place)):
+        for name in _ledger_names(place, systems, reported_heads(place)):
             for item in settle_losses(place, name, who.strip(), acknowledge.strip()):
                 click.echo(f"{name}: acknowledged: {item.text}")
-    anchors = (*reported_heads(place), *(outside_heads(Path(against)) if against else ()))
-    found = {name: audit_system(place, name, key, anchors) for name in ledger_names(place, systems, anchors)}
-    index = audit_index(place, key)
+    anchors = (*reported_heads(place), *(_outside_heads(against) if against else ()))
+    found = {name: _audit_system(place, name, key, anchors) for name in _ledger_names(place, systems, anchors)}
+    index = _audit_index(place, key)
     bad = any(d.serious for ds in (index, *(ds for ds, _ in found.values())) for d in ds)
-    if sign and not bad:
-        for path in sign_all(place, tuple(found), Path(sign)):
+    if private and not bad:
+        for path in _sign_all(place, tuple(found), private):
             click.echo(f"signed: {path}", err=True)
     if as_json:
         listed = {
@@ -89,6 +96,95 @@ def command(
             click.echo(f"index of ledgers: {d.fault}: {d.text}")
         if not found and not bad:
             click.echo("no ledger yet: run `avow verify`")
-        if sign and bad:
+        if private and bad:
             click.echo("not signed: there are discrepancies", err=True)
     return 1 if bad else 0
+
+
+def _ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anchor] = ()) -> tuple[str, ...]:
+    """The systems named, or all that have a ledger, or had one by what the index of ledgers and `anchors` say. Raises
+    Rejected for one that never had any."""
+    there = [path.stem for path in place.ledgers.glob("*.jsonl")] if place.ledgers.is_dir() else []
+    known = sorted({*there, *_index(place).systems, *(anchor.system for anchor in anchors)})
+    wanted = [name_of(place, name) for name in wanted]
+    for name in wanted:
+        if name not in known:
+            hint = did_you_mean(name, known, 3) or suggest(name, known)
+            raise Rejected(Diagnostic("LEDGER002", f"there is no ledger of a system '{name}'", hint=hint))
+    return tuple(wanted) or tuple(known)
+
+
+def _outside_heads(path: Path) -> tuple[Anchor, ...]:
+    """The ledgers' heads that a report or attestation, kept elsewhere, names. Raises Rejected where it names none."""
+    try:
+        found = stated_heads(path, "")
+    except OSError as error:
+        raise Rejected(Diagnostic("REPORT001", f"{path} cannot be read: {error.strerror}")) from None
+    if not found:
+        raise Rejected(Diagnostic("REPORT002", f"{path} names no ledger: it is no report, and no attestation"))
+    return found
+
+
+def _audit_system(
+    place: Workspace, name: str, public_key: Path | None = None, anchors: Sequence[Anchor] = ()
+) -> tuple[tuple[Discrepancy, ...], int]:
+    """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
+    ledger = Ledger(place.ledger(name))
+    with readable(ledger.path):
+        found = discrepancies(place, ledger, _surveyed(place, name), anchors, strict=True)
+        count = len(ledger.records())
+    return (*found, *_signature(place.ledger(name), _head_of(ledger), public_key)), count
+
+
+def _surveyed(place: Workspace, name: str) -> Survey | None:
+    for folder in sorted(place.systems(), key=lambda folder: folder.name != name):
+        found = survey(folder)
+        if isinstance(found, Survey) and found.system.name == name:
+            return found
+    return None
+
+
+def _audit_index(place: Workspace, public_key: Path | None = None) -> tuple[Discrepancy, ...]:
+    """What is wrong with the index of ledgers as a whole. Raises Rejected if it cannot be read."""
+    path, index = index_path(place.ledgers), _index(place)
+    damage = tuple(Discrepancy(Fault.LEDGER, "index", text) for text in index.damage)
+    if not index.exists and not public_key:
+        return ()
+    return (*damage, *_signature(path, Signed("index of ledgers", index.marks), public_key, grows=True))
+
+
+def _index(place: Workspace) -> Index:
+    path = index_path(place.ledgers)
+    with readable(path):
+        return read_index(path)
+
+
+def _head_of(ledger: Ledger) -> Signed:
+    return Signed(ledger.path.stem, tuple(entry.hash for entry in ledger.records()))
+
+
+def _signature(file: Path, signed: Signed, public_key: Path | None, grows: bool = False) -> Iterable[Discrepancy]:
+    """With a key of the auditor's own everything must be covered by a signature of it."""
+    path = signature_path(file)
+    if not path.exists():
+        if public_key:
+            yield Discrepancy(Fault.SIGNATURE, path.name, f"{path.name}: it is not signed")
+        return
+    problem, covered = verify_signature(path, signed, public_key)
+    if problem:
+        yield Discrepancy(Fault.SIGNATURE, path.name, problem)
+    elif covered < len(signed.marks) and not grows:
+        text = f"{len(signed.marks) - covered} of {len(signed.marks)} records are newer than the signature"
+        yield Discrepancy(Fault.SIGNATURE, path.name, text, serious=bool(public_key))
+
+
+def _sign_all(place: Workspace, systems: Sequence[str], private_key: Path) -> Iterable[Path]:
+    """Sign each system's ledger, and the index of ledgers. Raises Rejected."""
+    for name in systems:
+        ledger = Ledger(place.ledger(name))
+        if ledger.damage:
+            raise Rejected(Diagnostic("SIGN002", f"{ledger.path.name} is damaged: it is not signed"))
+        yield sign(signature_path(ledger.path), _head_of(ledger), private_key)
+        confirm(place, ledger)
+    path = index_path(place.ledgers)
+    yield sign(signature_path(path), Signed("index of ledgers", _index(place).marks), private_key)

@@ -22,9 +22,8 @@ from avow.base.files import write_out
 from avow.base.plain import count
 from avow.base.tuning.shown import DIFF_REASONS
 from avow.base.workspace import Workspace, workspace
-from avow.cli.ledgers import readable
 from avow.cli.options import json_option
-from avow.evidence.ledger import Entry, Ledger
+from avow.evidence.ledger import Entry, Ledger, readable
 from avow.pipeline.workload import survey
 
 

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import click
 
+from avow.assurance.codec import read_case, to_json
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import short
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.suggestions import did_you_mean
 from avow.base.tuning.shown import DIFF_REASONS
+from avow.base.workspace import Workspace, workspace
 from avow.cli.options import json_option
-
-if TYPE_CHECKING:
-    from avow.assurance.model import Case, ObligationView
-    from avow.base.workspace import Workspace
+from avow.evidence.ledger import Ledger, readable
+from avow.evidence.obligation import Kind
+from avow.pipeline.report_check import differences
+from avow.report.explained import explained, left_out
+from avow.report.terminal import show_obligation
+from avow.system.names import renamed
 
 
 @click.command()
@@ -29,15 +35,11 @@ def command(name: str, as_json: bool) -> int:
     argument (G4 of gsn.yaml), a digest, a file, a diagnostic's code, or a word such as argued. It is told as the report
     has it, and where that is not what the ledger says: exit code 1, or 2 where the ledger cannot be read.
     """
-    from avow.assurance.codec import to_json
-    from avow.base.workspace import workspace
-    from avow.cli.ledgers import find_claim, reported_cases, unreported
-
     place = workspace()
-    cases_here = reported_cases(place)
+    cases_here = _reported_cases(place)
     told = [*_others(cases_here, name), *_left_out(place, cases_here, name)]
     try:
-        found = find_claim(cases_here, name, unreported(place, cases_here))
+        found = find_claim(cases_here, name, _unreported(place, cases_here))
     except Rejected:
         if not told:
             raise
@@ -65,8 +67,6 @@ def _show(
     found: Sequence[tuple[Case, ObligationView]],
     wrong: Mapping[str, Sequence[str]],
 ) -> None:
-    from avow.report.terminal import show_obligation
-
     for system, lines in wrong.items():
         click.echo(f"{system}: as of an earlier state: its report does not say what the ledger says")
         for line in lines[:DIFF_REASONS]:
@@ -89,9 +89,6 @@ def _show(
 
 def _held_against_ledgers(place: Workspace, cases: Sequence[Case]) -> tuple[dict[str, list[str]], list[Diagnostic]]:
     """System → how its report differs from its ledger, where that can be read; what is wrong where it cannot."""
-    from avow.cli.ledgers import readable
-    from avow.pipeline.report_check import differences
-
     wrong: dict[str, list[str]] = {}
     faults: list[Diagnostic] = []
     for case in cases:
@@ -106,8 +103,6 @@ def _held_against_ledgers(place: Workspace, cases: Sequence[Case]) -> tuple[dict
 
 def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]]:
     """(system, heading, lines) of what is no obligation; a word is told once."""
-    from avow.report.explained import explained
-
     found: dict[tuple[str, ...], tuple[str, str, list[str]]] = {}
     for case in cases:
         for title, lines in explained(case, name):
@@ -118,9 +113,6 @@ def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]
 
 def _left_out(place: Workspace, cases: Sequence[Case], name: str) -> Iterator[tuple[str, str, list[str]]]:
     """As `_others`, of records that stand in the ledger alone."""
-    from avow.evidence.ledger import Ledger
-    from avow.report.explained import left_out
-
     for case in cases:
         with contextlib.suppress(OSError):  # what cannot be read has no record to show: `avow audit` says so
             for title, lines in left_out(case, Ledger(place.ledger(case.system)).records(), name):
@@ -129,3 +121,70 @@ def _left_out(place: Workspace, cases: Sequence[Case], name: str) -> Iterator[tu
 
 def _id(obligation: dict[str, str]) -> str:
     return "/".join(obligation[part] for part in ("system", "node", "kind", "name"))
+
+
+def _reported_cases(place: Workspace) -> tuple[Case, ...]:
+    """Every report in the workspace that can be read. Raises Rejected where there is none."""
+    files = sorted(place.reports.glob("*/report.json")) if place.reports.is_dir() else []
+    if not files:
+        raise Rejected(Diagnostic("REPORT001", f"no report under {place.reports}", hint="run `avow verify` first"))
+    found: list[Case] = []
+    faults: list[Diagnostic] = []
+    for file in files:
+        try:
+            found.append(read_case(file))
+        except Rejected as rejected:  # of an older version: no reason not to speak of the others
+            faults += rejected.diagnostics
+    if not found:
+        raise Rejected(*faults)
+    return tuple(found)
+
+
+def _unreported(place: Workspace, cases: Sequence[Case]) -> tuple[str, ...]:
+    """Systems of the workspace of which there is no report that can be read."""
+    folders = sorted(f.name for f in place.contracts.iterdir() if f.is_dir()) if place.contracts.is_dir() else []
+    return tuple(name for name in folders if name not in {case.system for case in cases})
+
+
+def find_claim(
+    cases: Sequence[Case], wanted: str, without_report: Sequence[str] = ()
+) -> tuple[tuple[Case, ObligationView], ...]:
+    """The obligations that a name means: a whole id, one without the system, ``agent.low``, or the end of one.
+
+    Raises Rejected where nothing is called so. `without_report`: systems of which nothing can be known here.
+    """
+    named = [(case, view) for case in cases for view in case.obligations]
+    for test in (
+        lambda view: view.id == wanted,
+        lambda view: wanted in (view.obligation.local_id, short(view.id)),
+        lambda view: wanted and (view.id.endswith("/" + wanted) or view.obligation.digest.startswith(wanted)),
+    ):
+        found = tuple((case, view) for case, view in named if test(view))
+        if found:
+            return found
+    system = wanted.partition("/")[0]
+    if system in without_report:
+        hint = f"`avow verify {system}` makes one; it says why, if there is something wrong with the system's files"
+        raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
+    known = [name for _, view in named for name in (short(view.id), view.id)]
+    known += [name for case in cases for name in _names(case)]
+    today = renamed(wanted)
+    guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
+    such = f" (such as {guarantees[0]})" if guarantees else ""
+    kinds = (
+        f"a guarantee{such}, a requirement, node, supposition, gate or file, a diagnostic's code, a word of the report"
+    )
+    hint = f"did you mean `{today}`?" if today else did_you_mean(wanted, known, 3) or f"known: {kinds}"
+    raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
+
+
+def _names(case: Case) -> Iterator[str]:
+    """Names in a case that are no obligations'."""
+    yield case.system
+    yield from (node.name for node in case.nodes)
+    yield from (r.id for r in case.requirements)
+    yield from (name for s in case.suppositions for name in (s.number, s.key))
+    yield from (w.key for w in case.weakenings)
+    yield from (gate.id for gate in case.gates)
+    yield from (d.derivation.name for d in case.derivations)
+    yield from (method.name for method in case.methods)

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.codec import Unreadable, canonical, from_json, from_text, plain, to_json
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import identity, read_regular, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
@@ -341,6 +342,15 @@ class Ledger:
         if not any(entry.hash == stated.hash for entry in reversed(self._entries)):  # nearly always one of the last
             return (Damage(self._lines, f"is not the newest record that {self._head_file.name} names"),)
         return ()
+
+
+@contextlib.contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raises Rejected (``LEDGER001``) for the OSError of a ledger, or their index, that is there and cannot be read."""
+    try:
+        yield
+    except OSError as error:
+        raise Rejected(Diagnostic("LEDGER001", f"{error.filename or path} cannot be read: {error.strerror}")) from None
 
 
 @functools.cache

@@ -19,7 +19,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
-from avow.evidence.ledger import ledger_of
+from avow.evidence.ledger import ledger_of, readable
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
 from avow.pipeline.assess import Assessment, certify, gate, report
@@ -84,12 +84,13 @@ def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected
         return surveyed
     path = state.workspace.ledger(surveyed.system.name)
     try:
-        if state.run.fresh:
-            ledger_of(path).check()
-        ledger_of(path).records()
-        read_index(index_path(path.parent))
-    except OSError as error:
-        return Rejected(Diagnostic("LEDGER001", f"{error.filename or path} cannot be read: {error.strerror}"))
+        with readable(path):
+            if state.run.fresh:
+                ledger_of(path).check()
+            ledger_of(path).records()
+            read_index(index_path(path.parent))
+    except Rejected as rejected:
+        return rejected
     return surveyed
 
 

@@ -18,7 +18,7 @@ from avow.assurance.model import Case
 from avow.assurance.naming import short
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
-from avow.cli.ledgers import find_claim
+from avow.cli.explain import find_claim
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Kind
 from avow.report import formats
