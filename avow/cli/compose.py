@@ -8,19 +8,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
 
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected, refuse
+from avow.base.rendering import render
+from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.calculus.composition import Composition, compose
+from avow.calculus.derivation import Goal
+from avow.calculus.discharge import Bounds
+from avow.calculus.document import told
+from avow.calculus.export import derived_contract
+from avow.calculus.notation import write_goal
+from avow.calculus.obligations import composition_obligations, settle_each
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option, system_of
+from avow.evidence.obligation import Obligation
+from avow.language.translate import to_rcl
 from avow.solving.limits import from_seconds
-
-if TYPE_CHECKING:
-    from avow.base.verdict import Counterexample, Outcome
-    from avow.calculus.composition import Composition
-    from avow.calculus.derivation import Goal
-    from avow.evidence.obligation import Obligation
 
 
 @dataclass(slots=True)
@@ -84,12 +92,6 @@ def command(
     a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's stderr tells the
     answers as they come; who interrupts it gets those so far.
     """
-    from avow.base.diagnostics import Diagnostic, Rejected, refuse
-    from avow.base.verdict import Verdict
-    from avow.calculus.composition import compose
-    from avow.calculus.discharge import Bounds
-    from avow.calculus.obligations import composition_obligations, settle_each
-
     system = system_of(path)
     composition = compose(system)
     refuse(composition.frame.graph.findings)
@@ -101,14 +103,9 @@ def command(
     bounds = Bounds(from_seconds(seconds), seed)
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
     if as_latex:
-        from avow.calculus.notation import write_goal
-
         click.echo("\n\n".join(write_goal(goal).latex for goal in chosen))
         return 0
     if as_rcl:
-        from avow.calculus.export import derived_contract
-        from avow.language.translate import to_rcl
-
         goal = chosen[-1] if goals else composition.whole
         parts = list(goal.inner_first())
         with progress(sum(len(part.conditions) for part in parts)) as telling:
@@ -133,8 +130,6 @@ def command(
             settled.append(outcome)
     outcomes = tuple(settled)
     if as_json:
-        from avow.calculus.document import told
-
         click.echo(document(told(composition, chosen, obligations, outcomes)))
     else:
         _listing(composition, chosen, obligations, outcomes)
@@ -156,14 +151,6 @@ def _shown(counterexample: Counterexample) -> str:
 def _listing(
     composition: Composition, goals: list[Goal], obligations: list[Obligation], outcomes: tuple[Outcome, ...]
 ) -> None:
-    from rich.console import Console
-    from rich.padding import Padding
-    from rich.text import Text
-
-    from avow.base.rendering import render
-    from avow.base.verdict import Verdict
-    from avow.calculus.notation import write_goal
-
     console = Console(highlight=False)
     levels = (composition.frame_of(goal).graph for goal in goals if goal.name in composition.levels)
     findings = [

@@ -7,7 +7,11 @@ from pathlib import Path
 import click
 
 from avow.base.codec import document
+from avow.base.diagnostics import Rejected
+from avow.base.rendering import render
 from avow.cli.options import PathArgument, json_option
+from avow.cli.translate import put
+from avow.fretish.project import nodes, read
 
 
 @click.command()
@@ -20,11 +24,6 @@ def command(file: Path, outputs: str, output: Path | None, as_json: bool) -> int
 
     Code 1 where sentences are left out, 2 where none can be read.
     """
-    from avow.base.diagnostics import Rejected
-    from avow.base.rendering import render
-    from avow.cli.translate import put
-    from avow.fretish.project import nodes, read
-
     project = read(file)
     made = nodes(project, frozenset(name.strip() for name in outputs.split(",") if name.strip()))
     left = [fault for fault in made.faults if fault.is_error]

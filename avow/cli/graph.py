@@ -7,7 +7,12 @@ from pathlib import Path
 import click
 
 from avow.base.codec import document
+from avow.base.diagnostics import refuse
 from avow.cli.options import ContractArgument, json_option, system_of
+from avow.system.folding import seen
+from avow.system.graph import dataflow
+from avow.system.graph_svg import sheet, texts
+from avow.system.wiring import wiring
 
 
 @click.command()
@@ -22,12 +27,6 @@ def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
     of each topic its type, who publishes it and who listens, what comes from the environment, and what arrives one
     step later. Several publishers of one topic are heard each, at any step.
     """
-    from avow.base.diagnostics import refuse
-    from avow.system.folding import seen
-    from avow.system.graph import dataflow
-    from avow.system.graph_svg import sheet, texts
-    from avow.system.wiring import wiring
-
     system = system_of(path)
     graph = dataflow(system)
     refuse(graph.findings)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import io
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from avow.backend_kit.registry import trust_plugins
 from avow.base.codec import document
+from avow.base.diagnostics import Rejected
+from avow.base.workspace import system_folder, workspace
 from avow.cli.options import json_option, node_option, seconds_option
-
-if TYPE_CHECKING:
-    from avow.pipeline.mutation import Score
+from avow.pipeline.mutation import Score, hunt
+from avow.pipeline.run_info import SECONDS, new_run
+from avow.pipeline.tasks import execute
+from avow.pipeline.workload import survey
 
 
 @click.command()
@@ -31,16 +35,7 @@ def command(
     Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
     supports nothing from then on, and the exit code is 1.
     """
-    from avow.backend_kit.registry import trust_plugins
-
     trust_plugins()
-    from avow.base.diagnostics import Rejected
-    from avow.base.workspace import system_folder, workspace
-    from avow.pipeline.mutation import hunt
-    from avow.pipeline.run_info import SECONDS, new_run
-    from avow.pipeline.tasks import execute
-    from avow.pipeline.workload import survey
-
     place = workspace()
     if seconds is not None:
         os.environ[SECONDS] = str(seconds)

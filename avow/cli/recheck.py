@@ -8,9 +8,20 @@ from pathlib import Path
 import click
 
 from avow.base.codec import Foreign, Unreadable, document, from_json, parsed
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular
 from avow.base.records import dataclass
+from avow.base.workspace import system_folder
+from avow.calculus.certificates import scope_of
+from avow.calculus.induction import with_lemmas
+from avow.calculus.variables import frame
+from avow.calculus.wiring import wiring
 from avow.cli.options import ContractArgument, json_option
 from avow.kernel.certificate import Certificate, How
+from avow.kernel.check import Kernel, Refused
+from avow.kernel.statements import statements
+from avow.solving.apart import Both, versions
+from avow.system.load import load_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +68,6 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
     the claims under it; code 2 where there is nothing to establish.
     """
-    from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.files import read_regular
-    from avow.base.workspace import system_folder
-    from avow.calculus.certificates import scope_of
-    from avow.calculus.induction import with_lemmas
-    from avow.calculus.variables import frame
-    from avow.calculus.wiring import wiring
-    from avow.kernel.check import Kernel, Refused
-    from avow.kernel.statements import statements
-    from avow.solving.apart import Both, versions
-    from avow.system.load import load_path
-
     claims = (How.SHOWN, How.POSSIBLE)
     system = load_path(path if path.is_dir() else system_folder(str(path)))
     wired = wiring(frame(system))

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from avow.base.codec import document
+from avow.base.codec import document, to_json
+from avow.base.diagnostics import Diagnostic, Rejected, refuse
+from avow.base.verdict import Verdict
+from avow.calculus.composition import compose
+from avow.calculus.discharge import Bounds
+from avow.calculus.export import derived_contract
+from avow.calculus.refinement import Demand, Refinement, refines
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.language.contract import ClauseKind, Node
+from avow.language.load import load_contract
 from avow.solving.limits import from_seconds
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from avow.base.verdict import Verdict
-    from avow.calculus.discharge import Bounds
-    from avow.calculus.refinement import Demand, Refinement
-    from avow.language.contract import Node
+from avow.system.load import load_system
 
 
 @click.command()
@@ -46,10 +47,6 @@ def command(
     Code 1 where it does not, where the solver gave up, or where the answer is vacuous: CONCRETE's guarantees cannot
     be met at some input, and of such a contract everything follows. 2 for bad input.
     """
-    from avow.base.verdict import Verdict
-    from avow.calculus.discharge import Bounds
-    from avow.calculus.refinement import refines
-
     bounds = Bounds(from_seconds(seconds), seed)
     new, stands = _nodes(concrete, bounds)
     old, _ = _nodes(abstract, bounds)
@@ -72,16 +69,8 @@ def command(
 
 def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
     """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation stands."""
-    from avow.base.verdict import Verdict
-    from avow.language.load import load_contract
-
     if not path.is_dir():
         return load_contract([path]).nodes, Verdict.PROVED
-    from avow.base.diagnostics import refuse
-    from avow.calculus.composition import compose
-    from avow.calculus.export import derived_contract
-    from avow.system.load import load_system
-
     composition = compose(load_system(path))
     refuse(composition.frame.graph.findings)
     whole = composition.whole
@@ -92,8 +81,6 @@ def _pairs(
     new: tuple[Node, ...], old: tuple[Node, ...], asked: str | None, concrete: Path, abstract: Path
 ) -> tuple[list[tuple[Node, Node]], list[str]]:
     """What is compared with what, and what of ABSTRACT has no counterpart. Raises Rejected."""
-    from avow.base.diagnostics import Diagnostic, Rejected
-
     if asked is not None:
         mine, _, theirs = asked.partition("=") if "=" in asked else (asked, "", asked)
         for name, nodes, path in ((mine, new, concrete), (theirs, old, abstract)):
@@ -114,8 +101,6 @@ def _pairs(
 
 def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
     """Raises Rejected."""
-    from avow.base.diagnostics import Diagnostic, Rejected
-
     ports = {port.name for node in nodes for port in (*node.inputs, *node.outputs)}
     found: dict[str, str] = {}
     for text in texts:
@@ -131,8 +116,6 @@ def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
 
 
 def _data(result: Refinement) -> dict[str, object]:
-    from avow.base.codec import to_json
-
     return {
         "concrete": result.concrete,
         "abstract": result.abstract,
@@ -174,9 +157,6 @@ def _print(result: Refinement, concrete: str, abstract: str) -> None:
 
 
 def _told(demand: Demand, concrete: str, abstract: str) -> str:
-    from avow.base.verdict import Verdict
-    from avow.language.contract import ClauseKind
-
     if demand.verdict is Verdict.PROVED:
         if not demand.vacuous:
             return ""

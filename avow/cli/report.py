@@ -7,8 +7,14 @@ from pathlib import Path
 
 import click
 
+from avow.assurance.codec import read_case
 from avow.base.codec import document
+from avow.base.workspace import find_workspace, report_folder, require_systems, workspace
 from avow.cli.options import PathArgument, json_option
+from avow.evidence.ledger import Ledger
+from avow.pipeline.report_check import check, stale
+from avow.pipeline.run_info import sign_with
+from avow.pipeline.tasks import execute
 
 
 @click.command()
@@ -31,10 +37,6 @@ def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json:
     """
     if folder is not None:
         return _check(folder, as_json)
-    from avow.base.workspace import require_systems, workspace
-    from avow.pipeline.run_info import sign_with
-    from avow.pipeline.tasks import execute
-
     place = workspace()
     systems = require_systems(place, systems)
     sign_with(key)
@@ -44,11 +46,6 @@ def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json:
 
 
 def _check(folder: Path, as_json: bool) -> int:
-    from avow.assurance.codec import read_case
-    from avow.base.workspace import find_workspace, report_folder
-    from avow.evidence.ledger import Ledger
-    from avow.pipeline.report_check import check, stale
-
     folder = report_folder(folder)
     place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())
     case = read_case(folder)

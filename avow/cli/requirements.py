@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
+from avow.assurance.requirements_import import plan_section, read_requirements
 from avow.base.codec import document
 from avow.cli.options import PathArgument, json_option
 
@@ -13,10 +16,6 @@ from avow.cli.options import PathArgument, json_option
 @json_option()
 def command(file: str, as_json: bool) -> int:
     """The requirements in FILE (CSV or ReqIF) as the `requirements:` section of a plan.yaml, on standard output."""
-    from pathlib import Path
-
-    from avow.assurance.requirements_import import plan_section, read_requirements
-
     found = read_requirements(Path(file))
     if as_json:
         keys = ("id", "text", "formula", "temporal", "supported_by")

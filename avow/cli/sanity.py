@@ -5,11 +5,17 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
 
 from avow.base.codec import document
+from avow.base.verdict import Counterexample, Verdict
+from avow.calculus import providers
+from avow.calculus.scenario import ranges
+from avow.calculus.variables import frame
 from avow.cli.options import (
     ContractArgument,
     has_nodes,
@@ -19,12 +25,13 @@ from avow.cli.options import (
     seed_option,
     system_of,
 )
+from avow.formulas.interpretation import interpretation
+from avow.language.contract import Node
+from avow.sanity.analysis import analyse
+from avow.sanity.claims import Property
+from avow.sanity.document import SanityDocument, told
+from avow.sanity.results import Bounds, SanityResult
 from avow.solving.limits import from_seconds
-
-if TYPE_CHECKING:
-    from avow.base.verdict import Counterexample
-    from avow.language.contract import Node
-    from avow.sanity.results import SanityResult
 
 
 @click.command()
@@ -41,15 +48,6 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     SYSTEM is a system's name or folder, or an .rcl file. Code 1 where something is refuted that is an error, or where
     two solvers contradict each other, 2 for bad input.
     """
-    from avow.base.verdict import Verdict
-    from avow.calculus import providers
-    from avow.calculus.scenario import ranges
-    from avow.calculus.variables import frame
-    from avow.formulas.interpretation import interpretation
-    from avow.sanity.analysis import analyse
-    from avow.sanity.document import SanityDocument, told
-    from avow.sanity.results import Bounds
-
     system = system_of(path)
     has_nodes(system.contract, nodes)
     bounds = Bounds(from_seconds(seconds), seed)
@@ -76,12 +74,6 @@ _COLOURS = {"proved": "green", "checked": "cyan", "unknown": "yellow", "refuted"
 
 
 def _listing(results: list[SanityResult], everything: bool) -> None:
-    from rich.console import Console
-    from rich.padding import Padding
-    from rich.text import Text
-
-    from avow.base.verdict import Verdict
-
     console = Console(highlight=False)
     folded = [] if everything else [r for r in results if _free(r)]
     shown = [r for r in results if everything or not (r.verdict is Verdict.PROVED or r.because or r in folded)]
@@ -119,8 +111,6 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
 
 def _free(result: SanityResult) -> bool:
     """Whether it says only that an output is the implementation's to choose."""
-    from avow.sanity.claims import Property
-
     return result.asked.about is Property.DETERMINED and result.verdict == "refuted" and not result.because
 
 

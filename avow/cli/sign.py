@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from datetime import date, datetime
+from pathlib import Path
+
 import click
 
+from avow.assurance.codec import read_case
+from avow.assurance.signed import sign_case
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
+from avow.base.persons import unreadable
+from avow.base.workspace import find_workspace, report_folder, workspace
 from avow.cli.options import PathArgument, json_option
+from avow.evidence.envelope import seal_lines
+from avow.evidence.ledger import Ledger
+from avow.pipeline.report_check import check, stale
+from avow.report.exchange import render_attestation
 
 
 @click.command()
@@ -22,20 +35,6 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     envelope on a line of its own (*.attestation.jsonl). Public keys in signed/keys/*.pub make only signatures by these
     keys count.
     """
-    from datetime import date, datetime
-    from pathlib import Path
-
-    from avow.assurance.codec import read_case
-    from avow.assurance.signed import sign_case
-    from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.files import write
-    from avow.base.persons import unreadable
-    from avow.base.workspace import find_workspace, report_folder, workspace
-    from avow.evidence.envelope import seal_lines
-    from avow.evidence.ledger import Ledger
-    from avow.pipeline.report_check import check, stale
-    from avow.report.exchange import render_attestation
-
     folder = report_folder(Path(name))
     place = find_workspace(folder.resolve()) or workspace()
     case = read_case(folder)

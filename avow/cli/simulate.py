@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
+from random import Random
 
 import click
 
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tuning.bounds import WALKS
+from avow.calculus.scenario import CannotRun, world
+from avow.calculus.transition import Machine
+from avow.calculus.variables import frame
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option, system_of
+from avow.formulas.temporal.ages import CLOCK
+from avow.formulas.values import show
 from avow.solving.limits import from_seconds
 
 
@@ -25,18 +35,6 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
 
     Code 1 where the system gets stuck: a node has no answer that its contract allows. Code 2 without a usable scenario.
     """
-    from dataclasses import replace
-    from fractions import Fraction
-    from random import Random
-
-    from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.tuning.bounds import WALKS
-    from avow.calculus.scenario import CannotRun, world
-    from avow.calculus.transition import Machine
-    from avow.calculus.variables import frame
-    from avow.formulas.temporal.ages import CLOCK
-    from avow.formulas.values import show
-
     loaded = system_of(path)
     try:
         machine = Machine(replace(world(frame(loaded)), effort=from_seconds(seconds)), seed)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
 
 import click
 
+from avow.backend_kit import one_step
+from avow.backend_kit.registry import translators, trust_plugins
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import write, write_out
+from avow.base.rendering import render, told
 from avow.cli.options import ContractArgument, PathArgument, has_nodes, json_option, node_option
-
-if TYPE_CHECKING:
-    from avow.base.diagnostics import Diagnostic
-    from avow.language.contract import Contract
-    from avow.system.plan import System
+from avow.language.contract import Contract
+from avow.language.load import load_contract
+from avow.system.load import load_bare, load_system
+from avow.system.plan import System
+from avow.system.plan_file import read_plan
 
 NOTATIONS = {
     **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
@@ -45,15 +50,9 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
     backends may need). Code 1 where guarantees are left out, since the notation cannot say them; 2 where nothing can be
     translated.
     """
-    from avow.backend_kit.registry import trust_plugins
-    from avow.base.diagnostics import Rejected
-    from avow.base.rendering import render
-
     trust_plugins()
     if notation not in NOTATIONS:
         return _by_backend(notation, paths, nodes, output, as_json)
-    from avow.language.load import load_contract
-
     contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
     translate = getattr(module, "FORMATS", {}).get(notation) or getattr(module, f"to_{notation}")
@@ -74,14 +73,6 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
 def _by_backend(
     notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None, as_json: bool
 ) -> int:
-    from dataclasses import replace
-
-    from avow.backend_kit import one_step
-    from avow.backend_kit.registry import translators
-    from avow.base.diagnostics import Rejected, Severity
-    from avow.base.rendering import render
-    from avow.system.load import load_bare, load_system
-
     system = load_system(paths[0]) if len(paths) == 1 and paths[0].is_dir() else load_bare(_files(paths))
     known = translators(system.plan.plugins)
     if notation not in known:
@@ -112,8 +103,6 @@ def _by_backend(
 
 
 def _only(contract: Contract, nodes: tuple[str, ...]) -> Contract:
-    from dataclasses import replace
-
     has_nodes(contract, nodes)
     return replace(contract, nodes=tuple(n for n in contract.nodes if n.name in nodes)) if nodes else contract
 
@@ -126,8 +115,6 @@ def _folder(node: str, system: System) -> str:
 
 
 def _data(notation: str, files: dict[str, str], left_out: list[Diagnostic], output: Path | None) -> str:
-    from avow.base.rendering import told
-
     listed = [{"name": name, "text": text} for name, text in files.items()]
     written = None if output is None else str(output)
     whole = {"notation": notation, "files": listed, "written": written, "left_out": told(left_out).diagnostics}
@@ -136,8 +123,6 @@ def _data(notation: str, files: dict[str, str], left_out: list[Diagnostic], outp
 
 def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:
     """Several files go into a folder; on the terminal, each under its name."""
-    from avow.base.files import write
-
     if output is None:
         for name, text in files.items():
             click.echo((f"// ---- {name}\n" if len(files) > 1 else "") + text, nl=False)
@@ -154,8 +139,6 @@ def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:
 
 def put(text: str, output: Path | None) -> None:
     """To a file, or to the terminal."""
-    from avow.base.files import write_out
-
     if output is None:
         click.echo(text, nl=False)
     elif output.is_dir():
@@ -165,13 +148,9 @@ def put(text: str, output: Path | None) -> None:
 
 
 def _files(paths: tuple[Path, ...]) -> list[Path]:
-    from avow.base.diagnostics import Diagnostic, Rejected
-
     found: list[Path] = []
     for path in paths:
         if (path / "plan.yaml").is_file():
-            from avow.system.plan_file import read_plan
-
             found.extend(read_plan(path / "plan.yaml")[0].contract_files)
         elif path.is_dir():
             files = sorted(path.glob("*.rcl"))
