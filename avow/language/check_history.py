@@ -1,4 +1,4 @@
-"""The formula checker, part four: what speaks of other steps than this one, and lengths of time."""
+"""The formula checker, part three: what speaks of other steps than this one, and lengths of time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from avow.base.optional import complete
 from avow.base.plain import count
-from avow.language.check_relations import Relations
+from avow.language.check_terms import Terms
 from avow.language.conversions import WHOLE, common, joined, widen
 from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS
 from avow.language.printer import show_sort
@@ -33,7 +33,7 @@ _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
 _PLACE = "a response stands as the whole right side of a clause's outermost `->`, or is the clause"
 
 
-class Histories(Relations):
+class Histories(Terms):
     """Records of the past, and responses."""
 
     response: TermSyntax | None = None

@@ -17,12 +17,11 @@ from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import syntax
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
-from avow.language.environment import Environment
 from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.limits import sort_extent, term_extent
-from avow.language.scope import Defined, Scope
+from avow.language.scope import Defined, Environment, Scope
 from avow.language.sorts import (
     Constructor,
     DataSort,

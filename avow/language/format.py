@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.flat import definition_head, flat, quantifier_head
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text, unless_torn
@@ -23,10 +22,12 @@ from avow.language.syntax import (
     ConstantDeclaration,
     Declaration,
     Define,
+    FileSyntax,
     IfThenElse,
     Lasting,
     Limited,
     Negation,
+    NodeSyntax,
     Parentheses,
     PortList,
     Quantification,

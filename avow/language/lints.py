@@ -11,19 +11,18 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.persons import distance
 from avow.base.records import dataclass
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
-from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.lexer import Token
 from avow.language.lookups import lookups
 from avow.language.printer import show_sort, show_term
 from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
-from avow.language.spelling import similar
 from avow.language.subterms import subterms
-from avow.language.syntax import Define, Name, NodePort, Syntax, walk
+from avow.language.syntax import Define, FileSyntax, Name, NodePort, NodeSyntax, Syntax, walk
 from avow.language.terms import (
     TRUE,
     And,
@@ -406,3 +405,49 @@ def _alike(what: str, table: Mapping[str, Span | None], apart: Iterable[frozense
         message = f"the {what}s `{earlier}` and `{later}` differ in a letter or two"
         note = (f"`{earlier}` is here", table[earlier])
         yield _warning("RCL406", message, table[later], "if one thing is meant, write it one way", note)
+
+
+_DIGITS = re.compile(r"[0-9]+|'+$")
+
+
+def similar(names: Sequence[str]) -> list[tuple[str, str]]:
+    """The pairs (earlier, later) of names that look like two spellings of one.
+
+    Names of five letters and more that differ by one letter, of nine and more also by two, or only in capitals and
+    underscores. Names that differ only in numbers or primes (``arm1``, ``arm2``; ``x``, ``x'``) are meant to differ.
+    Time grows linearly with the number of names: candidates share what is left of them without one or two letters.
+    """
+    buckets: dict[str, list[int]] = {}
+    found: dict[tuple[int, int], None] = {}
+    for i, name in enumerate(names):
+        if len(name) > 80:
+            continue
+        folded = name.replace("_", "").casefold()
+        for key in _deletions(folded):
+            for j in buckets.setdefault(key, [])[-20:]:
+                if (j, i) not in found and _one_thing(names[j], name):
+                    found[(j, i)] = None
+            buckets[key].append(i)
+    return [(names[i], names[j]) for i, j in found]
+
+
+def _one_thing(one: str, other: str) -> bool:
+    if _DIGITS.sub("", one) == _DIGITS.sub("", other):
+        return False
+    a, b = one.replace("_", "").casefold(), other.replace("_", "").casefold()
+    if a == b:
+        return len(a) > 1
+    shorter = min(len(a), len(b))
+    limit = 0 if shorter < 5 else 1 if shorter < 9 else 2
+    return distance(a, b, limit) <= limit
+
+
+def _deletions(name: str) -> set[str]:
+    """The name, and what is left of it without one letter (without two, for long names)."""
+    if len(name) < 5:
+        return {name}
+    once = {name[:i] + name[i + 1 :] for i in range(len(name))}
+    found = {name, *once}
+    if len(name) + 2 >= 9 and len(name) <= 40:
+        found.update(part[:i] + part[i + 1 :] for part in once for i in range(len(part)))
+    return found

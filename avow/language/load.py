@@ -16,18 +16,16 @@ from avow.base.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
-from avow.language.environment import of_contract
-from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.lexer import Token, tokens
 from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import read
 from avow.language.parser import parse
 from avow.language.pieces import by_pieces
-from avow.language.scope import BOTH_ROLES, Defined, Scope
+from avow.language.scope import BOTH_ROLES, Defined, Scope, of_contract
 from avow.language.sorts import Sort
 from avow.language.source import Reports, Source, in_order
-from avow.language.syntax import TermSyntax
+from avow.language.syntax import FileSyntax, NodeSyntax, TermSyntax
 from avow.language.terms import Role, Term, Variable
 
 NOTHING = Contract((), (), (), ())

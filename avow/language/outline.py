@@ -11,11 +11,10 @@ from collections.abc import Sequence
 
 from avow.language.contract import ClauseKind
 from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keyword
-from avow.language.file_syntax import ClauseSyntax, FileSyntax, NodeSyntax
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
-from avow.language.syntax import Declaration, Define, PortList, TopicList
+from avow.language.syntax import ClauseSyntax, Declaration, Define, FileSyntax, NodeSyntax, PortList, TopicList
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _NESTED = {**_OPEN, "LSQUARE": "RSQUARE"}

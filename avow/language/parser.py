@@ -7,7 +7,7 @@ It is iterative: no nesting, however deep, can exhaust the stack.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple, TypeVar, overload
@@ -16,10 +16,9 @@ from avow.base.grammars import lark_of
 from avow.base.tuning.bounds import CHAIN
 from avow.base.tuning.sizes import NESTING
 from avow.language import syntax
-from avow.language.lexer import Token
+from avow.language.lexer import KEYWORDS, Token
 from avow.language.source import Reports
 from avow.language.terms import Quantifier
-from avow.language.topic_names import topic_names
 
 QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
 STARTS = ("declaration", "ports", "topics", "formula")
@@ -55,7 +54,7 @@ def parse(
     """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
     and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
     if start == "topics":
-        tokens = topic_names(tokens)
+        tokens = _topic_names(tokens)
     tree = _run(_tables(start), tokens, Token("$END", "", end, end))
     if begin is None:
         begin = tokens[0].start if tokens else end
@@ -294,3 +293,43 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "pace": _pace,
 }
 """What becomes of the tokens and trees of a rule, by its name in the grammar."""
+
+
+# --- names of topics --------------------------------------------------------------------------------------------------
+
+_SEGMENTS = frozenset(("NAME", *KEYWORDS.values()))
+
+
+def _topic_names(tokens: Sequence[Token]) -> list[Token]:
+    """The tokens of a list of topics, each name that has several segments as one NAME. A word of the language is an
+    ordinary segment (`/arm/in`)."""
+    found: list[Token] = []
+    runs = 0
+    for run in _runs(tokens):
+        if len(run) == 1 and run[0].type not in _SEGMENTS and run[0].type != "SLASH":
+            runs = 0 if run[0].type in ("COMMA", "LPAR", "RPAR") else runs
+            found += run
+            continue
+        runs += 1
+        if runs == 2 and len(run) > 1:
+            text = "".join(token.text for token in run)
+            found.append(Token("NAME", text, run[0].start, run[-1].end))
+        else:
+            found += run
+    return found
+
+
+def _runs(tokens: Sequence[Token]) -> Iterator[list[Token]]:
+    """Segments and slashes that stand close together; any other token by itself."""
+    run: list[Token] = []
+    for token in tokens:
+        part = token.type in _SEGMENTS or token.type == "SLASH"
+        if run and (not part or run[-1].end != token.start):
+            yield run
+            run = []
+        if part:
+            run.append(token)
+        else:
+            yield [token]
+    if run:
+        yield run

@@ -18,12 +18,12 @@ from avow.base.tuning.shown import DIAGNOSTICS
 from avow.base.tuning.sizes import CONTRACT_PARTS, TOKENS
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
-from avow.language.file_syntax import FileSyntax
 from avow.language.lexer import Token, tokens
 from avow.language.lints import LintedFile, allows, of_all, of_node, spoken, tell
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import read
 from avow.language.source import Reports, Source, in_order
+from avow.language.syntax import FileSyntax
 
 _BEGINS = re.compile(r"^[ \t]*node\b", re.MULTILINE)
 

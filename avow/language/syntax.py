@@ -1,4 +1,4 @@
-"""The surface syntax of declarations and formulas: what the parser makes of the tokens, before any name is resolved.
+"""The surface syntax of files, declarations and formulas: what becomes of the tokens, before any name is resolved.
 
 A frozen dataclass for each kind of node, its fields in reading order, so that `children` finds the trees in it. Names
 that are only compared are plain strings; those that a diagnostic may point at are tokens.
@@ -7,10 +7,12 @@ that are only compared are plain strings; those that a diagnostic may point at a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import field
 from enum import StrEnum
 from typing import Any
 
 from avow.base.records import dataclass
+from avow.language.contract import ClauseKind
 from avow.language.lexer import Token
 from avow.language.terms import Quantifier
 
@@ -410,6 +412,49 @@ Syntax = (
     | TopicDeclaration
     | RosType
 )
+
+
+# --- files: what their text is made of (`avow.language.outline` finds it) ---------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ClauseSyntax:
+    kind: ClauseKind
+    name: Token | None
+    sentence: Token | None
+    formula: TermSyntax | None
+    """None: it was in error, which has been reported."""
+    inside: tuple[int, int]
+    """Where the formula stands, between the parentheses."""
+    start: int
+    end: int
+
+
+@dataclass(slots=True)
+class NodeSyntax:
+    """`broken` are names that a part in error seems to declare; nothing more should be said about them."""
+
+    name: Token
+    start: int
+    end: int = 0
+    inputs: PortList | None = None
+    outputs: PortList | None = None
+    topics: TopicList | None = None
+    definitions: list[Define] = field(default_factory=list)
+    clauses: list[ClauseSyntax] = field(default_factory=list)
+    broken: set[str] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class FileSyntax:
+    declarations: list[Declaration] = field(default_factory=list)
+    nodes: list[NodeSyntax] = field(default_factory=list)
+    broken: set[str] = field(default_factory=set)
+    parts: list[tuple[int, int]] = field(default_factory=list)
+    """Where each declaration, node, and part of a node stands: what a comment before it is about."""
+
+
+# --- what a tree is made of -------------------------------------------------------------------------------------------
 
 
 def children(tree: Syntax) -> tuple[Syntax, ...]:

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from avow.language.contract import Contract, Definition, Node, Port
-from avow.language.environment import of_contract
 from avow.language.lexer import LONG_UNITS, STEPS, UNITS
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
+from avow.language.scope import of_contract
 from avow.language.sorts import DataSort, FunctionSort, SequenceSort, Sort, TupleSort, components
 from avow.language.terms import Past, Role
 from avow.lsp.names import Text

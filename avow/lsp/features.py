@@ -12,10 +12,10 @@ from typing import assert_never
 from avow.base.diagnostics import Diagnostic, Span
 from avow.language.contract import Clause, Definition, Node, Port
 from avow.language.definitions import show_clause
-from avow.language.environment import of_contract
 from avow.language.lexer import Token
 from avow.language.load import clean_text
 from avow.language.printer import show_sort, show_term, show_type
+from avow.language.scope import of_contract
 from avow.language.source import Source
 from avow.language.subterms import subterms
 from avow.language.syntax import ConstantDeclaration, Declaration, Define, TypeDeclaration

@@ -13,21 +13,22 @@ from enum import StrEnum
 from typing import assert_never
 
 from avow.language.contract import ClauseKind, Contract
-from avow.language.environment import Environment, of_contract
-from avow.language.file_syntax import FileSyntax, NodeSyntax
 from avow.language.lexer import Token, tokens
 from avow.language.load import unless_torn
 from avow.language.outline import read
 from avow.language.parser import QUANTIFIERS
+from avow.language.scope import Environment, of_contract
 from avow.language.source import Reports, Source
 from avow.language.syntax import (
     ConstantDeclaration,
     Define,
     Element,
     FieldOf,
+    FileSyntax,
     Name,
     NamedType,
     NodePort,
+    NodeSyntax,
     PortName,
     Quantification,
     RecordType,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from avow.base.diagnostics import Rejected, Span
 from avow.language.contract import Contract
-from avow.language.environment import of_contract
+from avow.language.scope import of_contract
 from avow.language.source import Source
 from avow.language.terms import Role
 from avow.lsp.names import Meaning, Occurrence, Ports, What, declared

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.persons import distance
+from avow.language.lints import similar
 from avow.language.load import check_paths, check_text
-from avow.language.spelling import distance, similar
 
 NODE = """\
 context {{ Stat : {{red, orange, green}}; }}

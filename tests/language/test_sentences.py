@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from avow.base.diagnostics import Diagnostic
-from avow.language.english import both_ways, comparisons, is_one_way, mentions
 from avow.language.load import check_paths, check_text
+from avow.language.sentences import both_ways, comparisons, is_one_way, mentions
 
 ROOT = Path(__file__).parents[2]
 NODE = """\
