@@ -16,7 +16,7 @@ from avow.evidence.record import REMARKS
 from avow.language.contract import Contract
 from avow.language.load import warnings_of
 from avow.language.sentences import elements_of
-from avow.system.sentences import said_otherwise
+from avow.system.statements import said_otherwise
 from avow.system.strict_yaml import Piece, read_yaml
 
 REMARK = "remark"

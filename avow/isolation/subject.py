@@ -19,10 +19,9 @@ from avow.base.codec import LATER, Unreadable, from_text
 from avow.base.records import dataclass
 from avow.base.tuning.sizes import SCRATCH_BYTES
 from avow.base.verdict import Isolation
-from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed, Seen, as_here, interpreter, recorded, untold, variables
-from avow.isolation.printed import Printed
+from avow.isolation.printed import Names, Printed
 from avow.isolation.tracing import Trace, traces
 
 _SCRATCH = "/tmp/avow-scratch"

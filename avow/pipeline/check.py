@@ -85,8 +85,7 @@ def of_plan(
     `diagnostics`."""
     from avow.system import launched
     from avow.system.graph import dataflow
-    from avow.system.sentences import requirement_sentences
-    from avow.system.statements import unconfirmed, without_words
+    from avow.system.statements import requirement_sentences, unconfirmed, without_words
     from avow.system.topics import turned, unknown_types
 
     found = [

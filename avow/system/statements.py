@@ -1,15 +1,18 @@
-"""What the plan says, in plain words, of all that is supposed without being shown: read, and what is missing told."""
+"""What the plan says, in plain words, of all that is supposed without being shown: read, and what is missing told; and
+requirements whose sentence says otherwise than their formula: the sentence is what an assessor reads."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.persons import unreadable, wrong_day
 from avow.base.plain import identifiers, is_blank
 from avow.base.tuning.sizes import STATEMENT_WORDS
+from avow.language.contract import Contract
 from avow.system.plan import Plan, Statement, System
 from avow.system.strict_yaml import Piece
+from avow.system.temporal import written_state
 
 _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
 
@@ -46,6 +49,29 @@ def unconfirmed(system: System) -> Iterator[Diagnostic]:
                 Severity.WARNING,
                 hint=f'confirmed: {{who: …, on: …, sentence: "{requirement.digest}"}}',
             )
+
+
+def requirement_sentences(system: System) -> Iterator[Diagnostic]:
+    """The lints RCL413 to RCL415 of the plan's requirements that have a formula."""
+    from avow.language.sentences import elements_of  # not what loading a plan needs
+
+    elements = elements_of(system.contract.nodes)
+    for requirement in system.plan.requirements:
+        if requirement.formula is not None:
+            yield from said_otherwise(
+                requirement.text, requirement.formula, system.contract, elements, requirement.span
+            )
+
+
+def said_otherwise(
+    text: str, formula: str, contract: Contract, elements: Mapping[str, str], span: Span | None
+) -> Iterator[Diagnostic]:
+    """What a requirement's sentence says otherwise than its formula; `elements` are the contract's (`elements_of`).
+    Raises Rejected where that is no formula."""
+    from avow.language.sentences import differences
+
+    for found in differences(text, written_state(formula, contract, span, clause=True), elements):
+        yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)
 
 
 def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> Iterator[Diagnostic]:

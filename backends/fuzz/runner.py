@@ -23,10 +23,9 @@ from avow.base.codec import Unreadable, from_text
 from avow.base.tuning.running import SUBJECT_PATIENCE
 from avow.base.verdict import Isolation
 from avow.isolation import judge
-from avow.isolation.forged import Names
 from avow.isolation.level import available, sealed
 from avow.isolation.observed import Observed
-from avow.isolation.printed import Printed
+from avow.isolation.printed import Names, Printed
 from avow.isolation.subject import Message, SubjectFailed, SubjectProcess
 
 _OPTIONS = {
@@ -145,7 +144,7 @@ class Question:
     root: str
     seconds: float
     names: tuple[str, ...]
-    """What has a verdict: `avow.isolation.forged.Names.of`."""
+    """What has a verdict: `avow.isolation.printed.Names.of`."""
 
 
 def campaign(asked: Campaign, question: Question) -> Campaigned:

@@ -16,8 +16,8 @@ from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.base.codec import canonical, document, to_json
 from avow.base.verdict import Isolation, Outcome, Verdict
 from avow.isolation import judge
-from avow.isolation.forged import Names, forged
 from avow.isolation.level import SANDBOX
+from avow.isolation.printed import Names, forged
 from avow.isolation.subject import Message, SubjectFailed, SubjectProcess
 from avow.pipeline.requests import Response
 

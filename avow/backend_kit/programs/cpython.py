@@ -33,7 +33,7 @@ class Subject:
     attributes: tuple[str, ...]
     """Whose values after `__init__` are wanted."""
     names: tuple[str, ...] = ()
-    """What has a verdict: `avow.isolation.forged.Names.of`."""
+    """What has a verdict: `avow.isolation.printed.Names.of`."""
     ros: Mapping[str, Any] | None = None
     """Of a callback class: what stands in for ROS (`avow.drive.callbacks`)."""
 
