@@ -15,7 +15,7 @@ from avow.formulas.temporal.cell import CELL
 from avow.language.printer import show_term
 from avow.language.terms import Variable
 
-from .printer import Predicate, Vocabulary, call, print_clause, sort_text
+from .printer import Predicate, Vocabulary, call, print_clause, signature, sort_text
 
 ESTABLISHED, FIRST = "Established", "First"
 
@@ -61,12 +61,12 @@ class History:
         ]
         for predicates in (self.begins, *self.moves):
             for predicate in predicates[:-1]:
-                lines += _declared(predicate, "bool", words)
+                lines += declared(predicate, "bool", words)
         ports = ", ".join(f"{words.local(p)}: {sort_text(p.sort, words)}" for p in self.ports)
         moved = ", ".join(self._of(made[-1], words, "") for made in self.moves)
-        lines += _declared(self.begins[-1], "bool", words)
+        lines += declared(self.begins[-1], "bool", words)
         for cell, made in zip(self.cells, self.moves, strict=True):
-            lines += _declared(made[-1], sort_text(cell.sort, words), words)
+            lines += declared(made[-1], sort_text(cell.sort, words), words)
         return [
             *lines,
             f"  predicate Begins(h: History) {{ {self._of(self.begins[-1], words, '')} }}",
@@ -138,7 +138,7 @@ def _named(wanted: str, words: Vocabulary) -> str:
     return name
 
 
-def _declared(predicate: Predicate, sort: str, words: Vocabulary) -> list[str]:
-    parameters = ", ".join(f"{words.local(p)}: {sort_text(p.sort, words)}" for p in predicate.parameters)
+def declared(predicate: Predicate, sort: str, words: Vocabulary) -> list[str]:
+    """The lines of a predicate, or of a function to a sort."""
     kind, result = ("predicate", "") if sort == "bool" else ("function", f": {sort}")
-    return [f"  {kind} {predicate.name}({parameters}){result}", f"  {{ {predicate.body} }}"]
+    return [f"  {kind} {predicate.name}({signature(predicate.parameters, words)}){result}", f"  {{ {predicate.body} }}"]

@@ -17,7 +17,7 @@ from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
 
-from .history import ESTABLISHED, History, history
+from .history import ESTABLISHED, History, declared, history
 from .printer import (
     RESERVED,
     Names,
@@ -27,6 +27,7 @@ from .printer import (
     file_stem,
     identifier,
     print_clause,
+    signature,
     sort_text,
 )
 
@@ -171,10 +172,6 @@ def lines_map(generated: Generated) -> str:
     return document(data) + "\n"
 
 
-def signature(variables: Sequence[Variable], words: Vocabulary) -> str:
-    return ", ".join(f"{words.local(v)}: {sort_text(v.sort, words)}" for v in variables)
-
-
 def _types(words: Vocabulary) -> str:
     lines = ["// Generated: the types of the contract. Do not edit.", f"{_MODULE} Types {{"]
     # Asking for the types of constructors' parameters may bring further types in, so this is no plain loop.
@@ -232,8 +229,7 @@ def _contract(
         lines.append("")
         lines.append(f"  // {clause.kind} {one_line(clause.name)}" + _sentence(clause))
         for predicate in predicates:
-            lines.append(f"  predicate {predicate.name}({signature(predicate.parameters, words)})")
-            lines.append(f"  {{ {predicate.body} }}")
+            lines += declared(predicate, "bool", words)
     return "\n".join([*lines, "}", ""])
 
 

@@ -9,7 +9,7 @@ is known there, so whatever is proved holds however they are read.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
 from functools import reduce
@@ -159,6 +159,11 @@ def call(predicate: Predicate, words: Vocabulary, module: str = "") -> str:
     """The predicate applied to variables of the names of its parameters."""
     arguments = ", ".join(words.local(p) for p in predicate.parameters)
     return f"{module}{predicate.name}({arguments})"
+
+
+def signature(variables: Sequence[Variable], words: Vocabulary) -> str:
+    """Variables with their types, as parameters."""
+    return ", ".join(f"{words.local(v)}: {sort_text(v.sort, words)}" for v in variables)
 
 
 _Text = tuple[str, bool]

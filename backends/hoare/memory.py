@@ -97,53 +97,36 @@ class Established:
 
 
 def establish(
-    stated: Sequence[Invariant],
-    guessed: Sequence[Iterator[Invariant]],
-    steps: Stepping,
-    checked: Checked,
-    proves: Callable[[Condition], bool],
+    guessed: Sequence[Iterator[Invariant]], steps: Stepping, checked: Checked, proves: Callable[[Condition], bool]
 ) -> Established:
-    """The largest part of the stated invariants, and of guesses, that hold first and that together each step keeps. Of
+    """The largest part of the plan's invariants, and of guesses, that hold first and that together each step keeps. Of
     each guess there are forms, of which the first that lasts is taken."""
-    lacking: list[str] = []
 
     def begins(each: Invariant) -> bool:
         return proves(Condition("first", (), steps.first(each.formula), "it holds before the first step"))
 
-    left: list[Invariant] = []
-    for each in stated:
-        if begins(each):
-            left.append(each)
-        else:
-            lacking.append(f"not shown that `{each.text}` holds before the first step")
+    def lasts(each: Invariant, node: Node) -> bool:
+        found = kept(each, "invariant", steps, node, checked)
+        try:
+            return all(proves(c) for t in found for c in conditions(t.as_stated, checked.program.body))
+        except TooLarge:
+            return False
+
+    left = [each for each in steps.invariants if begins(each)]
+    lacking = [
+        f"not shown that `{each.text}` holds before the first step" for each in steps.invariants if each not in left
+    ]
     forms = [filter(begins, form) for form in guessed]
     now = [next(form, None) for form in forms]
     while True:
         known = [*left, *(each for each in now if each is not None)]
         node = steps.knowing(known)
-        lost = [each for each in known if not _is_kept(each, steps, node, checked, proves)]
+        lost = [each for each in known if not lasts(each, node)]
         if not lost:
             return Established(tuple(known), tuple(lacking))
         lacking += [f"not shown that a step keeps `{each.text}`" for each in left if each in lost]
         left = [each for each in left if each not in lost]
         now = [next(forms[k], None) if each in lost else each for k, each in enumerate(now)]
-
-
-def _is_kept(
-    invariant: Invariant,
-    steps: Stepping,
-    node: Node,
-    checked: Checked,
-    proves: Callable[[Condition], bool],
-) -> bool:
-    try:
-        return all(
-            proves(condition)
-            for triple in kept(invariant, "invariant", steps, node, checked)
-            for condition in conditions(triple.as_stated, checked.program.body)
-        )
-    except TooLarge:
-        return False
 
 
 def knowing(job: Job, steps: Stepping, invariants: Sequence[Invariant]) -> Job:
@@ -164,7 +147,7 @@ def remembered(
         return seen, Established((), ())
     memories = [dict(pairs) for pairs in dict.fromkeys(tuple(sorted(m.items())) for m in seen.memories)]
     forms = [(each for each in family if not _contradicted(each, memories)) for family in guesses(steps)]
-    found = establish(steps.invariants, forms[:GUESSES], steps, checked, proves)
+    found = establish(forms[:GUESSES], steps, checked, proves)
     told = tuple(f"a run contradicts `{each.text}`" for each in steps.invariants if _contradicted(each, memories))
     return seen, replace(found, lacking=told or found.lacking)
 
