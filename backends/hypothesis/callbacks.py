@@ -31,20 +31,10 @@ from avow.isolation.observed import Observed
 from avow.ros.sources import message_files
 from avow.system.plan import Driving
 
+from . import tuning
 from .convention import ANY, EXACT, SPECIAL
 from .export import cases, numbers
 from .judging import failure_bound
-from .tuning import (
-    APART,
-    ASKED_AGAIN,
-    CONFIDENCE,
-    LONGEST_RUN,
-    REJECTED_CASES,
-    RUNS_TOGETHER,
-    SHRINKING_SECONDS,
-    SILENCE,
-    STEPS,
-)
 
 UNSTEADY = "undeclared input: asked the same again from its start, another process publishes otherwise"
 
@@ -100,7 +90,7 @@ def _work(job: Job, backend: Backend, limits: Limits) -> _Work:
     """Raises Rejected."""
     judge = backend.judge(job)
     clauses = (*job.node.assumptions, *map(job.clause, job.obligations))
-    length = STEPS + min(2 * longest_limits(c.formula for c in clauses), LONGEST_RUN)
+    length = tuning.STEPS + min(2 * longest_limits(c.formula for c in clauses), tuning.LONGEST_RUN)
     return _Work(job, driver(job.system, job.node.name), judge, limits, length)
 
 
@@ -157,10 +147,10 @@ class _Work:
                 return f"only {self.messages} of {many} messages in the time given"
             made: list[Messages] = []
             left = many - self.messages
-            while len(made) < min(RUNS_TOGETHER, math.ceil(left / self.length)):
+            while len(made) < min(tuning.RUNS_TOGETHER, math.ceil(left / self.length)):
                 events, number = self.allowed(f"{self.limits.seed}/{number}"), number + 1
                 made += [events] if events else []
-                if self.rejected > REJECTED_CASES * max(self.messages + sum(map(len, made)), 50):
+                if self.rejected > tuning.REJECTED_CASES * max(self.messages + sum(map(len, made)), 50):
                     whole = f"{self.messages} of {self.messages + self.rejected} generated messages"
                     return f"the assumptions are met too rarely: {whole}"
             self.put(made)
@@ -191,7 +181,7 @@ class _Work:
         if not made:
             return
         for events, run in zip(made, self.ask(made), strict=True):
-            if len(self.first) * self.length < ASKED_AGAIN:
+            if len(self.first) * self.length < tuning.ASKED_AGAIN:
                 self.first.append((events, run))
             self.runs += drawn
             self.messages += drawn * len(events)
@@ -256,7 +246,7 @@ class _Work:
 
     def smaller(self, name: str, best: Messages) -> Messages:
         """Without the messages that it does not take: the last alone, halves, then one by one."""
-        end = min(self.end, time.monotonic() + SHRINKING_SECONDS)
+        end = min(self.end, time.monotonic() + tuning.SHRINKING_SECONDS)
         while len(best) > 1 and time.monotonic() < end:
             half = len(best) // 2
             tried = [best[-1:], best[half:], best[:half]] if half > 1 else []
@@ -283,7 +273,7 @@ class _Work:
     def apart(self) -> list[Counterexample]:
         """What goes wrong where a float of a message is no number, or the negative zero: each in its turn."""
         tried: list[tuple[Messages, str]] = []
-        for events, _ in self.first[:APART]:
+        for events, _ in self.first[: tuning.APART]:
             for topic in dict.fromkeys(event.topic for event in events):
                 at = next(k for k, event in enumerate(events) if event.topic == topic)
                 for path in _floats(events[at].data):
@@ -291,7 +281,7 @@ class _Work:
                         put = replace(events[at], data=_put(events[at].data, path, {"f": text}))
                         tried.append(((*events[:at], put, *events[at + 1 :]), f"{topic}: {'.'.join(path)} = {word}"))
         found: dict[str, Counterexample] = {}
-        asked = tried[:: max(1, len(tried) // (RUNS_TOGETHER * APART))]
+        asked = tried[:: max(1, len(tried) // (tuning.RUNS_TOGETHER * tuning.APART))]
         for (events, what), run in zip(asked, self.ask([events for events, _ in asked]) if asked else (), strict=True):
             judged = self.judged(events, run)
             broken = [
@@ -327,7 +317,7 @@ class _Work:
         if not count.triggered:
             return replace(outcome, summary=f"in none of {self.runs} runs was its condition met", vacuous=True)
         below = failure_bound(count.triggered)
-        bound |= {"confidence": CONFIDENCE, "triggered": count.triggered}
+        bound |= {"confidence": tuning.CONFIDENCE, "triggered": count.triggered}
         bound["failure_probability_below"] = round(failure_bound(self.runs), 6)
         bound["failure_probability_when_triggered_below"] = round(below, 6)
         before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
@@ -340,7 +330,7 @@ class _Work:
 
 def _end(events: Sequence[Event]) -> int:
     """How long a run goes on: timers are due after its last message."""
-    return (events[-1].at if events else 0) + SILENCE * SECOND
+    return (events[-1].at if events else 0) + tuning.SILENCE * SECOND
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, str]]:

@@ -31,16 +31,7 @@ from avow.language.sorts import (
 from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
 
-from .tuning import (
-    CONSTANTS_COMBINED,
-    CONSTANTS_READ,
-    LARGEST_CONSTANT,
-    LENGTHS,
-    LONG_SEQUENCE,
-    LONGEST_SEQUENCE,
-    LONGEST_TEXT,
-    SMALL,
-)
+from . import tuning
 
 STEP = Fraction(1, 1000)
 """How close to a threshold a value is tried on either side."""
@@ -76,10 +67,10 @@ def pools(
     said = {part.value for part in parts if isinstance(part, Literal) and isinstance(part.value, str)}
     strings = {"", *(t for text in said | of_subject[1] for t in (text, text + "x"))}
     around = _around(numbers | solved)
-    few = sorted({*numbers, Fraction(0)}) if len(numbers) <= CONSTANTS_COMBINED else []
+    few = sorted({*numbers, Fraction(0)}) if len(numbers) <= tuning.CONSTANTS_COMBINED else []
     # An output's threshold may be reached from an input by adding or taking away.
     combined = _simple((*around, *(a + b for a in few for b in few), *(a - b for a in few for b in few)))
-    small = tuple(range(SMALL))
+    small = tuple(range(tuning.SMALL))
     inside = tuple(int(n) for n in sorted(numbers) if n.denominator == 1 and n not in small)
     texts = tuple(sorted(strings, key=lambda s: (len(s), s)))
     near: dict[Sort, tuple[Value, ...]] = {
@@ -124,7 +115,7 @@ def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
     documentation = {id(part.value) for part in ast.walk(tree) if isinstance(part, ast.Expr)}
     for part in (*ast.walk(tree), *map(ast.Constant, calculated)):
         if (
-            len(numbers) + len(texts) >= CONSTANTS_READ
+            len(numbers) + len(texts) >= tuning.CONSTANTS_READ
             or id(part) in documentation
             or not isinstance(part, ast.Constant)
         ):
@@ -132,12 +123,12 @@ def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
         match part.value:
             case bool():
                 continue
-            case int(number) if abs(number) <= LARGEST_CONSTANT:
+            case int(number) if abs(number) <= tuning.LARGEST_CONSTANT:
                 numbers |= {Fraction(number), Fraction(-number)}
-            case float(number) if math.isfinite(number) and abs(number) <= LARGEST_CONSTANT:
+            case float(number) if math.isfinite(number) and abs(number) <= tuning.LARGEST_CONSTANT:
                 # as it is written, and as the machine has it
                 numbers |= {Fraction(repr(number)), Fraction(number), -Fraction(repr(number))}
-            case str(text) if len(text) <= LONGEST_TEXT:
+            case str(text) if len(text) <= tuning.LONGEST_TEXT:
                 texts.add(text)
     return frozenset(numbers), frozenset(texts)
 
@@ -156,9 +147,9 @@ def _neighbours(number: Fraction) -> Iterable[Fraction]:
 
 def _lengths(numbers: Iterable[Fraction]) -> tuple[int, ...]:
     """Lengths at, beside and beyond each number that can be one, and those that any sequence may have."""
-    whole = {math.floor(n) for n in numbers if 0 <= n <= LONGEST_SEQUENCE}
-    found = {n + d for n in whole for d in (-1, 0, 1, 2)} | {2 * n + 1 for n in whole} | {0, 1, 2, LONG_SEQUENCE}
-    return tuple(sorted(n for n in found if 0 <= n <= 2 * LONGEST_SEQUENCE + 1))[:LENGTHS]
+    whole = {math.floor(n) for n in numbers if 0 <= n <= tuning.LONGEST_SEQUENCE}
+    found = {n + d for n in whole for d in (-1, 0, 1, 2)} | {2 * n + 1 for n in whole} | {0, 1, 2, tuning.LONG_SEQUENCE}
+    return tuple(sorted(n for n in found if 0 <= n <= 2 * tuning.LONGEST_SEQUENCE + 1))[: tuning.LENGTHS]
 
 
 def _solved(comparison: Compare) -> set[Fraction]:

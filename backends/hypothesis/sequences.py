@@ -23,29 +23,13 @@ from avow.isolation.scout import Sight
 from avow.isolation.subject import SubjectFailed, SubjectProcess
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
 
-from . import steer
+from . import steer, tuning
 from .bench import Bench, _Enough
 from .convention import SPECIAL, Case, Malformed, asked_with, kept_runs, outputs, pairs, received, told, valuation
 from .exchange import Answer, Pairs, Question, Tried
 from .export import KEPT
 from .generate import Impossible, Inputs, Source
 from .shrink import OutOfTime
-from .tuning import (
-    AFTER_COUNTING,
-    ASKED_AGAIN,
-    CASE_BYTES,
-    COUNTED_STEPS,
-    EDGES,
-    HELD_STEPS,
-    LED_TO,
-    LONG_HELD_STEPS,
-    LONGEST_RUN,
-    REJECTED_CASES,
-    SHRINKING_SECONDS,
-    SHRINKING_TRIES,
-    STEP_TRIES,
-    STEPS,
-)
 
 Trace = list[tuple[Inputs, dict[str, Value]]]
 
@@ -61,7 +45,7 @@ class SequenceBench(Bench):
         self.memory = asked.memory
         self.unread = tuple(name.removeprefix("out.") for name in asked.left_out if name.startswith("out."))
         self.turned = {n: s for n, s in self.inputs_sorts.items() if n not in self.memory}
-        self.counted = COUNTED_STEPS
+        self.counted = tuning.COUNTED_STEPS
         self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
         self.traces: dict[str, Trace] = {}
         self._first: list[list[Inputs]] = []
@@ -69,7 +53,7 @@ class SequenceBench(Bench):
         self._edges_left: Iterator[Inputs] = iter(())
         self._swept = False
         self.runs = 0
-        self._steps = STEPS + min(2 * longest_limits(self.formulas), LONGEST_RUN)
+        self._steps = tuning.STEPS + min(2 * longest_limits(self.formulas), tuning.LONGEST_RUN)
 
     # -- the class ---------------------------------------------------------------------------------------
 
@@ -132,7 +116,7 @@ class SequenceBench(Bench):
 
     def starts(self) -> list[list[Inputs]]:
         """The beginnings of some runs."""
-        return [run[:steps] for run, steps in zip(self._first, LED_TO, strict=False) if len(run) >= steps]
+        return [run[:steps] for run, steps in zip(self._first, tuning.LED_TO, strict=False) if len(run) >= steps]
 
     def allowed(self, inputs: Inputs) -> bool:
         """What the assumptions say hangs on where the run is: `tried_at` asks them."""
@@ -190,9 +174,9 @@ class SequenceBench(Bench):
             self._edges_left = iter([*map(self.as_given, self.generator.edges(self.blamed))])
             while self.valid < self.cases:
                 self._run(chance)
-                if self.rejected > REJECTED_CASES * max(self.valid, 50):
+                if self.rejected > tuning.REJECTED_CASES * max(self.valid, 50):
                     return "assumptions"
-            self.tried_at([], [*itertools.islice(self._edges_left, EDGES // 3)])
+            self.tried_at([], [*itertools.islice(self._edges_left, tuning.EDGES // 3)])
             steer.steer(self)
         except OutOfTime:
             return "time"
@@ -204,9 +188,9 @@ class SequenceBench(Bench):
 
     def _run(self, chance: random.Random) -> None:
         trace: Trace = []
-        held = HELD_STEPS if chance.random() < 0.4 else 0.0
+        held = tuning.HELD_STEPS if chance.random() < 0.4 else 0.0
         if held and self.remembers:
-            held = chance.choice((HELD_STEPS, *LONG_HELD_STEPS))
+            held = chance.choice((tuning.HELD_STEPS, *tuning.LONG_HELD_STEPS))
         before = {name: list(g.hits) for name, g in self.guarantees.items()}
         try:
             memory = self.begin(self.subject)
@@ -218,7 +202,7 @@ class SequenceBench(Bench):
             inputs = self._drawn(chance, memory, trace[-1][0] if trace else None, held)
             if inputs is None or self.valid >= self.cases:
                 break
-            if len(self.tried) < AFTER_COUNTING:
+            if len(self.tried) < tuning.AFTER_COUNTING:
                 self.tried.append(inputs)
             memory = self._one(inputs, trace)
         self.runs += bool(trace)
@@ -226,7 +210,7 @@ class SequenceBench(Bench):
             each.run_hits = [
                 n + (now > was) for n, now, was in zip(each.run_hits, each.hits, before[name], strict=True)
             ]
-        if len(self._first) * self._steps < ASKED_AGAIN:
+        if len(self._first) * self._steps < tuning.ASKED_AGAIN:
             self._first.append([inputs for inputs, _ in trace])
 
     def _one(self, inputs: Inputs, trace: Trace, *, drawn: bool = True) -> dict[str, Value]:
@@ -260,19 +244,19 @@ class SequenceBench(Bench):
         self, chance: random.Random, memory: dict[str, Value], last: Inputs | None, held: float
     ) -> Inputs | None:
         """Inputs that the assumptions allow beside this memory; None where none are found."""
-        for attempt in range(STEP_TRIES):
+        for attempt in range(tuning.STEP_TRIES):
             if last is not None and held and chance.random() < held:
                 inputs = {**last, **memory}
             else:
                 edge = next(self._edges_left, None) if chance.random() < 0.5 else None
-                data = Source(chance.randbytes(CASE_BYTES))
+                data = Source(chance.randbytes(tuning.CASE_BYTES))
                 inputs = edge or self.as_given(
                     self.generator.case(data, lambda drawn: self.blamed({**drawn, **memory}), self._aims)
                 )
                 inputs = {**self._nudged(chance, inputs, memory, last), **memory}
             if self.assumed(inputs):
                 return inputs
-            self.rejected += attempt == STEP_TRIES - 1
+            self.rejected += attempt == tuning.STEP_TRIES - 1
         return None
 
     def _nudged(self, chance: random.Random, inputs: Inputs, memory: dict[str, Value], last: Inputs | None) -> Inputs:
@@ -335,7 +319,7 @@ class SequenceBench(Bench):
     def _shrunk(self, name: str) -> Case | None:
         each = self.guarantees[name]
         assert each.failure is not None
-        end = min(self.end or math.inf, time.monotonic() + SHRINKING_SECONDS)
+        end = min(self.end or math.inf, time.monotonic() + tuning.SHRINKING_SECONDS)
         best = self.traces[name]
         alone = self._again([best[-1][0]], name)
         best = alone if alone is not None else self._shorter(best, name, end)
@@ -360,7 +344,7 @@ class SequenceBench(Bench):
     def _shorter(self, best: Trace, name: str, end: float) -> Trace:
         """The run without the steps that it does not take, as far as they are found one by one from its end."""
         tries, at = 0, len(best) - 2
-        while at >= 0 and tries < SHRINKING_TRIES and time.monotonic() < end:
+        while at >= 0 and tries < tuning.SHRINKING_TRIES and time.monotonic() < end:
             tries += 1
             shorter = self._again([i for k, (i, _) in enumerate(best) if k != at], name)
             best = shorter if shorter is not None else best

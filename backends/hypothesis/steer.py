@@ -25,23 +25,12 @@ from avow.isolation.scout import Sight
 from avow.isolation.subject import SubjectFailed
 from avow.language.sorts import Sort, StringSort
 
+from . import tuning
 from .convention import Case
 from .generate import Impossible, Inputs, Source
 from .knobs import Knob, at, knobs, put
 from .pools import STEP, variants
 from .shrink import OutOfTime
-from .tuning import (
-    ASKED_TO_COUNT,
-    CASE_BYTES,
-    COUNTED_FROM,
-    SAMPLED,
-    STEERED,
-    STEERED_FROM,
-    STEERED_PLACES,
-    STEERED_STEPS,
-    STEERED_TEXTS,
-    TURNS,
-)
 
 if TYPE_CHECKING:
     from .bench import Bench
@@ -64,7 +53,7 @@ class Steering:
     look: Look
     allowed: Callable[[Inputs], bool]
     doubles: bool
-    left: int = STEERED
+    left: int = tuning.STEERED
     ways: list[Inputs] = field(default_factory=list)
     """Cases that were steered from."""
     _turned: Counter[Any] = field(default_factory=Counter)
@@ -77,7 +66,7 @@ class Steering:
         every = list(bases)
         waiting = deque(base for base, seen in zip(every, self._looked(every), strict=True) if self._new(seen))
         waiting.extend(every[: not waiting])  # nothing is compared of any: perhaps of what is beside one
-        while waiting and self.left > 0 and len(self.ways) < STEERED_FROM:
+        while waiting and self.left > 0 and len(self.ways) < tuning.STEERED_FROM:
             base = waiting.popleft()
             self.ways.append(base)
             found: list[Inputs] = []
@@ -118,7 +107,7 @@ class Steering:
         said = [side for sight in seen.values() for side in (sight.right, sight.left) if isinstance(side, str)]
         for knob in texts:
             for text in dict.fromkeys(said):
-                if self._turned[knob.path] < STEERED_TEXTS and not self._turned[knob.path, text]:
+                if self._turned[knob.path] < tuning.STEERED_TEXTS and not self._turned[knob.path, text]:
                     self._turned[knob.path] += 1
                     self._turned[knob.path, text] += 1
                     yield from (put(base, knob, other) for other in (text, *variants(text)))
@@ -126,7 +115,7 @@ class Steering:
             yield from self._parts(base, knob, seen)
             longer = [int(n) for s in seen.values() for n in (s.left, s.right) if isinstance(n, Fraction)]
             for length in dict.fromkeys(n for n in longer if 2 < n <= 5000):
-                if self._turned[knob.path, length] == 0 and self._turned[knob.path, "long"] < STEERED_TEXTS:
+                if self._turned[knob.path, length] == 0 and self._turned[knob.path, "long"] < tuning.STEERED_TEXTS:
                     self._turned[knob.path, length] += 1
                     self._turned[knob.path, "long"] += 1
                     yield from (put(base, knob, "x" * (length + more)) for more in (-1, 0, 1))
@@ -141,7 +130,7 @@ class Steering:
             for part in _wanted(other):
                 for text in dict.fromkeys(_with_part(now, one, part)):
                     turned = (knob.path, "part", text)
-                    if text != now and not self._turned[turned] and self._turned[turned[:2]] < STEERED_TEXTS:
+                    if text != now and not self._turned[turned] and self._turned[turned[:2]] < tuning.STEERED_TEXTS:
                         self._turned[turned] += 1
                         self._turned[turned[:2]] += 1
                         case = put(base, knob, text)
@@ -154,13 +143,13 @@ class Steering:
 
     def _numbers(self, base: Inputs, numbers: list[Knob], seen: Seen) -> Iterator[Inputs]:
         apart = {place: d for place, sight in seen.items() if (d := _difference(sight)) is not None}
-        wanted = {place for place in apart if self._turned[place[0]] < STEERED_PLACES}
+        wanted = {place for place in apart if self._turned[place[0]] < tuning.STEERED_PLACES}
         if not wanted:
             return
         moving = self._moving(base, numbers, {place: apart[place] for place in wanted})
         for place, ways in moving.items():
             for knob, slope in ways:
-                if self._turned[place[0]] < STEERED_PLACES and self._turned[place, knob.path] < 2:
+                if self._turned[place[0]] < tuning.STEERED_PLACES and self._turned[place, knob.path] < 2:
                     self._turned[place[0]] += 1
                     self._turned[place, knob.path] += 1
                     yield from self._steered(base, knob, place, apart[place], slope)
@@ -172,7 +161,7 @@ class Steering:
         """The numbers with which each difference moves, and how fast."""
         found: dict[Place, list[tuple[Knob, Fraction]]] = {place: [] for place in apart}
         still = list(numbers)
-        for turn in TURNS:
+        for turn in tuning.TURNS:
             tried = [(knob, self._by(base, knob, Fraction(turn))) for knob in still]
             made = [(knob, case) for knob, case in tried if case is not None]
             moved: set[Knob] = set()
@@ -195,7 +184,7 @@ class Steering:
         now = at(base, knob)
         assert isinstance(now, int | Fraction)
         here, goal = Fraction(now), Fraction(now)
-        for _ in range(STEERED_STEPS):
+        for _ in range(tuning.STEERED_STEPS):
             goal = _short(here - apart / slope)
             near = goal if not knob.whole else Fraction(round(goal))
             case = put(base, knob, number) if (number := knob.fitting(near)) is not None else None
@@ -346,7 +335,7 @@ def _beside(number: Fraction, whole: bool, doubles: bool) -> Iterator[Fraction]:
 def learn(bench: Bench) -> None:
     """Inputs are made from what the subject compares with in a few drawn cases, and from what its modules hold."""
     with suppress(Impossible):
-        drawn = [_drawn(bench, random.Random(k).randbytes(CASE_BYTES)) for k in range(SAMPLED)]
+        drawn = [_drawn(bench, random.Random(k).randbytes(tuning.CASE_BYTES)) for k in range(tuning.SAMPLED)]
         allowed = [case for case in drawn if bench.meets(case)] or drawn
         bench.generator = bench.generating(*constants(bench.looked([], allowed)))
 
@@ -371,11 +360,11 @@ def _steer(bench: Bench) -> None:
         def looked(cases: Sequence[Inputs], start: list[Inputs] = start) -> list[tuple[Sight, ...]]:
             return bench.looked(start, cases)
 
-        steering = Steering(bench.turned, looked, bench.allowed, bench.doubles, STEERED // len(starts))
+        steering = Steering(bench.turned, looked, bench.allowed, bench.doubles, tuning.STEERED // len(starts))
         for cases in steering.cases([_drawn(bench, b""), *bench.tried]):
             bench.tried_at(start, [*map(bench.as_given, cases)])
-        for base in steering.ways[:COUNTED_FROM]:
-            times = repeats(bench.looked(start, [base] * ASKED_TO_COUNT, on=True), bench.counted)
+        for base in steering.ways[: tuning.COUNTED_FROM]:
+            times = repeats(bench.looked(start, [base] * tuning.ASKED_TO_COUNT, on=True), bench.counted)
             if times > counted:
                 counted = times
                 bench.repeat(start, base, times)

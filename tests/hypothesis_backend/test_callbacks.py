@@ -12,7 +12,7 @@ from helpers import some
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits
-from avow.backends.hypothesis import callbacks
+from avow.backends.hypothesis import tuning
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.evidence.record import CASE
 from avow.pipeline.evidence_keys import surroundings
@@ -75,7 +75,7 @@ MUTANTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", some(sorted(MUTANTS), 3))
 def test_mutants_are_refuted_by_a_run(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(callbacks, "SHRINKING_SECONDS", 40.0)  # on a busy machine too
+    monkeypatch.setattr(tuning, "SHRINKING_SECONDS", 40.0)  # on a busy machine too
     given = job(tmp_path / "w", "rospy", ROS1.replace(*MUTANTS[name]), "{cases: 300}")
     found = asked(given)["high"]
     assert found.verdict is Verdict.REFUTED, found
