@@ -414,27 +414,11 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
     for name in ("low", "medium", "high", "marks_inspected"):
         target = by_name[f"radiationSensor.{name}"]
         if name == "medium":
-            records.append(
-                evidence(
-                    target,
-                    Verdict.REFUTED,
-                    "hoare",
-                    counterexample=Counterexample(
-                        (("in.r", "120"), ("out.radiationStatus", "green")), "guarantee medium demands orange"
-                    ),
-                )
-            )
+            at = Counterexample((("in.r", "120"), ("out.radiationStatus", "green")), "guarantee medium demands orange")
+            records.append(evidence(target, Verdict.REFUTED, "hoare", counterexample=at))
         else:
-            records.append(
-                evidence(
-                    target,
-                    details={
-                        "outline": "{0 ≤ r}\nif r < 120 then\n  {0 ≤ r < 120}\n  status := green\n{status = green}"
-                    }
-                    if name == "low"
-                    else {},
-                )
-            )
+            outline = "{0 ≤ r}\nif r < 120 then\n  {0 ≤ r < 120}\n  status := green\n{status = green}"
+            records.append(evidence(target, details={"outline": outline} if name == "low" else {}))
         records.append(
             evidence(
                 target,
@@ -444,6 +428,7 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
                 details={"mutation": {"score": 0.92, "killed": 46, "mutants": 50}},
             )
         )
+    no_dafny = "dafny is not installed; install it with: apt install dafny"
     records += [
         evidence(
             by_name["agent.next_waypoint"],
@@ -452,12 +437,7 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
             bound={"states": 55584, "waypoints": 13},
             hypotheses=("percepts are edge-triggered", "waypoints are those of waypoints.csv"),
         ),
-        evidence(
-            by_name["agent.next_waypoint"],
-            Verdict.NOT_RUN,
-            "dafny",
-            summary="dafny is not installed; install it with: apt install dafny",
-        ),
+        evidence(by_name["agent.next_waypoint"], Verdict.NOT_RUN, "dafny", summary=no_dafny),
         evidence(
             by_name["agent.inspect_here"],
             Verdict.CHECKED,
@@ -466,19 +446,9 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
             bound={"states": 55584, "waypoints": 13},
             summary="holds, but its trigger is never reached for waypoints 6 to 12",
         ),
-        evidence(
-            by_name["agent.inspect_here"],
-            Verdict.NOT_RUN,
-            "dafny",
-            summary="dafny is not installed; install it with: apt install dafny",
-        ),
+        evidence(by_name["agent.inspect_here"], Verdict.NOT_RUN, "dafny", summary=no_dafny),
         evidence(by_name["agent.exit_on_danger"], Verdict.CHECKED, "ajpf", bound={"states": 55584, "waypoints": 13}),
-        evidence(
-            by_name["agent.exit_on_danger"],
-            Verdict.NOT_RUN,
-            "dafny",
-            summary="dafny is not installed; install it with: apt install dafny",
-        ),
+        evidence(by_name["agent.exit_on_danger"], Verdict.NOT_RUN, "dafny", summary=no_dafny),
         evidence(
             by_name["navigation.arrives"],
             Verdict.REFUTED,

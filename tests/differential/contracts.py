@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from differential.inputs import COLOURS, grid, literal
@@ -33,6 +32,7 @@ from differential.language import (
     var,
     widen,
 )  # fmt: skip
+from differential.near_misses import near_miss
 from differential.oracle import truth
 
 Leaf = tuple[list[Expr], list[tuple[str, str]], Expr]
@@ -414,10 +414,10 @@ class Writer:
             guarantees.update({name: self.spiced(g) for name, g in guarantees.items()})
         chance = self.rng.random()
         if chance < 0.5:
-            made.program = self.mutated(made.program)
+            made.program = near_miss(made.program, self.rng, self.given)
         elif chance < 0.75:
             name = self.rng.choice(sorted(guarantees))
-            guarantees[name] = self.mutated(guarantees[name])
+            guarantees[name] = near_miss(guarantees[name], self.rng, self.given)
         return made
 
     # -- operators that programs do not have
@@ -454,66 +454,3 @@ class Writer:
             return widen(absolute, sort)
         other = self.pick(e, self.constant(sort))
         return (self.pick("min", "max"), sort, e, other)
-
-    # -- near misses
-
-    def mutated(self, tree: Any) -> Any:
-        """The tree with one change, if there is something to change."""
-        spots = list(self.spots(tree, ()))
-        if not spots:
-            return tree
-        at, new = self.rng.choice(spots)
-        return _replaced(tree, at, new)
-
-    def spots(self, tree: Any, at: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], Any]]:
-        if not isinstance(tree, tuple | list):
-            return
-        if isinstance(tree, tuple) and tree:
-            yield from ((at, new) for new in self.changes(tree))
-        for k, part in enumerate(tree):
-            yield from self.spots(part, (*at, k))
-
-    def changes(self, e: Any) -> Iterator[Any]:
-        match e:
-            case ("num", sort, value):
-                step = Fraction(1, 8) if sort == "R" and self.rng.random() < 0.5 else Fraction(1)
-                new = value + self.pick(step, -step)
-                if sort != "N" or new >= 0:
-                    yield ("num", sort, new)
-            case ("cmp", sort, comparators, *items) if items[0][1] in "RIN":
-                k = self.rng.randrange(len(comparators))
-                swap = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "<=", "!=": ">"}[comparators[k]]
-                if len(comparators) == 1 or swap not in {"<=", "<"} or comparators[0][0] == "<":
-                    yield ("cmp", sort, (*comparators[:k], swap, *comparators[k + 1 :]), *items)
-            case ("and", sort, *parts):
-                yield ("or", sort, *parts)
-                yield parts[0]
-            case ("or", sort, *parts):
-                yield ("and", sort, *parts)
-            case ("-", sort, a, b):
-                yield ("-", sort, b, a)
-                yield ("+", sort, a, b)
-            case ("/", "R", a, b):
-                yield ("*", "R", a, b)
-            case ("elem", "C", name):
-                yield ("elem", "C", self.rng.choice([c for c in COLOURS if c != name]))
-            case ("if", test, then, otherwise):
-                yield ("if", test, otherwise, then)
-                yield ("if", ("not", "B", test), then, otherwise)
-            case ("in", sort, *parts):
-                yield ("!in", sort, *parts)
-            case ("seq", sort, a, b, *more):
-                yield ("seq", sort, b, a, *more)
-            case ("var", sort, name):
-                others = [v for v in self.given(sort) if v[2] != name and v[2].startswith("in.")]
-                if name.startswith("in.") and others:
-                    yield self.rng.choice(others)
-            case ("update", name, at, new):
-                yield ("update", name, arith("+", at, num(1)), new)
-
-
-def _replaced(tree: Any, at: tuple[int, ...], new: Any) -> Any:
-    if not at:
-        return new
-    parts = [_replaced(p, at[1:], new) if k == at[0] else p for k, p in enumerate(tree)]
-    return tuple(parts) if isinstance(tree, tuple) else parts

@@ -33,6 +33,7 @@ from avow.language.load import check_text
 from differential.contracts import Contract, Writer
 from differential.inputs import grid
 from differential.language import FIELDS, INPUTS, OUTPUTS, rcl
+from differential.near_misses import near_miss
 from differential.oracle import Stops, Table, run, truth
 
 State = Mapping[str, Any]
@@ -187,7 +188,8 @@ def test_a_wrong_oracle_or_translator_would_be_caught(tmp_path: Path) -> None:
         made = written(seed)
         if made is None:
             continue
-        other = Writer(seed + 1000).mutated(made.program)
+        writer = Writer(seed + 1000)
+        other = near_miss(made.program, writer.rng, writer.given)
         right = made.imp
         made.program = other
         job = make_job(tmp_path / str(seed), made.rcl, "n", {"program": "n.imp"}, {"n.imp": right}, "hoare")

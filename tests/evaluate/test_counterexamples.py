@@ -9,7 +9,7 @@ from avow.formulas.values import FunctionValue
 from avow.language.sorts import NATURAL
 from avow.language.terms import And, Compare, Implies, Not
 
-from .test_evaluate import K, M, N, P, X, eq, exists, forall, given, holds, nat, unique
+from .terms import K, M, N, P, X, eq, exists, forall, given, holds, nat, unique
 
 
 def test_a_counterexample_has_the_names_of_the_formula() -> None:

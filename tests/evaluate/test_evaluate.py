@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import random
 from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
-from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.evaluation.compiler import finite_values, member_of
@@ -21,10 +19,6 @@ from avow.language.sorts import (
     NATURAL,
     REAL,
     STRING,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
     OpaqueSort,
     SequenceSort,
     SetSort,
@@ -33,7 +27,6 @@ from avow.language.sorts import (
 )
 from avow.language.terms import (
     And,
-    Apply,
     Arithmetic,
     Compare,
     Construct,
@@ -47,77 +40,40 @@ from avow.language.terms import (
     Negative,
     Not,
     Or,
-    Quantified,
-    Quantifier,
-    Role,
     SequenceRange,
     SequenceTerm,
     SetTerm,
     Term,
     TupleTerm,
-    Variable,
     Widen,
 )
 from avow.solving.questions import entails
 
-COMMAND = DataSort("Command", (Constructor("move", (REAL, REAL)), Constructor("inspect", (NATURAL,))))
-COLOUR = EnumSort("Colour", ("red", "orange", "green"))
-PLACE = FunctionSort((REAL, REAL), BOOL)
-MAP = FunctionSort((REAL, REAL, NATURAL), BOOL)
-NUMBERS = FunctionSort((NATURAL,), BOOL)
-HEIGHT = FunctionSort((REAL,), REAL)
-
-
-def bound(name: str, sort: Sort = REAL) -> Variable:
-    return Variable(Role.BOUND, name, sort)
-
-
-def given(name: str, sort: Sort) -> Variable:
-    return Variable(Role.INPUT, name, sort)
-
-
-X, Y, A, B, N, M = bound("x"), bound("y"), bound("a"), bound("b"), bound("n", NATURAL), bound("m", NATURAL)
-P, Q = given("p", PLACE), given("q", PLACE)
-H, K = given("h", HEIGHT), given("k", NUMBERS)
-C = given("c", COMMAND)
-
-
-def real(value: int | str) -> Literal:
-    return Literal(Fraction(value), REAL)
-
-
-def nat(value: int) -> Literal:
-    return Literal(value, NATURAL)
-
-
-def forall(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.FORALL, variables, body)
-
-
-def exists(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.EXISTS, variables, body)
-
-
-def unique(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.UNIQUE, variables, body)
-
-
-def holds(function: Variable, *arguments: Term) -> Apply:
-    assert isinstance(function.sort, FunctionSort)
-    return Apply(function, arguments, function.sort.result)
-
-
-def points(*tuples: tuple[int, ...], default: bool = False) -> FunctionValue:
-    return FunctionValue({tuple(map(Fraction, t)): not default for t in tuples}, default)
-
-
-def eq(left: Term, right: Term) -> Compare:
-    return Compare("==", left, right)
-
-
-def plus(left: Term, right: Term) -> Arithmetic:
-    return Arithmetic("+", left, right, left.sort)
-
+from .terms import (
+    COLOUR,
+    COMMAND,
+    A,
+    B,
+    C,
+    H,
+    K,
+    N,
+    P,
+    Q,
+    X,
+    Y,
+    bound,
+    eq,
+    exists,
+    forall,
+    given,
+    holds,
+    nat,
+    plus,
+    points,
+    real,
+    unique,
+)
 
 # -- known answers -----------------------------------------------------------------------------------------------------
 
@@ -402,113 +358,3 @@ def test_negative_and_widen() -> None:
     i = given("i", INTEGER)
     assert evaluate(Negative(i, INTEGER), {"in.i": 3}) == -3
     assert evaluate(Arithmetic("/", Widen(i, REAL), real(2), REAL), {"in.i": 3}) == Fraction(3, 2)
-
-
-# -- agreement with Z3 -------------------------------------------------------------------------------------------------
-
-
-def _random_formula(rng: random.Random, depth: int, scope: tuple[Variable, ...]) -> Term:
-    numbers = [v for v in scope if v.sort == REAL]
-    naturals = [v for v in scope if v.sort == NATURAL]
-
-    def number() -> Term:
-        choice = rng.random()
-        if numbers and choice < 0.7:
-            return rng.choice(numbers)
-        if choice < 0.8:
-            return holds(H, rng.choice(numbers) if numbers else real(rng.randrange(3)))
-        if numbers and choice < 0.87:
-            return Arithmetic(rng.choice("+-"), rng.choice(numbers), real(rng.randrange(1, 3)), REAL)
-        return real(rng.randrange(3))
-
-    def natural() -> Term:
-        if naturals and rng.random() < 0.7:
-            return rng.choice(naturals)
-        if naturals and rng.random() < 0.4:
-            return plus(rng.choice(naturals), nat(1))
-        return nat(rng.randrange(3))
-
-    if depth == 0:
-        commands = [C, *(v for v in scope if v.sort == COMMAND)]
-        colours: list[Term] = [EnumValue("red", COLOUR), *(v for v in scope if v.sort == COLOUR)]
-        match rng.randrange(10):
-            case 7:
-                return eq(rng.choice(commands), rng.choice(commands))
-            case 8:
-                return eq(rng.choice(colours), EnumValue(rng.choice(COLOUR.members), COLOUR))
-            case 9:
-                return In(number(), SetTerm((real(0), real(2)), SetSort(REAL)))
-            case 0 | 1:
-                return holds(rng.choice((P, Q)), number(), number())
-            case 2:
-                return holds(K, natural())
-            case 3:
-                return Compare(rng.choice(("==", "!=")), number(), number())
-            case 4:
-                return Compare(rng.choice(("<", "<=", ">", ">=")), number(), number())
-            case 5:
-                return eq(rng.choice(commands), Construct("move", (number(), number()), COMMAND))
-            case _:
-                return eq(rng.choice(commands), Construct("inspect", (natural(),), COMMAND))
-    match rng.randrange(8):
-        case 0 | 1:
-            return And(tuple(_random_formula(rng, depth - 1, scope) for _ in range(rng.randrange(2, 4))))
-        case 2:
-            return Or(tuple(_random_formula(rng, depth - 1, scope) for _ in range(2)))
-        case 3:
-            return Implies(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
-        case 4:
-            return Iff(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
-        case 5:
-            return Not(_random_formula(rng, depth - 1, scope))
-        case _:
-            fresh = tuple(
-                bound(f"v{len(scope) + k}", rng.choice((REAL, REAL, REAL, NATURAL, NATURAL, COMMAND, COLOUR)))
-                for k in range(rng.randrange(1, 3))
-            )
-            body = _random_formula(rng, depth - 1, scope + fresh)
-            return Quantified(rng.choice(list(Quantifier)), fresh, body)
-
-
-def _random_values(rng: random.Random) -> dict[str, Value]:
-    def relation() -> FunctionValue:
-        default = rng.random() < 0.2
-        table = {
-            (Fraction(rng.randrange(3)), Fraction(rng.randrange(3))): rng.random() < 0.8
-            for _ in range(rng.randrange(4))
-        }
-        return FunctionValue(table, default)
-
-    move = Data("move", (Fraction(rng.randrange(3)), Fraction(rng.randrange(3))))
-    return {
-        "in.p": relation(),
-        "in.q": relation(),
-        "in.h": FunctionValue({(Fraction(rng.randrange(3)),): Fraction(rng.randrange(3))}, Fraction(rng.randrange(3))),
-        "in.k": FunctionValue({(rng.randrange(3),): rng.random() < 0.7}, rng.random() < 0.2),
-        "in.c": rng.choice((move, Data("inspect", (rng.randrange(3),)))),
-    }
-
-
-@pytest.mark.parametrize("seed", some(range(4), 1, slow=1))
-def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
-    from avow.solving.replay import replay
-
-    rng = random.Random(seed)
-    variables = {"in.p": P, "in.q": Q, "in.h": H, "in.k": K, "in.c": C}
-    evaluated = compared = true = 0
-    for _ in range(60):
-        formula = _random_formula(rng, 3, ())
-        values = _random_values(rng)
-        try:
-            mine = evaluate(formula, values)
-        except NotEvaluable:
-            continue
-        evaluated += 1
-        theirs = replay([formula], {v: values[n] for n, v in variables.items()}, effort=1000)
-        if theirs is not None:
-            compared += 1
-            true += bool(mine)
-            assert mine is theirs, (seed, formula, values)
-    assert evaluated > 30
-    assert compared > 25
-    assert 0 < true < compared

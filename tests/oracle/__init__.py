@@ -18,5 +18,6 @@ Apart from it and from `drawn`, on purpose, stand
 - oracles whose subject is no typed term: `differential.oracle` (what was written, before Avow's parser saw it, and
   programs that run), FRET's intervals in
   `fretish.test_meaning`;
-- generators of terms that no text of a contract would be: those of `evaluate.test_evaluate` and `logic.test_one_point`.
+- generators of terms that no text of a contract would be: those of `evaluate.test_against_z3` and
+  `logic.test_one_point`.
 """
