@@ -8,7 +8,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from rosmonitoring.processes import LONGEST, a_free_port, answers, running, wait_for
+from helpers import wait_for
+from rosmonitoring.processes import LONGEST, a_free_port, answers, running
 
 from avow.backend_kit.programs.callbacks import SECOND, Event, driver
 from avow.system.load import load_system
