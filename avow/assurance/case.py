@@ -126,8 +126,9 @@ def conclude(facts: Facts) -> Case:
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])
     supposed = suppositions(facts, views, relied, closed, whole, said)
+    by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}
     requirements = tuple(
-        held(requirement_view(r, names, standings, statuses), closed[r.id], views, relied, supposed, facts)
+        held(requirement_view(r, names, standings, statuses), closed[r.id], by_id, relied, supposed, titles)
         for r in facts.requirements
     )
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
@@ -144,7 +145,6 @@ def conclude(facts: Facts) -> Case:
     basis = whole.claims if not closed else {n for c in closed.values() for n in c.claims}
     weakened = weakenings(views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id)
     changed = changes(facts.baseline, requirements, views, supposed, weakened)
-    by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}
     weakest = weakest_of(basis, by_id, relied, titles)
     following = weakest_of(basis, by_id, relied, titles, beside=weakest.node) if weakest else None
     if weakest is not None:

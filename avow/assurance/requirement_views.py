@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from avow.assurance.answers import How, Supposition, WeakestEvidence
 from avow.assurance.closure import Closed
-from avow.assurance.facts import Facts
 from avow.assurance.first_screen import tone_of, weakest_of
 from avow.assurance.model import ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
@@ -53,31 +52,29 @@ def requirement_view(
 def held(
     view: RequirementView,
     closed: Closed,
-    views: Sequence[ObligationView],
+    views: Mapping[str, ObligationView],
     relied: Mapping[str, Relied],
     supposed: Sequence[Supposition],
-    facts: Facts,
+    titles: Mapping[str, str],
 ) -> RequirementView:
-    """A requirement with how it holds, its colour, its weakest evidence and what it supposes."""
-    by_id = {v.id: v for v in views}
+    """A requirement with how it holds, its colour, weakest evidence and what it supposes; `titles` are the nodes'."""
     mine = [s for s in supposed if view.id in s.needed_by]
     how = How.DERIVED
     if not view.status.supports or closed.failing or view.unknown_names or any(s.expired for s in mine):
         how = How.OPEN
     elif not view.formal:
         how = How.ARGUED
-    elif any(by_id[name].status is not Status.PROVED for name in view.obligations):
+    elif any(views[name].status is not Status.PROVED for name in view.obligations):
         how = How.BOUNDED
     under = [relied[name] for name in closed.claims if name in relied and relied[name].status in EVIDENCE]
-    titles = {node.name: node.title for node in facts.nodes}
     return replace(
         view,
         how=how,
         tone=tone_of(how, under, mine),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=(_failing_of(closed, by_id, titles) if how is How.OPEN else None)
-        or weakest_of(closed.claims, by_id, relied, titles),
+        weakest_evidence=(_failing_of(closed, views, titles) if how is How.OPEN else None)
+        or weakest_of(closed.claims, views, relied, titles),
         supposes=tuple(s.key for s in mine),
     )
 

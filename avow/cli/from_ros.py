@@ -8,14 +8,22 @@ import shutil
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
 from avow.base.tuning.running import DRAFT_MESSAGES
-
-if TYPE_CHECKING:
-    from avow.ros.bags import Carried
-    from avow.ros.listing import Listing
+from avow.base.tuning.sizes import ROS_GRAPH_BYTES
+from avow.language.format import format_text
+from avow.language.lexer import KEYWORDS
+from avow.ros.bags import Carried, NoBag, Origin, carried, messages
+from avow.ros.calls import is_part, parts_of, with_calls
+from avow.ros.dds import LOOPBACK, ask_domain, domain_of
+from avow.ros.definitions import Definitions
+from avow.ros.drafting import Given, draft, is_plumbing, watch
+from avow.ros.listing import EVERY_SIDE, Listed, Listing, NoListing, parse_listing
+from avow.ros.master import ask_master
+from avow.ros.names import is_name
+from avow.ros.sources import definitions
 
 _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
 _DOMAIN = re.compile(r"(dds(?::\d+)?)(?:@([\w.:-]+))?\Z")
@@ -23,16 +31,6 @@ _DOMAIN = re.compile(r"(dds(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
     """Write the system's folder. Raises Rejected for what cannot be read; nothing is written then."""
-    from avow.base.files import write
-    from avow.language.format import format_text
-    from avow.language.lexer import KEYWORDS
-    from avow.ros.bags import NoBag, Origin, carried, messages
-    from avow.ros.calls import parts_of, with_calls
-    from avow.ros.definitions import Definitions
-    from avow.ros.drafting import Given, draft, watch
-    from avow.ros.listing import Listing
-    from avow.ros.sources import definitions
-
     known, wrong = definitions((), distro)
     if wrong:
         raise Rejected(*wrong)
@@ -81,11 +79,6 @@ _OPTION = (
 
 
 def _listing(graph: str) -> Listing:
-    from avow.base.tuning.sizes import ROS_GRAPH_BYTES
-    from avow.ros.dds import LOOPBACK, ask_domain, domain_of
-    from avow.ros.listing import NoListing, parse_listing
-    from avow.ros.master import ask_master
-
     try:
         if _MASTER.match(graph):
             return ask_master(os.environ.get("ROS_MASTER_URI", "http://localhost:11311") if graph == "ros1" else graph)
@@ -103,9 +96,6 @@ def _listing(graph: str) -> Listing:
 
 def _together(listing: Listing | None, found: Carried) -> Listing:
     """What a bag says of who publishes, beside what a graph does. Where neither does, all of it is one node's."""
-    from avow.ros.drafting import is_plumbing
-    from avow.ros.listing import Listed, Listing
-
     nodes = listing.nodes if listing is not None else ()
     known = {topic for node in nodes for topic in node.publishes}
     callers: dict[str, list[str]] = {}
@@ -122,15 +112,11 @@ def _together(listing: Listing | None, found: Carried) -> Listing:
 
 def _asks(topic: str) -> bool:
     """Whether a topic is the part of calls that their server hears."""
-    from avow.ros.calls import is_part
-
     return is_part(topic) and topic.endswith(("/_request", "/_goal"))
 
 
 def _sound(listing: Listing) -> Listing:
     """Without names and types that ROS would not take: they come from a file."""
-    from avow.ros.listing import EVERY_SIDE, Listed, Listing
-    from avow.ros.names import is_name
 
     def kept(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in dict.fromkeys(names) if name.startswith("/") and is_name(name))

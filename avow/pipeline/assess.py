@@ -13,9 +13,12 @@ from pathlib import Path
 from doit.exceptions import TaskError
 
 from avow import __version__
+from avow.assurance.case import as_of_earlier, conclude
 from avow.assurance.certification import KernelRun
-from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
-from avow.assurance.signed import KEYS
+from avow.assurance.codec import SCHEMA, read_case
+from avow.assurance.facts import facts_of_system
+from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
+from avow.assurance.signed import KEYS, newest_signed
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, is_intact, read_regular, read_text, sha256, write
@@ -23,6 +26,9 @@ from avow.base.git import head
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
+from avow.calculus.composition import composed
+from avow.calculus.notation import Written, write_goal
+from avow.calculus.obligations import discharged_by
 from avow.evidence.continuity import continuity
 from avow.evidence.currency import as_of_now
 from avow.evidence.heads import index_path, read_index
@@ -30,12 +36,17 @@ from avow.evidence.ledger import Ledger, ledger_of
 from avow.evidence.record import CASE, RETRY
 from avow.evidence.signing import private_key
 from avow.pipeline import check as checking
+from avow.pipeline.doctor import findings
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, Run, asked_seconds, signing_key
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
+from avow.system.folding import seen
+from avow.system.graph import dataflow
+from avow.system.graph_svg import sheet
+from avow.system.plan import System
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +141,6 @@ def case_of(assessment: Assessment) -> Case:
 
 def build(assessment: Assessment) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
-    from avow.assurance.case import conclude
-    from avow.assurance.facts import facts_of_system
-    from avow.assurance.signed import newest_signed
-    from avow.pipeline.derivations import derivation_views, discharging, graph_svg
-
     system, workspace = assessment.surveyed.system, assessment.workspace
     ledger = ledger_of(workspace.ledger(system.name))
     plan = system.plan
@@ -162,14 +168,14 @@ def build(assessment: Assessment) -> Case:
                     "seed": "0, unless the plan says otherwise",
                 },
             ),
-            derivations=derivation_views(system),
-            discharging=discharging(system),
+            derivations=_derivation_views(system),
+            discharging=_discharging(system),
             methods=_methods(assessment),
             tools=_tools(),
             discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
             digests={path: sha256(data) for path, data in texts.items()},
             ledger_head=ledger.head,
-            graph_svg=graph_svg(system),
+            graph_svg=_picture(system),
             sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
             baseline=newest_signed(workspace.signed, system.name)[0],
             kernel=kernel_run(entries, workspace.root, system, assessment.run),
@@ -208,8 +214,6 @@ def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
 
 
 def _tools() -> tuple[ToolInfo, ...]:
-    from avow.pipeline.doctor import findings
-
     return tuple({f.tool: ToolInfo(f.tool, f.version, f.install) for f in findings()}.values())
 
 
@@ -223,8 +227,6 @@ def _key(assessment: Assessment) -> str:
     surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
     keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
     damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
-    from avow.assurance.codec import SCHEMA
-
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
     entries = counting_now(ledger, root, surveyed.system, assessment.run)
@@ -328,8 +330,6 @@ def write_overview(state: State) -> None:
 def mark_earlier(state: State) -> None:
     """Say in reports of an earlier state, in every format, that they are. Once the system can be read again they are
     not as they were written, and therefore written anew. Raises OSError."""
-    from avow.assurance.case import as_of_earlier
-    from avow.assurance.codec import read_case
     from avow.report import render_all
 
     for name in earlier(state):
@@ -351,3 +351,36 @@ def _mark_pages(folder: Path) -> None:
         before, body, after = read_text(page, "utf-8", errors="replace").partition("<body>")
         if body and not after.lstrip().startswith(mark):
             write(page, before + body + mark + after)
+
+
+def _derivation_views(system: System) -> tuple[Derivation, ...]:
+    """One for each goal of the plan, the whole system's last; with the rule instances that they are made of."""
+    return tuple(_view(system, write_goal(goal)) for goal in composed(system).goals)
+
+
+def _discharging(system: System) -> dict[str, tuple[str, ...]]:
+    """Of each node the obligations (without the system) that settle its assumptions."""
+    found = discharged_by(composed(system))
+    return {node: tuple(hypothesis.name for hypothesis in behind) for node, behind in found.items()}
+
+
+def _picture(system: System) -> str:
+    """The dataflow picture."""
+    return sheet(seen(system, dataflow(system)))
+
+
+def _view(system: System, written: Written) -> Derivation:
+    wiring = {node.name for node in system.contract.nodes if node.relay}  # nothing of it has to be shown
+    return Derivation(
+        written.name,
+        written.rule,
+        written.text,
+        written.conclusion,
+        tuple(name for name in written.premises if name not in wiring),
+        tuple(
+            SideCondition(c.text, f"{system.name}/{c.obligation}" if c.obligation else "")
+            for c in written.side_conditions
+        ),
+        written.latex,
+        written.conditional,
+    )

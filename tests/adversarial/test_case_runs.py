@@ -28,7 +28,7 @@ from avow.calculus.composition import compose
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.pipeline import recheck
-from avow.pipeline.derivations import derivation_views, discharging
+from avow.pipeline.assess import _derivation_views, _discharging
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, catalogue, compose_work
 from avow.system.load import load_system
@@ -137,8 +137,8 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
             keys={(r.obligation, r.method): r.key for r in records},
             today=TODAY,
             run=RUN,
-            derivations=derivation_views(system),
-            discharging=discharging(system),
+            derivations=_derivation_views(system),
+            discharging=_discharging(system),
         )
     )
     return case, [*calculus, *(r for r in kept if r not in good)]

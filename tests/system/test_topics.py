@@ -190,12 +190,12 @@ def test_a_connection_to_one_publisher_does_not_silence_the_other(tmp_path: Path
 
 def test_what_stands_for_a_topic_has_nothing_to_show(tmp_path: Path) -> None:
     """It is wiring: no claim is made of it, no derivation rests on it, and no method can be given to it."""
-    from avow.pipeline.derivations import derivation_views
+    from avow.pipeline.assess import _derivation_views
     from avow.pipeline.work import catalogue
 
     system = make(tmp_path, two("out.w <= 0"))
     found = catalogue(system)
     assert {o.node for o in found.obligations} == {"joy", "auto", "wheels", "system"}
-    assert all("topic_cmd" not in view.premises for view in derivation_views(system))
+    assert all("topic_cmd" not in view.premises for view in _derivation_views(system))
     with pytest.raises(Rejected, match="topic_cmd"):
         make(tmp_path, two("out.w <= 0"), "nodes: {topic_cmd: {methods: [hoare: {program: x}]}}")
