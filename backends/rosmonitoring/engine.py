@@ -21,7 +21,7 @@ from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
 from .coverage import Tally
-from .latest import Doubts, SoFar, judge_latest, not_met
+from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
 from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
@@ -31,7 +31,7 @@ from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
 from .waiting_answers import accused, ask, doubtful, judge_answer, saw, sure, withdraw
-from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text, verdict_of
+from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text
 from .wires import MappingError
 from .word import Message, Word, follow, word_of
 

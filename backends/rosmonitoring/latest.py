@@ -60,12 +60,12 @@ class SoFar:
         self.unsure = self.unsure or watched.truth is None
 
 
-def blamed(
-    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool, so_far: SoFar | None,
-    event: int,
+def _blamed(
+    watched: Watched, truth: bool | None, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool,
+    so_far: SoFar | None = None, event: int = 0,
 ) -> tuple[Fault, str] | None:  # fmt: skip
     """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
-    if watched.truth is None:
+    if truth is None:
         return None
     said = watched.said
     if watched.clause.kind is ClauseKind.ASSUMPTION:
@@ -82,6 +82,15 @@ def blamed(
     # an assumption about the node's own answers is judged with the answer, of which a part may be missing
     late = (a.steps for a in assumptions if a.steps is not None and a.steps.answers and a.steps.stepped != event)
     return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
+
+
+def verdict_of(
+    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
+) -> Fault | str | None:
+    """Whether a clause that remembers nothing held of values; None where nobody can tell."""
+    truth = watched.truth_of(values, solver)
+    blame = None if truth else _blamed(watched, truth, assumptions, values, solver)
+    return "held" if truth else blame and blame[0]
 
 
 def judge_latest(
@@ -137,7 +146,8 @@ def not_met(
     if monitor.doubts is not None and monitor.doubts.ask(monitor, watched, values, event):
         return
     tally.judged += 1
-    blame = blamed(watched, monitor.assumptions, values, monitor.solver, monitor.so_far, monitor.events)
+    known = monitor.assumptions, values, monitor.solver, monitor.so_far, monitor.events
+    blame = _blamed(watched, watched.truth, *known)
     if blame is None:
         tally.undecided += 1
         tally.reason = tally.reason or UNSURE

@@ -12,7 +12,7 @@ from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge, judge_open
 from avow.formulas.values import Value, show
-from avow.language.contract import Clause, ClauseKind
+from avow.language.contract import Clause
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
 
@@ -191,29 +191,9 @@ def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown
             bindings = watched.witness(known) or {}
     except NotEvaluable:
         pass
-    values = tuple((n, _shorten(show(snapshot[n]))) for n in watched.names if n in snapshot)
+    texts = ((n, show(snapshot[n])) for n in watched.names if n in snapshot)
+    values = tuple((n, text if len(text) <= 200 else text[:199] + "…") for n, text in texts)
     return values, tuple((n, show(v)) for n, v in bindings.items())
-
-
-def _shorten(text: str) -> str:
-    return text if len(text) <= 200 else text[:199] + "…"
-
-
-def verdict_of(
-    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool
-) -> Fault | str | None:
-    """Whether a clause held of values; None where nobody can tell."""
-    truth = watched.truth_of(values, solver)
-    if truth is None:
-        return None
-    if truth:
-        return "held"
-    if watched.clause.kind is ClauseKind.ASSUMPTION:
-        return Fault.ASSUMPTION
-    for assumed in assumptions:
-        if all(n in values for n in assumed.names) and assumed.truth_of(values, solver) is False:
-            return Fault.EXCUSED
-    return Fault.GUARANTEE
 
 
 def open_verdict(

@@ -5,7 +5,8 @@
 - `stepping`: clauses with memory a step at a time, so that all runs of a system can be walked through;
 - `runs`: all runs of one node, and the game that it plays against its inputs;
 - `sanity`: what the sanity verdicts about a small contract have to be;
-- `rml`: RML as a monitor executes it, read by a grammar of its own.
+- `rml`: RML as a monitor executes it, read by a grammar of its own;
+- `rosmonitoring`: what ROSMonitoring takes as a configuration.
 
 The first five read terms and contracts, and use none of Avow's evaluation, compilation to cells or solving.
 

@@ -13,10 +13,10 @@ from typing import Any
 import jsonschema
 import pytest
 from oracle.rml_reader import read
+from oracle.rosmonitoring import problems
 
 from avow.backend_kit.protocol import Backend, Limits
 from avow.backends.rosmonitoring import BACKEND
-from avow.backends.rosmonitoring.configuration import problems
 from avow.base.verdict import Outcome, Verdict
 from avow.system.load import load_system
 from avow.system.plan import System

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 import yaml
+from oracle.rosmonitoring import problems
 
-from avow.backends.rosmonitoring.configuration import configuration, dotted_type, identifier, of_system, problems
+from avow.backends.rosmonitoring.configuration import configuration, dotted_type, identifier, of_system
 from avow.backends.rosmonitoring.options import setup
 from avow.base.diagnostics import Rejected
 from avow.system.load import load_system

@@ -18,9 +18,10 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped
 from avow.ros.dds import dds_topic, dds_type, settings
 from avow.ros.definitions import Definitions
+from avow.ros.sources import distribution
 
 from ..tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LIVE_PAUSE
-from .dds_types import DIAGNOSTICS, NO_DDS, Types, filled
+from .dds_types import NO_DDS, Types, filled
 from .graphs import Inbox, Status
 
 
@@ -118,7 +119,7 @@ class Dds:
         from cyclonedds.util import duration
 
         kind = "diagnostic_msgs/DiagnosticArray"
-        types = Types(Definitions(DIAGNOSTICS))
+        types = Types(Definitions(distribution("humble")))  # the same in every ROS 2 there has been
         qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(DDS_TAKEN))
         try:
             entity = Topic(self._participant, dds_topic(topic), types.struct(kind))
@@ -130,7 +131,7 @@ class Dds:
         def say(statuses: Sequence[Status]) -> None:
             made = [status.message(system) for status in statuses]
             header = {"stamp": divmod(time.time_ns(), 10**9), "frame_id": ""}
-            writer.write(filled(types, DIAGNOSTICS, kind, {"header": header, "status": made}))
+            writer.write(filled(types, kind, {"header": header, "status": made}))
 
         return say
 

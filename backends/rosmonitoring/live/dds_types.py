@@ -14,26 +14,9 @@ from avow.ros.definitions import Array, Definitions, Field, Message, Nested, Sca
 
 NO_DDS = Diagnostic("MON305", "DDS needs the packages cyclonedds and rosbags", hint="pip install 'avow[dds]'")
 
-DIAGNOSTICS = {
-    message.name: message
-    for name, text in (
-        ("std_msgs/Header", "time stamp\nstring frame_id"),
-        ("diagnostic_msgs/KeyValue", "string key\nstring value"),
-        (
-            "diagnostic_msgs/DiagnosticStatus",
-            "byte level\nstring name\nstring message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values",
-        ),
-        ("diagnostic_msgs/DiagnosticArray", "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status"),
-    )
-    for message in (parse_message(text, name),)
-}
-"""What verdicts are said as; the same in every ROS 2 there has been."""
-
 _TIME = {
-    "time": Message("builtin_interfaces/Time", (Field("sec", Scalar("int32")), Field("nanosec", Scalar("uint32")))),
-    "duration": Message(
-        "builtin_interfaces/Duration", (Field("sec", Scalar("int32")), Field("nanosec", Scalar("uint32")))
-    ),
+    kind: parse_message("int32 sec\nuint32 nanosec", f"builtin_interfaces/{kind.capitalize()}")
+    for kind in ("time", "duration")
 }
 _EMPTY = Message("", (Field("structure_needs_at_least_one_member", Scalar("uint8")),))
 """What ROS 2 makes of a message without fields."""
@@ -62,7 +45,7 @@ class Types:
             return f"nothing defines {kind}"
         if lacking := self._known.missing(message):
             return f"nothing defines {lacking[0]}, of which {kind} is made"
-        wide = [name for name in self._names(message) for f in self._message(name).fields if _has_wide(f.wire)]
+        wide = [name for name in self._names(message) for f in self.message(name).fields if _has_wide(f.wire)]
         return f"{wide[0]} has a wstring, which cannot be read here" if wide else ""
 
     def struct(self, kind: str) -> Any:
@@ -79,7 +62,7 @@ class Types:
         return made
 
     def _new(self, kind: str) -> Any:
-        fields = {_attribute(f.name): self._idl(f.wire) for f in self._message(kind).fields}
+        fields = {_attribute(f.name): self._idl(f.wire) for f in self.message(kind).fields}
         return self._make(f"{kind.rpartition('/')[2]}_", dds_type(kind), fields)
 
     def reader(self, kind: str) -> Callable[[bytes], dict[str, Any]]:
@@ -101,10 +84,8 @@ class Types:
                 case Array(item=item, length=length):
                     return base.ARRAY, (desc(item), length)
 
-        names = self._names(self._message(kind))
-        made: dict[str, Any] = {
-            _full(n): ([], [(f.name, desc(f.wire)) for f in self._message(n).fields]) for n in names
-        }
+        names = self._names(self.message(kind))
+        made: dict[str, Any] = {_full(n): ([], [(f.name, desc(f.wire)) for f in self.message(n).fields]) for n in names}
         store.register({name: parts for name, parts in made.items() if name not in store.fielddefs})
         plain, full = plainer(store.fielddefs), _full(kind)
 
@@ -117,7 +98,7 @@ class Types:
 
         return read
 
-    def _message(self, kind: str) -> Message:
+    def message(self, kind: str) -> Message:
         for time in _TIME.values():
             if time.name == kind:
                 return time
@@ -129,7 +110,7 @@ class Types:
         """The types that a message is made of, and its own."""
 
         def inner(name: str) -> Iterator[str]:
-            for each in self._message(name).fields:
+            for each in self.message(name).fields:
                 wire = each.wire.item if isinstance(each.wire, Array) else each.wire
                 if isinstance(wire, Nested):
                     yield wire.name
@@ -164,7 +145,7 @@ class Raw:
         self.sample_info: Any = None
 
 
-def filled(types: Types, known: Mapping[str, Message], kind: str, values: Mapping[str, Any]) -> Any:
+def filled(types: Types, kind: str, values: Mapping[str, Any]) -> Any:
     """A message to be said, of plain values."""
 
     def made(wire: Wire, value: Any) -> Any:
@@ -174,11 +155,11 @@ def filled(types: Types, known: Mapping[str, Message], kind: str, values: Mappin
             case Scalar():
                 return value
             case Nested(name=name):
-                return filled(types, known, name, value)
+                return filled(types, name, value)
             case Array(item=item):
                 return [made(item, one) for one in value]
 
-    return types.struct(kind)(**{_attribute(f.name): made(f.wire, values[f.name]) for f in known[kind].fields})
+    return types.struct(kind)(**{_attribute(f.name): made(f.wire, values[f.name]) for f in types.message(kind).fields})
 
 
 def _attribute(name: str) -> str:

@@ -154,31 +154,26 @@ def graph_of(
 ) -> Graph:
     """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. `warn`: as `Ros1`.
     Raises Rejected."""
-    calls = [topic for topic in running.topics if is_part(topic)]
-    graph = _graph(
-        text, [topic for topic in running.topics if topic not in calls], running, host, warn, enforce=enforce
-    )
-    for topic in calls:
-        graph.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
-    return graph
-
-
-def _graph(
-    text: str, heard: list[str], running: Session, host: str, warn: Callable[[str], None], *, enforce: bool
-) -> Graph:
+    heard = [topic for topic in running.topics if not is_part(topic)]
+    filters = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
     kind, _, address = text.partition(":")
-    topics = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
+    graph: Graph
     if kind == "ros1":
-        return Ros1(master_of(text), heard, host, topics, warn)
-    if enforce:
+        graph = Ros1(master_of(text), heard, host, filters, warn)
+    elif enforce:
         raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
-    if kind == "dds":
+    elif kind == "dds":
         try:
             domain = domain_of(text)
         except ValueError as error:
             raise Rejected(Diagnostic("MON303", str(error), hint="--live dds:0")) from None
-        return Dds(domain, heard, running.kinds, running.known, host)
-    if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
-        return Rosbridge(address, heard)
-    hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"
-    raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
+        graph = Dds(domain, heard, running.kinds, running.known, host)
+    elif kind == "rosbridge" and address.startswith(("ws://", "wss://")):
+        graph = Rosbridge(address, heard)
+    else:
+        hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"
+        raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
+    for topic in running.topics:
+        if topic not in heard:
+            graph.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
+    return graph
