@@ -14,7 +14,6 @@ from avow.ros.calls import is_part
 
 from .options import Setup, same_topic
 from .pace import duration
-from .rules import Choice, Fields
 
 _ESCAPE = re.compile(r"[^A-Za-z0-9_]|_(?=x[0-9a-f]+_)")
 
@@ -39,8 +38,7 @@ def _topic_types(setup: Setup) -> dict[str, str]:
     """Topic → dotted type, each once: the contract's topics, then those that only the plan names."""
     found: dict[str, str] = {}
     seen: set[str] = set()
-    rules = (rule for rule in setup.rules.values() if isinstance(rule, Fields | Choice) and rule.kind)
-    for name, kind in [*setup.named, *((rule.topic, rule.kind) for rule in rules)]:
+    for name, kind in [*setup.named, *((rule.topic, rule.kind) for rule in setup.carried.values() if rule.kind)]:
         if same_topic(name) not in seen and not is_part(name):  # ROSMonitoring listens to topics
             seen.add(same_topic(name))
             found[name] = dotted_type(kind)

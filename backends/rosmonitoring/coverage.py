@@ -51,11 +51,6 @@ class Tally:
         return self.judged - self.undecided
 
     @property
-    def share(self) -> float:
-        """The share of what was published that was decided."""
-        return self.decided / self.asked if self.asked else 0.0
-
-    @property
     def asked(self) -> int:
         """Answers that were to be decided."""
         return self.published - self.supposed

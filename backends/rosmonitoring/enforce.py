@@ -14,7 +14,6 @@ from avow.formulas.formula import free_variables
 from avow.language.terms import Role
 
 from .options import Setup, same_topic
-from .rules import Choice, Fields
 from .watched import Fault
 
 if TYPE_CHECKING:
@@ -45,8 +44,8 @@ def filtered(setups: Iterable[Setup]) -> frozenset[str]:
             hint = "answers: {by: arrival, because: …}"
             wrong.append(Diagnostic("MON307", f"{name}: which input an answer answered shows only later", hint=hint))
         for clause in setup.node.guarantees:
-            rules = (setup.rules.get(v.qualified) for v in free_variables(clause.formula) if v.role is Role.OUTPUT)
-            topics = {same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice)}
+            outputs = {v.qualified for v in free_variables(clause.formula) if v.role is Role.OUTPUT}
+            topics = {same_topic(rule.topic) for name, rule in setup.carried.items() if name in outputs}
             if topics & setup.filtered and len(topics) > 1:
                 text = f"{name}.{clause.name} speaks of several topics, {' and '.join(sorted(topics))}"
                 hint = "the first of them would be passed on before it can be judged"

@@ -28,7 +28,7 @@ from avow.ros.bags import Origin
 from .judged import as_float
 from .options import Setup, same_topic
 from .reading import Reader, reader
-from .rules import Choice, Fields, heard_through
+from .rules import heard_through
 from .traces import read_trace
 from .tuning import TIMELINE_EVENTS, WORD_LENGTH
 from .watched import Fault, Violation, time_text
@@ -83,10 +83,8 @@ def signals(
     every = max(1, -(-events // TIMELINE_EVENTS))
     readers: dict[str, list[tuple[Setup, str, Sort, Reader]]] = {}
     for setup in setups:
-        for name, rule in setup.rules.items():
-            if isinstance(rule, Fields | Choice):
-                one = (setup, name, rule.variable.sort, reader(rule))
-                readers.setdefault(same_topic(rule.topic), []).append(one)
+        for name, rule in setup.carried.items():
+            readers.setdefault(same_topic(rule.topic), []).append((setup, name, rule.variable.sort, reader(rule)))
     found: dict[tuple[str, str], Columns[Stretch]] = {}
     start = end = ""
     marked = marks.events()

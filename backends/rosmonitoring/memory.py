@@ -33,7 +33,7 @@ from .coverage import Tally
 from .options import Setup
 from .pace import Leeway
 from .pairing import time_of
-from .rules import Choice, Fields, Previous
+from .rules import Previous
 from .watched import Watched, trigger_of
 from .word import untold
 
@@ -364,7 +364,8 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
 
 def triggers_of(setup: Setup, names: tuple[str, ...], *, every: bool = False) -> tuple[str, ...]:
     """The variables whose publication makes a clause judged, of those that it speaks of."""
-    direct = tuple(n for n in names if isinstance(setup.rules[n], Fields | Choice))
+    carried = setup.carried
+    direct = tuple(n for n in names if n in carried)
     outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
     sources = tuple(rule.source for n in names if isinstance(rule := setup.rules[n], Previous))
     if outputs and setup.when != "every" and not every:

@@ -68,18 +68,12 @@ def whole(value: int) -> Fraction:
 
 @functools.lru_cache(maxsize=65536)
 def _fraction(text: str) -> Fraction:
-    if len(text) > NUMBER_LENGTH or abs(_exponent(text)) > NUMBER_LENGTH:
-        raise NotANumber
     front, point, digits = text.partition(".")
     try:
+        if len(text) > NUMBER_LENGTH or abs(int(text.lower().partition("e")[2] or 0)) > NUMBER_LENGTH:
+            raise NotANumber
         if point and text.isascii() and digits.isdecimal() and front.removeprefix("-").isdecimal():
             return Exact(int(front + digits), 10 ** len(digits))  # as nearly all are
         return Exact(text)
     except (ValueError, ZeroDivisionError):
         raise NotANumber from None
-
-
-def _exponent(text: str) -> int:
-    mantissa, _, exponent = text.lower().partition("e")
-    del mantissa
-    return int(exponent) if exponent else 0

@@ -63,10 +63,10 @@ class Observed:
     def variable(self) -> Variable:
         return self.port.variable
 
-
-def kind_of(at: Observed) -> str:
-    """The type of the topic's messages, as far as it is said."""
-    return at.message if isinstance(at.message, str) else at.message.name
+    @property
+    def kind(self) -> str:
+        """The type of the topic's messages, as far as it is said."""
+        return self.message if isinstance(self.message, str) else self.message.name
 
 
 def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
@@ -96,7 +96,7 @@ def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
     wires, names = _wires(at, paths, each, entry, take)
     rule = Fields(
         variable, at.topic, paths, names, hold, each, default, initial, wires, at.known if wires else NOTHING_KNOWN,
-        take, gaps, kind_of(at),
+        take, gaps, at.kind,
     )  # fmt: skip
     _check_gaps(rule)
     return rule
@@ -238,7 +238,7 @@ def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Val
     for word in names.values():
         if word not in known:
             raise Wrong(f"{sort.name} has no constructor {word!r}", "values", hint=suggest(word, known))
-    return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, kind_of(at))
+    return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, at.kind)
 
 
 def _field(at: Observed, way: FieldPath, sort: Sort, *place: str | int) -> Wire | None:

@@ -94,22 +94,24 @@ class Setup:
         return by == own if by in known else None
 
     @property
+    def carried(self) -> dict[str, Fields | Choice]:
+        """The rules of the variables that messages carry."""
+        return {name: rule for name, rule in self.rules.items() if isinstance(rule, Fields | Choice)}
+
+    @property
     def kinds(self) -> dict[str, str]:
         """The types of the topics that are listened to (without their leading slash), as far as they are said."""
-        rules = (rule for rule in self.rules.values() if isinstance(rule, Fields | Choice))
-        return {same_topic(rule.topic): rule.kind for rule in rules if rule.kind}
+        return {same_topic(rule.topic): rule.kind for rule in self.carried.values() if rule.kind}
 
     @property
     def heard(self) -> frozenset[str]:
         """The inputs that messages carry."""
-        rules = self.rules.items()
-        return frozenset(n for n, r in rules if isinstance(r, Fields | Choice) and n.startswith(f"{Role.INPUT}."))
+        return frozenset(name for name in self.carried if name.startswith(f"{Role.INPUT}."))
 
     @property
     def topics(self) -> tuple[str, ...]:
         """The names of the topics that are listened to, each once, in the order of the variables."""
-        names = (rule.topic for rule in self.rules.values() if isinstance(rule, Fields | Choice))
-        return tuple(dict.fromkeys(names))
+        return tuple(dict.fromkeys(rule.topic for rule in self.carried.values()))
 
 
 def setup(
@@ -267,13 +269,12 @@ class _Work:
     def filtered(self) -> frozenset[str]:
         """The topics of the outputs that are filtered: messages have to carry these."""
         names = said(self.options).get("filter", ())
-        outputs = [n for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)]
+        outputs = {n: r for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)}
         for at, name in enumerate(names):
             if name not in outputs:
                 hint = suggest(str(name), outputs)
                 self.wrong(f"filter: {name} is no output that messages carry", "filter", at, hint=hint)
-        rules = (self.rules[name] for name in names if name in outputs)
-        return frozenset(same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice))
+        return frozenset(same_topic(outputs[name].topic) for name in names if name in outputs)
 
     def heard(self, key: str, entry: Any) -> list[str]:
         """The variables of an option that messages carry; the others are faults."""
@@ -436,13 +437,10 @@ class _Work:
         if known[name].sort != port.sort:
             raise Wrong(f"{source} is of another type", "previous")
         edge = self.edge(port)
-        initial = self.literal(entry, "initial", port.variable)
+        initial = literal(entry["initial"], port.sort, "initial") if entry.get("initial") is not None else None
         if initial is None and edge is not None and edge.delayed:
             initial = self.first(port, edge)
         return Previous(port.variable, f"out.{name}", initial)
-
-    def literal(self, entry: Mapping[str, Any], key: str, variable: Variable) -> Value | None:
-        return literal(entry[key], variable.sort, key) if entry.get(key) is not None else None
 
     def edge(self, port: Port) -> Edge | None:
         if port.role is not Role.INPUT:

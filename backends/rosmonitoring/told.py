@@ -34,9 +34,9 @@ def readable(setup: Setup, path: Path, where: Origin) -> tuple[Diagnostic, ...]:
         return ()
     found = carried(path, where)
     kinds = setup.kinds
-    rules = (rule for name, rule in setup.rules.items() if name.startswith(f"{Role.OUTPUT}."))
-    said = {same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice)}
-    known = {same_topic(setup.rules[n].topic): who for n, (_, who) in setup.shared.items()}  # type: ignore[union-attr]
+    topics = {name: same_topic(rule.topic) for name, rule in setup.carried.items()}
+    said = {topic for name, topic in topics.items() if name.startswith(f"{Role.OUTPUT}.")}
+    known = {topics[name]: who for name, (_, who) in setup.shared.items()}
     hint = "model the others too, or say under `ros: {nodes: …}` how they are called: whose message it was is not told"
     for topic, who in found.publishers.items():
         modelled = known.get(same_topic(topic))

@@ -65,15 +65,11 @@ def fits(sort: Sort, wire: Wire, known: Definitions) -> bool:
             return fits(item, inner, known)
         case TupleSort(items=items), Array(item=inner, length=length):
             return length == len(items) and all(fits(item, inner, known) for item in items)
-        case TupleSort(items=items, labels=labels), Nested() if labels:
+        case TupleSort(items=items, labels=labels), Nested():
             named = dict(record(wire, known))
-            return all(
-                label in named and fits(item, named[label], known) for label, item in zip(labels, items, strict=True)
-            )
-        case TupleSort(items=items), Nested():
-            parts = record(wire, known)
+            parts = [named.get(label) for label in labels or named]
             return len(parts) == len(items) and all(
-                fits(item, part, known) for item, (_, part) in zip(items, parts, strict=True)
+                part is not None and fits(item, part, known) for item, part in zip(items, parts, strict=True)
             )
         case _:  # functions, algebraic types: the plan says how
             return False

@@ -8,6 +8,7 @@ been a step that went by unseen.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -22,7 +23,7 @@ from avow.language.terms import Role
 from .options import Setup, same_topic
 from .pairing import Answers, Pairing, time_of
 from .reading import Reader
-from .rules import Choice, Fields, Previous, of_latest
+from .rules import Previous, of_latest
 from .tuning import KEYS_KEPT
 
 if TYPE_CHECKING:
@@ -104,7 +105,8 @@ class Word:
         """The run is over. Inputs that nothing has answered yet are in order among themselves."""
         left = {topic: queue for topic, queue in self._queues.items() if queue}
         if self.answers.by == "order":
-            late = [t for t, queue in left.items() if self.topics[t] or self._answer_follows(queue)]
+            answer = -math.inf if self._answer is None else self._answer
+            late = [t for t, q in left.items() if self.topics[t] or any(time_of(m.event) <= answer for m in q)]
             counts = " and ".join(f"{self.counts.get(topic, 0)} of {topic}" for topic in self.topics)
             self.uneven = (
                 f"messages: {counts}: which belong together is not told by their order (`answers: {{by: order}}`)"
@@ -122,9 +124,6 @@ class Word:
     def waits(self, event: int) -> bool:
         """Whether a message of this event or an earlier one belongs to no step yet."""
         return any(queue and queue[0].index <= event for queue in self._queues.values())
-
-    def _answer_follows(self, queue: deque[Message]) -> bool:
-        return self._answer is not None and any(time_of(message.event) <= self._answer for message in queue)
 
     def _key(self, message: Message) -> object:
         topic, output = message.topic, self.topics[message.topic]
@@ -217,11 +216,12 @@ def word_of(setup: Setup, clauses: Iterable[Clause]) -> Word | None:
 def topics_of(setup: Setup, names: Iterable[str]) -> dict[str, bool]:
     """The topics that carry some variables; whether these are outputs."""
     sources = [rule.source if isinstance(rule := setup.rules.get(name), Previous) else name for name in names]
-    found: dict[str, bool] = {}
-    for name in sorted(sources):
-        if isinstance(rule := setup.rules.get(name), Fields | Choice):
-            found[same_topic(rule.topic)] = name.startswith(f"{Role.OUTPUT}.")
-    return found
+    carried = setup.carried
+    return {
+        same_topic(carried[name].topic): name.startswith(f"{Role.OUTPUT}.")
+        for name in sorted(sources)
+        if name in carried
+    }
 
 
 def untold(setup: Setup, clause: Clause) -> str:
@@ -235,7 +235,7 @@ def untold(setup: Setup, clause: Clause) -> str:
         return "it speaks of limits in seconds, which are judged by `answers: {by: arrival}` alone"
     if setup.when != "outputs":
         return f"it speaks of other steps, and with `when: {setup.when}` not every message is of one step"
-    names = [name for name, rule in setup.rules.items() if isinstance(rule, Fields | Choice)]
+    names = setup.carried
     if not setup.shared.keys().isdisjoint(names):
         return "it speaks of other steps, and several nodes publish a topic: whose step a message is of is not told"
     sides = [topics_of(setup, [n for n in names if n.startswith(f"{Role.OUTPUT}.") is out]) for out in (False, True)]

@@ -192,6 +192,15 @@ def test_the_papers_command_mapping(make_system: Callable[..., System]) -> None:
     assert "no row" in str(value_of(system, "out.cmd", {**event, "id": 9}))
 
 
+def test_a_cell_that_is_no_number_is_told(make_system: Callable[..., System]) -> None:
+    """Also with a letter e in it, as an exponent has: the monitor died with a traceback."""
+    cell = {"table": "waypoints", "key": "id", "by": "id"}
+    move = [{**cell, "column": "x"}, {**cell, "column": "y"}]
+    rows = {"scenario": {"waypoints": [{"id": 3, "x": "west", "y": 0}]}}
+    system = make_system(RCL, {"out.cmd": {"constructor": "command", "move": move}}, plan=rows)
+    assert "not a number" in str(value_of(system, "out.cmd", {"topic": "cmd", "command": "move", "id": 3}))
+
+
 @pytest.mark.parametrize(
     ("mapping", "words"),
     [

@@ -92,9 +92,7 @@ def code(sort: EnumSort | DataSort, name: str) -> int:
 def constant(value: Value, sort: Sort) -> Symbol:
     """A known value. Raises NotRml."""
     match value:
-        case bool():
-            return Scalar(Number(Fraction(value)))
-        case int() | Fraction():
+        case bool() | int() | Fraction():
             return Scalar(Number(Fraction(value)))
         case Element(name=name) if isinstance(sort, EnumSort):
             return Scalar(Number(Fraction(code(sort, name))))
