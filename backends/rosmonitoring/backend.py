@@ -29,7 +29,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "7"
+    version = "8"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING

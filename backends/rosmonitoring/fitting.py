@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from avow.base.plain import listed
-from avow.language.sorts import BOOL, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
+from avow.language.sorts import EnumSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.ros.definitions import INTEGERS, Array, Definitions, Message, Nested, Scalar, Wire
 
 from .rules import FieldPath
 from .tuning import CANDIDATES_SHOWN
-from .wires import fits
+from .wires import fits, parts_of
 
 
 class Undecided(Exception):  # noqa: N818 - it is what was found wrong
@@ -24,13 +24,6 @@ class Undecided(Exception):  # noqa: N818 - it is what was found wrong
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
         self.hint = hint
-
-
-def parts_of(sort: Sort) -> tuple[Sort, ...]:
-    """What fields are wanted for: a function's parameters (and result), or the value itself."""
-    if isinstance(sort, FunctionSort):
-        return sort.parameters if sort.result == BOOL else (*sort.parameters, sort.result)
-    return (sort,)
 
 
 def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str, str]) -> tuple[FieldPath, ...]:

@@ -33,10 +33,10 @@ from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message,
 from avow.system.graph import dataflow
 from avow.system.plan import Endpoint, Located, Plan, System, Table
 
-from .fitting import SOURCES, Undecided, decide, parts_of, words
+from .fitting import SOURCES, Undecided, decide, words
 from .reading import shown
 from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
-from .wires import MappingError, converter, fits
+from .wires import MappingError, converter, fits, parts_of
 
 
 class Wrong(Exception):  # noqa: N818 - it is what was found wrong
@@ -263,7 +263,7 @@ def _argument(plan: Plan, place: Any, constructor: str, at: int) -> Argument:
         return path(place)
     if not isinstance(place, Mapping) or not {"table", "key", "by", "column"} <= place.keys():
         raise Wrong("a field, or {table, key, by, column}, is wanted", constructor, at)
-    table = table_of(plan, place["table"], constructor, at)
+    table = named_table(plan, place["table"], constructor, at)
     for column in (place["by"], place["column"]):
         if column not in table.columns:
             hint = suggest(column, table.columns)
@@ -275,7 +275,7 @@ def _argument(plan: Plan, place: Any, constructor: str, at: int) -> Argument:
     return Lookup(table.name, path(place["key"]), rows, Scalar(held) if held is not None else None)
 
 
-def table_of(plan: Plan, name: str, *place: str | int) -> Table:
+def named_table(plan: Plan, name: str, *place: str | int) -> Table:
     """A table of the scenario. Raises Wrong."""
     scenario = plan.scenario
     known = [t.name for t in scenario.tables] if scenario else []

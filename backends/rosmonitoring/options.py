@@ -35,12 +35,12 @@ from .observing import (
     literal,
     mapping_of,
     method_of,
+    named_table,
     observe,
     published,
     said,
     show_entry,
     sources,
-    table_of,
     written_out,
 )
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
@@ -49,7 +49,7 @@ from .reading import from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise
 from .traces import carried
 from .tuning import DECIDED_SHARE
-from .wires import MappingError
+from .wires import MappingError, parts_of, table_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -398,25 +398,21 @@ class _Work:
         found = self.interpretation(port)
         if found is None or not isinstance(port.sort, FunctionSort):
             raise Wrong("the plan's scenario does not interpret it", "scenario")
-        table, columns = table_of(self.system.plan, found[0], "scenario"), found[1]
-        relation = port.sort.result == BOOL
-        sorts = port.sort.parameters if relation else (*port.sort.parameters, port.sort.result)
+        table, columns = named_table(self.system.plan, found[0], "scenario"), found[1]
         entry = self.mapping().get(port.variable.qualified)
         elsewhere: Value = False
-        if not relation:
+        if port.sort.result != BOOL:
             if not isinstance(entry, Mapping) or "elsewhere" not in entry:
                 raise Wrong("a total function needs its value `elsewhere`", "scenario")
             elsewhere = literal(entry["elsewhere"], port.sort.result, "elsewhere")
         at = [table.columns.index(c) for c in columns]
         wires = self.wires(port, entry) or [None] * len(at)
-        points: dict[tuple[Value, ...], Value] = {}
+        parts = list(zip(at, parts_of(port.sort), wires, strict=True))
         try:
-            for row in table.rows:
-                values = tuple(from_text(row[k], s, wire) for k, s, wire in zip(at, sorts, wires, strict=True))
-                points[values if relation else values[:-1]] = True if relation else values[-1]
+            points = [tuple(from_text(row[k], sort, wire) for k, sort, wire in parts) for row in table.rows]
         except MappingError as error:
             raise Wrong(f"table {table.name}: {error}", "scenario") from None
-        return Constant(port.variable, FunctionValue(points, elsewhere))
+        return Constant(port.variable, FunctionValue(table_of(points, port.sort), elsewhere))
 
     def wires(self, port: Port, entry: Any) -> tuple[Wire | None, ...]:
         """The types in which a port's messages carry its values: a map of decimals, read by a node as binary numbers,

@@ -24,7 +24,7 @@ from avow.ros.definitions import Array, Wire
 
 from .numbers import Decimal
 from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup
-from .wires import Convert, MappingError, NoReading, converter, of_type, show, taken
+from .wires import Convert, MappingError, NoReading, converter, meant, of_type, parts_of, show, table_of, taken
 
 Message = Mapping[str, Any]
 Reader = Callable[[Message, Value | None], Value]
@@ -92,17 +92,9 @@ def _scalar(rule: Fields, sort: Sort) -> Reader:
         return _with_default(rule, lambda message, old: tuple([read(at(message, p)) for p, read in pairs]))
     path, read = rule.paths[0], made[0]
     if len(path) == 1 and isinstance(path[0], str) and path[0] not in ENVELOPE:
-        return _with_default(rule, _one_field(path, path[0], read))
+        name = path[0]  # the most frequent reader of all
+        return _with_default(rule, lambda message, old: read(message[name] if name in message else at(message, path)))
     return _with_default(rule, lambda message, old: read(at(message, path)))
-
-
-def _one_field(path: FieldPath, name: str, read: Convert) -> Reader:
-    """The most frequent reader of all."""
-
-    def of_field(message: Message, old: Value | None) -> Value:
-        return read(message[name] if name in message else at(message, path))
-
-    return of_field
 
 
 def _with_default(rule: Fields, read: Reader) -> Reader:
@@ -121,10 +113,8 @@ def _with_default(rule: Fields, read: Reader) -> Reader:
 
 
 def _function(rule: Fields, sort: FunctionSort) -> Reader:
-    relation = sort.result == BOOL
-    sorts = sort.parameters if relation else (*sort.parameters, sort.result)
-    seen = rule.hold is Hold.SEEN
-    points = _points(rule, sorts)
+    relation, seen = sort.result == BOOL, rule.hold is Hold.SEEN
+    points = _points(rule, parts_of(sort))
     if not relation and rule.elsewhere is None:
         raise ValueError("the options demand `elsewhere` of a function with a result")
     elsewhere: Value = False if relation or rule.elsewhere is None else rule.elsewhere
@@ -132,7 +122,7 @@ def _function(rule: Fields, sort: FunctionSort) -> Reader:
     def read(message: Message, old: Value | None) -> Value:
         found = points(message)
         before = old.table if seen and isinstance(old, FunctionValue) else {}
-        fresh = {(p if relation else p[:-1]): (True if relation else p[-1]) for p in found}
+        fresh = table_of(found, sort)
         if isinstance(old, FunctionValue) and all(before.get(k) == v for k, v in fresh.items()) and seen:
             return old
         return FunctionValue({**before, **fresh}, elsewhere)
@@ -177,8 +167,7 @@ def _choice(rule: Choice) -> Reader:
 
     def read(message: Message, old: Value | None) -> Value:
         raw = at(message, tag)
-        word = names.get(raw, raw) if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
-        word = names.get(word, word) if word is not None else None
+        word = meant(raw, names)
         if word not in shapes:
             raise MappingError(f"{show(raw)} is none of the constructors {', '.join(shapes)}")
         return Data(word, tuple([argument(message) for argument in shapes[word]]))

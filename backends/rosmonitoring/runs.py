@@ -34,7 +34,7 @@ from .pairing import Answers
 from .rml.translate import translate
 from .session import Session
 from .told import readable
-from .traces import digest_trace, read_trace
+from .traces import Recorded, digest_trace, read_trace
 from .tuning import VIOLATIONS_KEPT
 from .watched import Fault, Violation
 
@@ -44,7 +44,7 @@ def discharge(job: Job, traces: Sequence[str], limits: Limits) -> Report:
     found, faults = setup(job.system, job.node, job.method.options)
     if faults:
         return Report.alike(job, Verdict.ERROR, told(job, faults), "avow monitor", __version__)
-    refused = _refused(job, found)
+    refused = translate(found, [job.clause(o) for o in job.obligations]).refused
     if not traces:
         outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
         return Report(outcomes, "avow monitor", __version__)
@@ -67,10 +67,6 @@ def discharge(job: Job, traces: Sequence[str], limits: Limits) -> Report:
         if drawn := _timelines(job, found, runs, obligation):
             outcome.details["timeline"] = drawn
     return Report(outcomes, "avow monitor", __version__, (), logs)
-
-
-def _refused(job: Job, found: Setup) -> dict[str, str]:
-    return translate(found, [job.clause(o) for o in job.obligations]).refused
 
 
 def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: Obligation) -> Outcome:
@@ -352,30 +348,24 @@ def steps(job: Job, traces: Iterable[str]) -> Iterator[tuple[Mapping[str, Value]
         path = inside(job.root, name)
         if path is None:
             raise Rejected(Diagnostic("MON102", f"traces: {name!r} is outside the system's folder"))
-        watched = _Steps(replace(found, answers=ARRIVAL, fresh={}, rates={}))
-        events = read_trace(path, origin(job.system), watched.monitor.listens)
-        yield tuple(step for recorded in events if (step := watched.step(recorded.event)) is not None)
+        monitor = Monitor(replace(found, answers=ARRIVAL, fresh={}, rates={}), ())
+        yield tuple(_steps(monitor, read_trace(path, origin(job.system), monitor.listens)))
 
 
-class _Steps:
-    """Tells one answer from the next."""
-
-    def __init__(self, used: Setup) -> None:
-        self.monitor = Monitor(used, ())
-        self.inputs: dict[str, Value] = {}
-        self.said: set[str] = set()
-
-    def step(self, event: Mapping[str, Any]) -> Mapping[str, Value] | None:
-        """The inputs of the step that begins with this event, where one does."""
-        names = {n for n in self.monitor.carried(str(event.get("topic", ""))) if n.startswith("out.")}
-        known = {n: v for n, v in self.monitor.values.items() if n.startswith("in.")} if names else {}
-        self.monitor.step(event)
-        heard = {name: known[name] for name in known.keys() & self.monitor.setup.heard}
-        if not names or not (names & self.said or heard != self.inputs):
-            self.said |= names
-            return None
-        self.said, self.inputs = names, heard
-        return known
+def _steps(monitor: Monitor, events: Iterable[Recorded]) -> Iterator[Mapping[str, Value]]:
+    """The inputs of each step."""
+    inputs: dict[str, Value] = {}
+    said: set[str] = set()
+    for recorded in events:
+        names = {n for n in monitor.carried(str(recorded.event.get("topic", ""))) if n.startswith("out.")}
+        known = {n: v for n, v in monitor.values.items() if n.startswith("in.")} if names else {}
+        monitor.step(recorded.event)
+        heard = {name: known[name] for name in known.keys() & monitor.setup.heard}
+        if names and (names & said or heard != inputs):
+            said, inputs = names, heard
+            yield known
+        else:
+            said |= names
 
 
 def _breaks(found: Setup, violation: Violation) -> bool:

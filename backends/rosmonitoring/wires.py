@@ -9,10 +9,10 @@ from __future__ import annotations
 import functools
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from types import MappingProxyType
-from typing import Any, assert_never
+from typing import Any, TypeVar, assert_never
 
 from avow.backend_kit.programs.samples import as_single, next_single
 from avow.formulas.values import Binary, Data, Element, FunctionValue, SequenceValue, Value
@@ -38,6 +38,7 @@ from .numbers import Decimal, Exact, NotANumber, exact, whole
 from .rules import NOTHING_KNOWN, Gap, Take
 
 Convert = Callable[[Any], Value]
+T = TypeVar("T")
 
 
 class MappingError(Exception):
@@ -93,11 +94,11 @@ def converter(
             return _real(wire, gaps)
         case IntegerSort() | NaturalSort():
             kind, natural = wire.name if isinstance(wire, Scalar) else None, isinstance(sort, NaturalSort)
-            return lambda raw: _natural(_whole(raw, kind)) if natural else _whole(raw, kind)
+            return functools.partial(_whole, name=kind, natural=natural)
         case BoolSort():
-            return _truth
+            return lambda raw: _given(raw, bool, "a truth value")
         case StringSort():
-            return lambda raw: names.get(_word(raw), _word(raw))
+            return lambda raw: names.get(word := _given(raw, str, "a string"), word)
         case EnumSort():
             return lambda raw: element(raw, sort, names)
         case SequenceSort(item=item):
@@ -305,7 +306,7 @@ def _number(raw: Any) -> Fraction | int:
         raise MappingError(f"{show(raw)} is not a number") from None
 
 
-def _whole(raw: Any, name: str | None) -> int:
+def _whole(raw: Any, name: str | None, *, natural: bool = False) -> int:
     """Of a type of ROS, where it is known."""
     number = _number(raw)
     if number.denominator != 1:
@@ -313,43 +314,48 @@ def _whole(raw: Any, name: str | None) -> int:
     least, greatest = (number, number) if name is None else INTEGERS[name]
     if not least <= number <= greatest:
         raise MappingError(f"{show(raw)} is no {name}")
+    if natural and number < 0:
+        raise MappingError(f"{number} is negative, where a natural number is wanted")
     return int(number)
 
 
-def _natural(number: int) -> int:
-    if number < 0:
-        raise MappingError(f"{number} is negative, where a natural number is wanted")
-    return number
-
-
-def _truth(raw: Any) -> bool:
-    if isinstance(raw, bool):
+def _given(raw: Any, kind: type[T], what: str) -> T:
+    if isinstance(raw, kind):
         return raw
-    raise MappingError(f"{show(raw)} is not a truth value")
+    raise MappingError(f"{show(raw)} is not {what}")
 
 
-def _word(raw: Any) -> str:
-    if isinstance(raw, str):
-        return raw
-    raise MappingError(f"{show(raw)} is not a string")
+def parts_of(sort: Sort) -> tuple[Sort, ...]:
+    """What fields are wanted for: a function's parameters (and result), or the value itself."""
+    if isinstance(sort, FunctionSort):
+        return sort.parameters if sort.result == BOOL else (*sort.parameters, sort.result)
+    return (sort,)
+
+
+def table_of(points: Iterable[tuple[Value, ...]], sort: FunctionSort) -> dict[tuple[Value, ...], Value]:
+    """The table of a relation that holds at these tuples; of a function with a result, which each has as its last."""
+    return dict.fromkeys(points, True) if sort.result == BOOL else {point[:-1]: point[-1] for point in points}
+
+
+def meant(raw: Any, names: Mapping[str, str]) -> str | None:
+    """The contract's name for a message's word or number; None of what is neither."""
+    word = raw if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
+    return None if word is None else names.get(word, word)
 
 
 def element(raw: Any, sort: EnumSort, names: Mapping[str, str]) -> Value:
     """The element that a word or a number stands for. Raises MappingError."""
-    word = raw if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
-    if word is not None:
-        word = names.get(word, word)
-        if word in sort.members:
-            return Element(word)
+    word = meant(raw, names)
+    if word is not None and word in sort.members:
+        return Element(word)
     raise MappingError(f"{show(raw)} is outside {{{', '.join(sort.members)}}}")
 
 
 def _items(raw: Any, length: int | None) -> list[Any]:
-    if not isinstance(raw, list):
-        raise MappingError(f"{show(raw)} is not a list")
-    if length is not None and len(raw) != length:
-        raise MappingError(f"{show(raw)} has {len(raw)} items, not {length}")
-    return raw
+    found: list[Any] = _given(raw, list, "a list")
+    if length is not None and len(found) != length:
+        raise MappingError(f"{show(raw)} has {len(found)} items, not {length}")
+    return found
 
 
 def _member(raw: Any, name: str) -> Any:

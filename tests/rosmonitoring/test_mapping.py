@@ -157,6 +157,14 @@ def test_constructors_by_a_field(make_system: Callable[..., System], message: di
     assert expected in found if isinstance(expected, str) and isinstance(found, str) else found == expected
 
 
+def test_a_word_that_means_another_constructor_is_looked_up_once(make_system: Callable[..., System]) -> None:
+    """As RML has it: `halt` meant `inspect` here."""
+    command = {**COMMAND, "values": {"halt": "stop", "stop": "inspect"}}
+    system = make_system(RCL, {"out.cmd": command})
+    assert value_of(system, "out.cmd", {"topic": "cmd", "command": "halt"}) == Data("stop")
+    assert value_of(system, "out.cmd", {"topic": "cmd", "command": "stop", "id": 4}) == Data("inspect", (4,))
+
+
 def test_an_argument_of_an_algebraic_type_is_named_by_its_field(make_system: Callable[..., System]) -> None:
     """Where the message's type is known, too: the monitor could not be made, and died with a traceback."""
     rcl = """

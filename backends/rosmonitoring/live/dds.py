@@ -1,11 +1,13 @@
 """A participant of a running ROS 2 graph, over DDS by the package cyclonedds: it needs no ROS package.
 
 A topic's writers are found by DDS's discovery. Each is heard by a reader with the quality of service that it offers, so
-that nothing is missed that it keeps or repeats. What comes together is put into the order of its writers' clocks.
+that nothing is missed that it keeps or repeats. What comes together is put into the order of its writers' clocks. How
+types are made, and what a sample holds, is known from the definitions of messages.
 """
 
 from __future__ import annotations
 
+import keyword
 import os
 import threading
 import time
@@ -15,14 +17,23 @@ from functools import partial
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import Event, enveloped
+from avow.base.graphs import reached
+from avow.ros.bags import Event, enveloped, plainer
 from avow.ros.dds import dds_topic, dds_type, settings
-from avow.ros.definitions import Definitions
+from avow.ros.definitions import Array, Definitions, Field, Message, Nested, Scalar, Wire, parse_message
 from avow.ros.sources import distribution
 
 from ..tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LIVE_PAUSE
-from .dds_types import NO_DDS, Types, filled
 from .graphs import Inbox, Status
+
+_NO_DDS = Diagnostic("MON305", "DDS needs the packages cyclonedds and rosbags", hint="pip install 'avow[dds]'")
+
+_TIME = {
+    kind: parse_message("int32 sec\nuint32 nanosec", f"builtin_interfaces/{kind.capitalize()}")
+    for kind in ("time", "duration")
+}
+_EMPTY = Message("", (Field("structure_needs_at_least_one_member", Scalar("uint8")),))
+"""What ROS 2 makes of a message without fields."""
 
 
 @dataclass(slots=True)
@@ -64,7 +75,7 @@ class Dds:
         nodes are. Raises Rejected for a topic whose type is not known, and without the package cyclonedds."""
         self.inbox = Inbox()
         self._domain, self._host = domain, host
-        self._types = Types(known)
+        self._types = _Types(known)
         self._heard: dict[str, _Heard] = {}
         wrong: list[Diagnostic] = []
         for topic in topics:
@@ -90,7 +101,7 @@ class Dds:
             from cyclonedds.domain import Domain, DomainParticipant
             from cyclonedds.topic import Topic
         except ImportError:
-            raise Rejected(NO_DDS) from None
+            raise Rejected(_NO_DDS) from None
         try:
             self._entity = None if "CYCLONEDDS_URI" in os.environ else Domain(self._domain, settings(self._host))
             self._participant = DomainParticipant(self._domain)
@@ -119,7 +130,7 @@ class Dds:
         from cyclonedds.util import duration
 
         kind = "diagnostic_msgs/DiagnosticArray"
-        types = Types(Definitions(distribution("humble")))  # the same in every ROS 2 there has been
+        types = _Types(Definitions(distribution("humble")))  # the same in every ROS 2 there has been
         qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(DDS_TAKEN))
         try:
             entity = Topic(self._participant, dds_topic(topic), types.struct(kind))
@@ -131,7 +142,7 @@ class Dds:
         def say(statuses: Sequence[Status]) -> None:
             made = [status.message(system) for status in statuses]
             header = {"stamp": divmod(time.time_ns(), 10**9), "frame_id": ""}
-            writer.write(filled(types, kind, {"header": header, "status": made}))
+            writer.write(_filled(types, kind, {"header": header, "status": made}))
 
         return say
 
@@ -235,3 +246,157 @@ def _event(heard: _Heard, data: bytes, now: float) -> Event:
         return enveloped(heard.read(data), heard.topic, now)
     except ValueError as error:
         raise ValueError(f"{heard.topic}: {error}") from None
+
+
+class _Types:
+    """The types of some definitions, for cyclonedds (what it tells others of them) and for rosbags, which reads."""
+
+    def __init__(self, known: Definitions) -> None:
+        """Raises Rejected without the packages cyclonedds and rosbags."""
+        try:
+            from cyclonedds.idl import make_idl_struct, types
+            from rosbags.interfaces import Nodetype
+            from rosbags.typesys import Stores, get_typestore
+        except ImportError:
+            raise Rejected(_NO_DDS) from None
+        self._make, self._types, self._kind = make_idl_struct, types, Nodetype
+        self._store = get_typestore(Stores.EMPTY)
+        self._known = known
+        self._made: dict[str, Any] = {}
+
+    def missing(self, kind: str) -> str:
+        """Why a type cannot be heard; empty where it can."""
+        message = self._known.get(kind)
+        if message is None:
+            return f"nothing defines {kind}"
+        if lacking := self._known.missing(message):
+            return f"nothing defines {lacking[0]}, of which {kind} is made"
+        wide = [name for name in self._names(message) for f in self.message(name).fields if _has_wide(f.wire)]
+        return f"{wide[0]} has a wstring, which cannot be read here" if wide else ""
+
+    def struct(self, kind: str) -> Any:
+        """A class of cyclonedds. It must not be `missing`."""
+        if kind not in self._made:
+            self._made[kind] = self._new(kind)
+        return self._made[kind]
+
+    def raw(self, kind: str) -> Any:
+        """As `struct`, for readers: its samples are `_Raw`."""
+        made = self._new(kind)
+        made.deserialize = classmethod(lambda cls, data, *more: _Raw(data))
+        made.deserialize_key = classmethod(lambda cls, data, *more: _Raw(b""))
+        return made
+
+    def _new(self, kind: str) -> Any:
+        fields = {_attribute(f.name): self._idl(f.wire) for f in self.message(kind).fields}
+        return self._make(f"{kind.rpartition('/')[2]}_", dds_type(kind), fields)
+
+    def reader(self, kind: str) -> Callable[[bytes], dict[str, Any]]:
+        """What a sample holds, as a bag's message would be read; it raises ValueError for what is none."""
+        from rosbags.serde import SerdeError
+
+        base, store = self._kind, self._store
+
+        def desc(wire: Wire) -> Any:
+            match wire:
+                case Scalar(name="time" | "duration" as name):
+                    return base.NAME, _full(_TIME[name].name)
+                case Scalar(name=name):
+                    return base.BASE, (name, 0)
+                case Nested(name=name):
+                    return base.NAME, _full(name)
+                case Array(item=item, length=None):
+                    return base.SEQUENCE, (desc(item), 0)
+                case Array(item=item, length=length):
+                    return base.ARRAY, (desc(item), length)
+
+        names = self._names(self.message(kind))
+        made: dict[str, Any] = {_full(n): ([], [(f.name, desc(f.wire)) for f in self.message(n).fields]) for n in names}
+        store.register({name: parts for name, parts in made.items() if name not in store.fielddefs})
+        plain, full = plainer(store.fielddefs), _full(kind)
+
+        def read(raw: bytes) -> dict[str, Any]:
+            try:
+                found: dict[str, Any] = plain(store.deserialize_cdr(raw, full))
+            except (SerdeError, AssertionError, IndexError) as error:
+                raise ValueError(f"a sample is no {kind}: {error}") from None
+            return found
+
+        return read
+
+    def message(self, kind: str) -> Message:
+        for each in _TIME.values():
+            if each.name == kind:
+                return each
+        message = self._known.get(kind)
+        assert message is not None, kind
+        return message if message.fields else Message(kind, _EMPTY.fields)
+
+    def _names(self, message: Message) -> list[str]:
+        """The types that a message is made of, and its own."""
+
+        def inner(name: str) -> Iterator[str]:
+            for each in self.message(name).fields:
+                wire = each.wire.item if isinstance(each.wire, Array) else each.wire
+                if isinstance(wire, Nested):
+                    yield wire.name
+                elif wire.name in _TIME:
+                    yield _TIME[wire.name].name
+
+        return list(reached([message.name], inner))
+
+    def _idl(self, wire: Wire) -> Any:
+        match wire:
+            case Scalar(name="time" | "duration" as name):
+                return self.struct(_TIME[name].name)
+            case Scalar(name="string"):
+                return str
+            case Scalar(name="bool"):
+                return bool
+            case Scalar(name=name):
+                return getattr(self._types, name)
+            case Nested(name=name):
+                return self.struct(name)
+            case Array(item=item, length=None):
+                return self._types.sequence[self._idl(item)]
+            case Array(item=item, length=length):
+                return self._types.array[self._idl(item), length]
+
+
+class _Raw:
+    """A sample as it came; cyclonedds sets `sample_info`."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.sample_info: Any = None
+
+
+def _filled(types: _Types, kind: str, values: Mapping[str, Any]) -> Any:
+    """A message to be said, of plain values."""
+
+    def made(wire: Wire, value: Any) -> Any:
+        match wire:
+            case Scalar(name="time" | "duration" as name):
+                return types.struct(_TIME[name].name)(*value)
+            case Scalar():
+                return value
+            case Nested(name=name):
+                return _filled(types, name, value)
+            case Array(item=item):
+                return [made(item, one) for one in value]
+
+    return types.struct(kind)(**{_attribute(f.name): made(f.wire, values[f.name]) for f in types.message(kind).fields})
+
+
+def _attribute(name: str) -> str:
+    """A field's name as one of Python's."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def _has_wide(wire: Wire) -> bool:
+    return (wire.item if isinstance(wire, Array) else wire) == Scalar("wstring")
+
+
+def _full(kind: str) -> str:
+    package, _, name = kind.partition("/")
+    return f"{package}/msg/{name}"
