@@ -52,6 +52,20 @@ _ACTIONS = frozenset(
 """What must not go missing without a word."""
 
 
+_MADE: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "GroupAction": ("group", {"actions": "*", "scoped": "scoped"}),
+    "TimerAction": ("timer", {"period": "", "actions": "*"}),
+    "LoadComposableNodes": ("load_composable_node", {"composable_node_descriptions": "*"}),
+    "PushRosNamespace": ("push_ros_namespace", {"namespace": "namespace"}),
+    "PushROSNamespace": ("push_ros_namespace", {"namespace": "namespace"}),
+    "SetRemap": ("set_remap", {"src": "from", "dst": "to"}),
+    "DeclareLaunchArgument": ("arg", {"name": "name", "default_value": "default"}),
+    "SetLaunchConfiguration": ("let", {"name": "name", "value": "value"}),
+}
+"""Action → the tag of its element, and its arguments in their order: what XML calls each; ``*``: it holds actions;
+empty: it is not read."""
+
+
 def from_python(text: str, file: str) -> Parsed:
     """Raises WrongLaunch."""
     try:
@@ -140,48 +154,24 @@ class _Python:
             return [self.node(call, _NODES[name])]
         if name in _SILENT:
             return []
-        match name:
-            case "LaunchDescription":
-                return [e for part in self.given(call, ("initial_entities",)) for e in self.actions(part)]
-            case "GroupAction":
-                return [self.element(call, "group", ("actions",), scoped="scoped")]
-            case "TimerAction":
-                return [self.element(call, "timer", ("period", "actions"))]
-            case "LoadComposableNodes":
-                return [self.element(call, "load_composable_node", ("composable_node_descriptions",))]
-            case "PushRosNamespace" | "PushROSNamespace":
-                return [self.plain(call, "push_ros_namespace", ("namespace",))]
-            case "SetRemap":
-                return [self.plain(call, "set_remap", ("src", "dst"), src="from", dst="to")]
-            case "DeclareLaunchArgument":
-                return [self.plain(call, "arg", ("name", "default_value"), default_value="default")]
-            case "SetLaunchConfiguration":
-                return [self.plain(call, "let", ("name", "value"))]
-            case "IncludeLaunchDescription":
-                return [self.include(call)]
-            case _:  # told, with its name
-                self.tell(call, f"{name}(…) is not read")
-                for inner in ast.walk(call):
-                    self.seen.add(id(inner))
-                return []
+        if name == "LaunchDescription":
+            parts = self.given(call, ("initial_entities",))
+            return self.actions(parts["initial_entities"]) if "initial_entities" in parts else []
+        if name == "IncludeLaunchDescription":
+            return [self.include(call)]
+        if name in _MADE:
+            tag, named = _MADE[name]
+            parts = self.given(call, tuple(named))
+            children = [e for key, to in named.items() if to == "*" and key in parts for e in self.actions(parts[key])]
+            said = {to: self.text(parts[key]) for key, to in named.items() if to not in ("", "*") and key in parts}
+            return [Element(tag, {**said, **self.condition(call)}, tuple(children), self.at(call))]
+        self.tell(call, f"{name}(…) is not read")
+        self.seen |= {id(inner) for inner in ast.walk(call)}
+        return []
 
-    def given(self, call: ast.Call, names: Sequence[str]) -> list[ast.expr]:
-        """The arguments of these names, by place or by keyword."""
-        found = dict(zip(names, call.args, strict=False))
-        found |= {k.arg: k.value for k in call.keywords if k.arg is not None}
-        return [found[name] for name in names if name in found]
-
-    def element(self, call: ast.Call, tag: str, names: tuple[str, ...], **attributes: str) -> Element:
-        """An action that holds others, in the last of its arguments `names`."""
-        inner = dict(zip(names, call.args, strict=False)) | {k.arg or "": k.value for k in call.keywords}
-        children = self.actions(inner[names[-1]]) if names[-1] in inner else []
-        texts = {key: self.text(inner[keyword]) for keyword, key in attributes.items() if keyword in inner}
-        return Element(tag, {**texts, **self.condition(call)}, tuple(children), self.at(call))
-
-    def plain(self, call: ast.Call, tag: str, names: tuple[str, ...], **renamed: str) -> Element:
-        inner = dict(zip(names, call.args, strict=False)) | {k.arg or "": k.value for k in call.keywords}
-        texts = {renamed.get(name, name): self.text(inner[name]) for name in names if name in inner}
-        return Element(tag, {**texts, **self.condition(call)}, (), self.at(call))
+    def given(self, call: ast.Call, names: Sequence[str]) -> dict[str, ast.expr]:
+        """The arguments by their names, of which `names` are those that may be given by place."""
+        return dict(zip(names, call.args, strict=False)) | {k.arg: k.value for k in call.keywords if k.arg is not None}
 
     def node(self, call: ast.Call, tag: str) -> Element:
         texts: dict[str, Text] = {}
@@ -217,10 +207,11 @@ class _Python:
 
     def include(self, call: ast.Call) -> Element:
         parts = self.given(call, ("launch_description_source",))
-        source = self.value(parts[0]) if parts else None
+        source = self.value(parts["launch_description_source"]) if "launch_description_source" in parts else None
         if isinstance(source, ast.Call) and _called(source).endswith("LaunchDescriptionSource"):
-            inner = self.given(source, ("launch_file_path", "location")) or [*source.args]
-            file = self.text(inner[0]) if inner else self.unknown(call)
+            inner = self.given(source, ("launch_file_path",))
+            path = inner.get("launch_file_path", inner.get("location"))
+            file = self.text(path) if path is not None else self.unknown(call)
         else:
             file = self.text(source) if source is not None else self.unknown(call)
         children: list[Element] = []
@@ -330,7 +321,7 @@ class _Python:
                 return "$(dirname)"
             case "TextSubstitution":
                 texts = self.given(call, ("text",))
-                return self.text(texts[0]) if texts else self.unknown(call)
+                return self.text(texts["text"]) if "text" in texts else self.unknown(call)
             case "str" if one is not None:
                 return one
             case "dirname" if ast.unparse(call.args[0]) in _THIS_FILE:
