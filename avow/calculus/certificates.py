@@ -109,7 +109,7 @@ class Certificates:
         return self.established(self.made[scope], claim)
 
     def existence(self, name: str) -> list[Established] | None:
-        """What an obligation says to be possible (`avow.calculus.existence`), in all its parts."""
+        """What an obligation says to be possible (`avow.calculus.wiring`), in all its parts."""
         entries: list[Entry] = []
         for part in self.parts(name):
             tried = ((claim, attempt) for claim in part for attempt in self._examples(claim))

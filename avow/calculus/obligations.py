@@ -19,12 +19,12 @@ from avow.calculus.certificates import Certificates, existence_scope, requiremen
 from avow.calculus.composition import Composition, argument, asked, composed
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds, Claim
-from avow.calculus.existence import circles, joined, loops, start_name
 from avow.calculus.questions import Answer
 from avow.calculus.requirements import requirement_question
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.variables import OBSERVED, Frame
+from avow.calculus.wiring import circles, joined, loops, start_name
 from avow.evidence.claims import Reestablished
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import digest, node_digest

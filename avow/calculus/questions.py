@@ -15,10 +15,10 @@ from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
-from avow.calculus.existence import start_name
 from avow.calculus.induction import INVARIANT, in_words
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
+from avow.calculus.wiring import start_name
 from avow.formulas.formula import negation
 from avow.kernel.check import Established
 from avow.language.printer import show_term

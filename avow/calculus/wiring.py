@@ -6,17 +6,22 @@ there is a definition); several publishers of a topic are a node that puts out w
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from avow.calculus.existence import beginning, circles, loops, situations, start_name
+from avow.base.graphs import components
 from avow.calculus.variables import Frame
+from avow.formulas.formula import conjunction, negation, substitute
 from avow.formulas.temporal.ages import CLOCK
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.clock import GOES_ON, is_arrival
 from avow.kernel.statements import Claimed, Place, Wiring
 from avow.language.sorts import BOOL, Sort
+from avow.language.subterms import ports_of
 from avow.language.terms import Role, Term, Variable
+from avow.sanity.claims import triggers
 from avow.system.formulas import initial_condition
+from avow.system.plan import Edge
 
 
 def wiring(frame: Frame) -> Wiring:
@@ -41,13 +46,65 @@ def wiring(frame: Frame) -> Wiring:
     for name, term in frame.required.items():
         known = frame.observed.get(name)
         plan.append((Claimed.REQUIREMENT, "", name, term if known is None else known.formula))
-    plan += [(Claimed.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
+    plan += [(Claimed.START, "", start_name(group), _beginning(frame, group)) for group in loops(frame)]
     for group in circles(frame):
         for node, clause in ((name, g.name) for name in group for g in frame.node(name).guarantees):
-            for found in situations(frame, group, node, clause):
-                plan.append((Claimed.POSSIBLE, "", found.name, found.possible))
-                plan.append((Claimed.IMPOSSIBLE, "", found.name, found.excluded))
+            plan += _situations(frame, group, node, clause)
     return Wiring(tuple(frame.node(n.name) for n in system.contract.nodes), _ports(frame), tuple(plan))
+
+
+# What an example shows: that a loop has first values, that a situation that a guarantee is about can arise. Nothing is
+# derived from these claims. Each is a formula over ``node.port``, which some values have to meet: the kernel asks for
+# values, and takes no proof that there are none for an answer.
+
+
+def loops(frame: Frame) -> Iterator[tuple[str, ...]]:
+    """Nodes that feed one another in a circle, at once or delayed."""
+    arcs = [(e.source.node, e.target.node) for e in frame.graph.edges]
+    selves = {source for source, target in arcs if source == target}
+    yield from (g for g in components(frame.graph.nodes, arcs) if len(g) > 1 or g[0] in selves)
+
+
+def circles(frame: Frame) -> Iterator[tuple[str, ...]]:
+    """Nodes that feed one another in a circle within one step."""
+    arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
+    yield from (group for group in components(frame.graph.nodes, arcs) if len(group) > 1)
+
+
+def start_name(group: Sequence[str]) -> str:
+    """The obligation that the nodes of a loop have first values."""
+    return f"start.{joined(group)}"
+
+
+def joined(names: Sequence[str]) -> str:
+    return "-".join(names) if len(names) <= 6 else f"{names[0]}-and-{len(names) - 1}-more"
+
+
+def _beginning(frame: Frame, group: Iterable[str]) -> Term:
+    """What the plan says of the outputs of a loop before the first step, over ``node.port``."""
+    members = frozenset(group)
+    first: dict[str, Edge] = {str(e.source): e for e in frame.graph.edges if e.delayed and e.source.node in members}
+    found = [(e.source.node, initial_condition(frame.system, e)) for e in first.values()]
+    return conjunction([_qualified(condition, node) for node, condition in found if condition is not None])
+
+
+def _situations(frame: Frame, group: Sequence[str], node: str, clause: str) -> Iterator[tuple[Claimed, str, str, Term]]:
+    """Of each situation that a guarantee of a node in a circle is about: that it arises while all nodes of the circle
+    keep their contracts; and that its node's own contract leaves it no room, which composing does not change."""
+    contracts = {name: [_qualified(each.formula, name) for each in frame.node(name).clauses] for name in group}
+    everything = [term for terms in contracts.values() for term in terms]
+    everything += [_qualified(assumed.formula, assumed.node) for assumed in frame.assumed]
+    for k, situation in enumerate(triggers(frame.node(node).clause(clause).formula)):
+        name, there = f"joint.{node}.{clause}.{k}", _qualified(situation, node)
+        yield Claimed.POSSIBLE, "", name, conjunction([*everything, there])
+        yield Claimed.IMPOSSIBLE, "", name, negation(conjunction([*contracts[node], there]))
+
+
+def _qualified(term: Term, node: str) -> Term:
+    """A formula of a node over ``node.port``."""
+    return substitute(
+        term, {v: Variable(v.role, f"{node}.{v.name}", v.sort) for v in ports_of(term) if v.role is not Role.BOUND}
+    )
 
 
 def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:

@@ -25,7 +25,7 @@ from avow.cli.options import (
     seed_option,
     system_of,
 )
-from avow.formulas.interpretation import interpretation
+from avow.formulas.finite import interpretation
 from avow.language.contract import Node
 from avow.sanity.analysis import analyse
 from avow.sanity.claims import Property

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from itertools import product
 from math import prod
 
@@ -12,10 +13,12 @@ from avow.base.records import dataclass
 from avow.base.tuning.bounds import VALUES_WRITTEN_OUT
 from avow.formulas.formula import conjunction, disjunction, negation, substitute
 from avow.formulas.renaming import map_children
-from avow.formulas.values import Value
+from avow.formulas.values import Element, FunctionValue, Value
 from avow.formulas.written import value_term
-from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
+from avow.language.contract import Node, Port
+from avow.language.sorts import BoolSort, EnumSort, FunctionSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.terms import Compare, Quantified, Quantifier, Term, Variable
+from avow.system.plan import Scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,3 +72,54 @@ _SIMPLE = BoolSort | EnumSort | IntegerSort | NaturalSort | RealSort | StringSor
 
 def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
     return [value_term(value, sort) for value in dict.fromkeys(values)] if isinstance(sort, _SIMPLE) else []
+
+
+# -- what the scenario's tables fix ------------------------------------------------------------------------------------
+
+
+def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Value]:
+    """The inputs of a node that are relations given by the scenario's tables: each holds at the rows and nowhere else.
+
+    A function with another result is not fixed: a table says nothing of its value elsewhere. Cells that are no value of
+    their sort leave the input open, too (the plan's checks report them).
+    """
+    found: dict[Variable, Value] = {}
+    for port in node.inputs:
+        sort = port.sort
+        if scenario is None or not isinstance(sort, FunctionSort) or not isinstance(sort.result, BoolSort):
+            continue
+        rows = rows_of(node, port, sort.parameters, scenario)
+        if rows is not None:
+            found[port.variable] = FunctionValue(dict.fromkeys(rows, True), False)
+    return found
+
+
+def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -> list[tuple[Value, ...]] | None:
+    """The rows of the table that interprets a port; None where there is none of such columns."""
+    said = scenario.interpreted(node.name, port)
+    if said is None or len(said[1]) != len(sorts):
+        return None
+    try:
+        table = scenario.table(said[0])
+        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(said[1], sorts, strict=True)]
+    except (KeyError, ValueError, ZeroDivisionError):
+        return None
+    return list(zip(*cells, strict=True))
+
+
+def _value(text: str, sort: Sort) -> Value:
+    """Raises ValueError."""
+    match sort:
+        case RealSort():
+            return Fraction(text)
+        case IntegerSort():
+            return int(text)
+        case NaturalSort() if int(text) >= 0:
+            return int(text)
+        case StringSort():
+            return text
+        case EnumSort(members=members) if text in members:
+            return Element(text)
+        case BoolSort() if text.lower() in {"true", "false"}:
+            return text.lower() == "true"
+    raise ValueError(text)

@@ -61,7 +61,6 @@ TRUSTED = {
     "wiring of a system as the kernel is told it (avow/calculus)": (
         "calculus/wiring.py",
         "calculus/variables.py",
-        "calculus/existence.py",
         "sanity/claims.py",
     ),
     "which claim an obligation is, and its certificate (avow/calculus)": (

@@ -17,8 +17,7 @@ from avow.base.remembered import by_identity
 from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.scenario import ranges
 from avow.calculus.variables import Frame
-from avow.formulas.finite import Ranges
-from avow.formulas.interpretation import interpretation
+from avow.formulas.finite import Ranges, interpretation
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable

@@ -1,14 +1,14 @@
 """Why a contract is not realizable: which guarantees conflict, where, and what each demands there.
 
 A conflict is a set of guarantees that no output meets together at some allowed input, while every smaller set can be
-met at all of them. Every one is looked for (`avow.sanity.minimal_sets`); where the search was cut short, that is said.
+met at all of them. Every one is looked for (`minimal_sets`); where the search was cut short, that is said.
 A guarantee that cannot be met by itself at some input would hide its conflicts at others: those that come up are listed
 too. What is shown of an input is what matters: the comparisons that make the conflict, and the inputs they speak of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.base.tuning.bounds import CONFLICTS
@@ -22,7 +22,6 @@ from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, DataSort, FunctionSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import realizable
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import effort_left, spent, until
@@ -281,3 +280,102 @@ def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, 
         if solve([formula, Not(made)], given=at, effort=CONFLICT_EFFORT, seed=seed).status == "unsat":
             return f"{value.constructor}(…)" if bound else value.constructor
     return ""
+
+
+# -- minimal sets ------------------------------------------------------------------------------------------------------
+
+
+class UndecidedError(Exception):
+    """Whether a set has the property was not found out."""
+
+
+@dataclass(frozen=True, slots=True)
+class _MinimalSets:
+    """The sets, smallest first, and whether there are no others and none of them could be smaller."""
+
+    sets: tuple[frozenset[str], ...]
+    complete: bool
+
+
+def minimal_sets(
+    labels: Sequence[str],
+    core: Callable[[frozenset[str]], frozenset[str] | None],
+    *,
+    most: int,
+    ended: Callable[[], bool],
+) -> _MinimalSets:
+    """All minimal sets of labels that have a property which every larger set has too. Seeds are maximal sets of which
+    nothing is known; one with the property is made smaller to a minimal set, one without it settles all its subsets
+    (Liffiton, Previti, Malik and Marques-Silva, "Fast, flexible MUS enumeration", 2016).
+
+    `core` says of a set which of its subsets it found to have the property, or None where it has not; it raises
+    `UndecidedError`. At most so many sets are looked for, until `ended`.
+    """
+    known = _Known(labels)
+    found: list[frozenset[str]] = []
+    complete = True
+    while (seed := known.seed()) is not None:
+        if ended() or len(found) >= most:
+            complete = False
+            break
+        try:
+            having = core(seed)
+        except UndecidedError:
+            known.without(seed)
+            complete = False
+            continue
+        if having is None:
+            known.lack(seed)
+            continue
+        for label in labels:
+            if label not in having or len(having) == 1:
+                continue
+            try:
+                if not ended():
+                    having = core(having - {label}) or having
+                else:
+                    complete = False
+            except UndecidedError:
+                complete = False
+        found.append(having)
+        known.have(having)
+    order = {label: k for k, label in enumerate(labels)}
+    found.sort(key=lambda chosen: (len(chosen), sorted(order[label] for label in chosen)))
+    return _MinimalSets(tuple(found), complete)
+
+
+class _Known:
+    """The sets about which something is known, as clauses over a Boolean for each label."""
+
+    def __init__(self, labels: Sequence[str]) -> None:
+        context = z3.Context()
+        self._solver = z3.Solver(ctx=context)
+        self._chosen = {label: z3.Bool(f"{k}", context) for k, label in enumerate(labels)}
+
+    def seed(self) -> frozenset[str] | None:
+        """A set of which nothing is known though something is of every larger one; None if there is none."""
+        seed: set[str] = set()
+        if self._solver.check() != z3.sat:
+            return None
+        seed |= self._true()
+        for label in self._chosen:
+            if label not in seed and self._solver.check(*(self._chosen[k] for k in (*seed, label))) == z3.sat:
+                seed |= self._true()
+        return frozenset(seed)
+
+    def _true(self) -> set[str]:
+        model = self._solver.model()
+        return {label for label, chosen in self._chosen.items() if z3.is_true(model.eval(chosen))}
+
+    def lack(self, labels: Collection[str]) -> None:
+        self._solver.add(z3.Or([v for label, v in self._chosen.items() if label not in labels] or [self._false()]))
+
+    def have(self, labels: Collection[str]) -> None:
+        self._solver.add(z3.Or([z3.Not(self._chosen[label]) for label in labels] or [self._false()]))
+
+    def without(self, labels: Collection[str]) -> None:
+        """This set alone is not asked about again."""
+        self._solver.add(z3.Or([z3.Not(v) if label in labels else v for label, v in self._chosen.items()]))
+
+    def _false(self) -> object:
+        return z3.BoolVal(False, self._solver.ctx)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Span
 from avow.evaluation.evaluate import NotEvaluable, evaluate, free_names
+from avow.formulas.finite import interpretation, rows_of
 from avow.formulas.formula import substitute
-from avow.formulas.interpretation import interpretation, rows_of
 from avow.formulas.renaming import bound_names
 from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Node

@@ -16,7 +16,7 @@ from avow.backends.rosmonitoring.options import usable
 from avow.backends.rosmonitoring.rules import Constant
 from avow.calculus.scenario import world
 from avow.calculus.variables import frame
-from avow.formulas.interpretation import interpretation
+from avow.formulas.finite import interpretation
 from avow.formulas.values import FunctionValue
 from avow.pipeline.work import method_job
 from avow.system.load import load_system

@@ -13,8 +13,7 @@ from oracle.values import holds
 from avow.base.verdict import Verdict
 from avow.formulas.values import Value
 from avow.language.terms import Role
-from avow.sanity.conflicts import Conflict, conflicts
-from avow.sanity.minimal_sets import UndecidedError, minimal_sets
+from avow.sanity.conflicts import Conflict, UndecidedError, conflicts, minimal_sets
 from avow.sanity.realizability import realizable
 
 from .contracts import contract

@@ -7,8 +7,7 @@ from pathlib import Path
 from avow.base.verdict import Verdict
 from avow.calculus.scenario import ranges
 from avow.calculus.variables import frame
-from avow.formulas.finite import Ranges
-from avow.formulas.interpretation import interpretation
+from avow.formulas.finite import Ranges, interpretation
 from avow.language.sorts import NATURAL
 from avow.language.subterms import subterms
 from avow.language.terms import Quantified
