@@ -373,6 +373,13 @@ def test_sanity_is_asked_in_the_background(editor: Editor) -> None:
     assert "not-tautological-high" in seen["high"]
     assert seen["low"] == "✓ sane"
     assert "refuted" in said(editor, uri, text, "high")
+
+
+@pytest.mark.slow
+def test_what_is_edited_is_asked_again_in_the_background(editor: Editor) -> None:
+    text = CONTRACT.replace("in.r >= Limit ->", "in.r < 0 and in.r > 1 ->")
+    uri = editor.open("untitled:edited", text)
+    editor.until(lambda: "agent" in hints(editor, uri, text))
     # what has become sound is sound at once where it was asked before, and is asked where it was not
     editor.write(uri, CONTRACT)
     assert "not-tautological-high" not in editor.codes(uri)

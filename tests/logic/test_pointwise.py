@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
+from helpers import calls
 
 from avow.base.verdict import Verdict
 from avow.formulas.pointwise import pointwise
@@ -105,7 +104,5 @@ def test_outputs_that_are_defined_by_each_other_do_not_grow() -> None:
     names = [f"o{k}" for k in range(8)]
     each = " and ".join(f"{name} == {' + '.join(o for o in names if o != name)}" for name in names)
     of = node(f"inputs( x : REAL ) outputs( {', '.join(f'{n} : REAL' for n in names)} )|guarantee( {each} )")
-    start = time.thread_time()
-    found = candidates([p.variable for p in of.outputs], (), [c.formula for c in of.guarantees])
-    assert isinstance(witnesses(found), list)
-    assert time.thread_time() - start < 2
+    outputs, guarantees = [p.variable for p in of.outputs], [c.formula for c in of.guarantees]
+    assert calls(lambda: witnesses(candidates(outputs, (), guarantees))) < 2_000_000, "a second"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from calculus.make import discharge
+from helpers import calls
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Verdict
@@ -64,23 +64,6 @@ def test_the_closest_facts_are_those_about_the_goal_and_bounds_of_what_these_spe
     for part in split:
         (fact,) = part.terms.values()
         assert set(part.speaking) == set(free_variables(fact))
-
-
-def calls(work: Callable[[], object]) -> int:
-    """How many functions are called: the same on every machine."""
-    found = 0
-
-    def count(frame: object, event: str, argument: object) -> None:
-        nonlocal found
-        found += event in ("call", "c_call")
-
-    before = sys.getprofile()
-    sys.setprofile(count)
-    try:
-        work()
-    finally:
-        sys.setprofile(before)
-    return found
 
 
 @pytest.mark.parametrize("shape", [chain, fan])
