@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import count
+from avow.base.rendering import render, summary, to_sarif, told
+from avow.base.workspace import system_folder
 from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
     from avow.base.codes import Code
-    from avow.base.diagnostics import Diagnostic
     from avow.base.remembered import Shelf
 
 
@@ -44,7 +46,6 @@ def command(
     error.
     """
     from avow import __version__
-    from avow.base.rendering import render, summary, to_sarif, told
 
     found: list[Diagnostic] = []
     files = 0
@@ -113,9 +114,6 @@ def _groups(
 
 
 def _no_system(path: Path) -> Iterator[Diagnostic]:
-    from avow.base.diagnostics import Rejected
-    from avow.base.workspace import system_folder
-
     try:
         system_folder(str(path))
     except Rejected as rejected:
@@ -124,7 +122,6 @@ def _no_system(path: Path) -> Iterator[Diagnostic]:
 
 def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozenset[str]]:
     """The contract files of a system's folder; without a plan, every .rcl file in it."""
-    from avow.base.diagnostics import Diagnostic, Rejected
     from avow.system.plan_file import read_rest
 
     plan_file = folder / "plan.yaml"
@@ -154,7 +151,6 @@ def _shelf(folder: Path) -> Shelf:
 
 def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
     """What there is to say of the folder's plan beside its contract files (which are checked already)."""
-    from avow.base.diagnostics import Rejected
     from avow.pipeline.check import of_plan, of_rest
     from avow.system.load import load_system
 
@@ -178,8 +174,6 @@ def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
 
 def _off(folder: Path) -> frozenset[str]:
     """The lints that the plan beside a file switches off; none where there is no readable plan."""
-    from avow.base.diagnostics import Rejected
-
     if not (folder / "plan.yaml").is_file():
         return frozenset()
     from avow.system.plan_file import read_plan

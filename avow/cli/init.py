@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from importlib import resources
 from pathlib import Path
 
 import click
 
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
+from avow.base.workspace import find_workspace
 from avow.cli.options import PathArgument, json_option
+from avow.ros.sources import DISTRIBUTIONS
 
 _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
 
@@ -63,9 +68,6 @@ def command(
     topics, types and mapping, for you to correct; what a node promises is left to write. Where DIRECTORY is a new
     folder in a workspace's contracts/, only the system is made.
     """
-    from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.ros.sources import DISTRIBUTIONS
-
     if directory.exists() and any(directory.iterdir()):
         raise Rejected(
             Diagnostic("CLI007", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
@@ -84,7 +86,6 @@ def command(
 
 
 def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str | None, as_json: bool) -> int:
-    from avow.base.workspace import find_workspace
     from avow.cli.from_ros import draft_system
 
     outer = find_workspace(directory.resolve().parent)
@@ -98,10 +99,6 @@ def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str |
 
 
 def _from_template(directory: Path, template: str) -> None:
-    from importlib import resources
-
-    from avow.base.files import write
-
     for part in ("template", *(("template_ros",) if template != "plain" else ())):
         origin = Path(str(resources.files("avow.cli") / part))
         for source in sorted(origin.rglob("*")):
@@ -115,10 +112,6 @@ def _from_template(directory: Path, template: str) -> None:
 
 def _workspace(directory: Path) -> None:
     """What every workspace has."""
-    from importlib import resources
-
-    from avow.base.files import write
-
     ignored = Path(str(resources.files("avow.cli") / "template/gitignore.txt"))
     write(directory / ".gitignore", ignored.read_bytes())
     write(directory / "dodo.py", _DODO)

@@ -11,6 +11,7 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
+from avow.assurance.policy import read_policy
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import COMMON_OPTIONS, asking
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
@@ -19,12 +20,21 @@ from avow.base.notes import read_note, write_note
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf
+from avow.base.rendering import printable, render
 from avow.base.tuning.shown import WARNINGS
 from avow.base.workspace import Workspace, plans_below
+from avow.language.load import check_paths
 from avow.pipeline import export as exporting
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
+from avow.system import launched
+from avow.system.faults import rest_of
+from avow.system.graph import dataflow
 from avow.system.plan import Located, Method, System
+from avow.system.rosgraph import account
+from avow.system.schema import violations
+from avow.system.statements import requirement_sentences, unconfirmed, without_words
+from avow.system.topics import heard, turned, unknown_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +81,6 @@ def diagnostics(
     """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off.
     `clean`: (node, method) of which nothing is to be said; those found to be so are added. `shelf`: where it is kept
     what the nodes' texts say, and which options have the right shape."""
-    from avow.language.load import check_paths
-
     off = frozenset(system.plan.lints_off)
     return (*check_paths(system.plan.contract_files, off=off, shelf=shelf)[1], *of_plan(system, clean, shelf))
 
@@ -83,11 +91,6 @@ def of_plan(
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
     what each backend says of its options; without the warnings that the plan switches off. `clean` and `shelf`: as for
     `diagnostics`."""
-    from avow.system import launched
-    from avow.system.graph import dataflow
-    from avow.system.statements import requirement_sentences, unconfirmed, without_words
-    from avow.system.topics import turned, unknown_types
-
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
         *launched.told(system),
@@ -126,13 +129,9 @@ def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERR
 
 def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
     """What is to be said of the policy and of the methods' options of a system that cannot be loaded."""
-    from avow.system.faults import rest_of
-
     rest = rest_of(folder)
     if rest is None:
         return ()
-    from avow.system.topics import heard, unknown_types
-
     found = [*_policy(rest.system), *unknown_types(rest.system.plan, rest.system.contract)]
     plan, contract, _ = heard(rest.system.plan, rest.system.contract)
     system = replace(rest.system, plan=plan, contract=contract)
@@ -150,9 +149,6 @@ def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
 
 def _model(system: System) -> tuple[Diagnostic, ...]:
     """The paper's step 1: does the system model account for all of the ROS graph?"""
-    from avow.system.graph import dataflow
-    from avow.system.rosgraph import account
-
     try:
         told = account(system, dataflow(system))
     except Rejected as rejected:  # a graph that cannot be read: said with everything else that is wrong
@@ -161,8 +157,6 @@ def _model(system: System) -> tuple[Diagnostic, ...]:
 
 
 def _policy(system: System) -> tuple[Diagnostic, ...]:
-    from avow.assurance.policy import read_policy
-
     try:
         read_policy(system.plan.policy)
     except Rejected as rejected:
@@ -220,8 +214,6 @@ def _right(schema: Mapping[str, Any], options: Located) -> Located:
 def _schema(
     schema: Mapping[str, Any], options: Located, whole: str, shelf: Shelf | None = None
 ) -> Iterable[Diagnostic]:
-    from avow.system.schema import violations
-
     data = options.data
     if isinstance(data, Mapping):
         own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
@@ -231,8 +223,6 @@ def _schema(
 
 def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> None:
     """The first few warnings, a line each: `avow check` shows all of it, with the source."""
-    from avow.base.rendering import printable
-
     warned = [d for d in found if d.severity is Severity.WARNING]
     for d in warned[:WARNINGS]:
         place = f"{workspace.relative(Path(d.span.file))}:{d.span.line}: " if d.span else ""
@@ -242,8 +232,6 @@ def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> Non
 
 
 def show(found: Iterable[Diagnostic]) -> None:
-    from avow.base.rendering import render
-
     text = render(tuple(found))
     if text:
         print(text, file=sys.stderr)

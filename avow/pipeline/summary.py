@@ -7,6 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
 from avow.base.codec import Unreadable, document, from_text
 from avow.base.files import read_regular
 from avow.base.tuning.shown import GATE_REASON
@@ -24,10 +28,6 @@ def print_summary(
     systems whose reports are of an earlier state."""
     if not results and not broken:
         return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     console = Console(file=out, highlight=False, soft_wrap=True, width=None if out.isatty() else 150)
     shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
     table = Table(box=None, header_style="bold", pad_edge=False)
@@ -129,9 +129,6 @@ def _inline(text: str) -> str:
 
 def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
     """The proof obligations of the selected systems, as a table (`doit obligations`)."""
-    from rich.console import Console
-    from rich.table import Table
-
     from avow.pipeline.workload import Listing
 
     wanted = {name.partition(":")[2] for name in selected if name.startswith("obligations")} - {""}
@@ -143,14 +140,8 @@ def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
         try:
             listed = from_text(Listing, read_regular(path)).obligations
         except (OSError, Unreadable) as error:
-            console.print(_plain(f"{path} cannot be read: {error}"))
+            console.print(escape(f"{path} cannot be read: {error}"))
             continue
         for o in listed:
-            table.add_row(_plain(o.id.partition("/")[2]), _plain(o.claim), _plain(", ".join(o.methods) or "no method"))
+            table.add_row(escape(o.id.partition("/")[2]), escape(o.claim), escape(", ".join(o.methods) or "no method"))
         console.print(table)
-
-
-def _plain(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)
