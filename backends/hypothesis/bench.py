@@ -11,7 +11,7 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
@@ -124,7 +124,7 @@ class Bench:
 
     @property
     def inputs(self) -> st.SearchStrategy[Inputs]:
-        """Inputs that meet the assumptions, mostly: `check` rejects the others."""
+        """Inputs that meet the assumptions, mostly: who draws them rejects the others."""
         text = st.binary(min_size=CASE_BYTES, max_size=CASE_BYTES)
         return text.map(lambda data: self.as_given(self.generator.case(Source(data), self.blamed, self._aims)))
 
@@ -134,19 +134,10 @@ class Bench:
     def sent(self, inputs: Inputs) -> dict[str, Any]:
         return sent_inputs(inputs, doubles=self.doubles)
 
-    def configured(self, test: Callable[..., None]) -> Callable[..., None]:
-        """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""
-        return seed(self.seed)(configuration(self, tuple(Phase))(test))
-
-    def check(self, name: str, inputs: Inputs) -> None:
-        """The guarantee holds of what the subject makes of the inputs. Raises AssertionError, in contract words."""
-        assume(self.assumed(inputs))
-        found = self.run(inputs)
-        held = self.guarantees[name].judged.holds(self.values_of(inputs, found))
-        if held is None:
-            raise AssertionError(f"{name} cannot be judged of {told(inputs, found)}")
-        if not held:
-            raise AssertionError(f"{name} is broken: {told(inputs, found)}")
+    def hold(self, name: str) -> None:
+        """For pytest: nothing that is tried breaks the guarantee. Raises AssertionError, in contract words."""
+        if broken := self._broken(name):
+            raise AssertionError(broken)
 
     def run(self, inputs: Inputs) -> dict[str, Value]:
         """The subject's outputs. Raises SubjectFailed."""
@@ -207,10 +198,16 @@ class Bench:
         return 1 if fault or any(found.values()) else 0
 
     def _broken(self, name: str) -> str:
-        @self.configured
+        @seed(self.seed)
+        @configuration(self, tuple(Phase))
         @given(self.inputs)
         def every(inputs: Inputs) -> None:
-            self.check(name, inputs)
+            assume(self.assumed(inputs))
+            found = self.run(inputs)
+            held = self.guarantees[name].judged.holds(self.values_of(inputs, found))
+            if not held:
+                what = "is broken:" if held is False else "cannot be judged of"
+                raise AssertionError(f"{name} {what} {told(inputs, found)}")
 
         try:
             every()

@@ -285,11 +285,6 @@ class SequenceBench(Bench):
         near = near if end is None else math.nextafter(near, end)
         return Fraction(near) if math.isfinite(near) else Fraction(0)
 
-    def hold(self, name: str) -> None:
-        """For pytest: no run breaks the guarantee. Raises AssertionError, in contract words."""
-        broken = self._broken(name)
-        assert not broken, broken
-
     def _broken(self, name: str) -> str:
         if not self._swept:
             self._swept = True
