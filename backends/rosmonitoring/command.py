@@ -196,7 +196,9 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling
     from .session import session
 
     running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
-    return _told(running, _violations(running, trace), trace, telling)
+    # each with the line of the event at which it was found; the last line's where it took the whole run
+    found = running.read(cast(io.BufferedReader, sys.stdin.buffer).read1) if trace == "-" else running.run(Path(trace))
+    return _told(running, found, trace, telling)
 
 
 def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Telling) -> int:
@@ -267,11 +269,6 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
-
-
-def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:
-    """With the line of the event at which each was found; the last line's where it took the whole run."""
-    return running.run(Path(trace)) if trace != "-" else running.read(cast(io.BufferedReader, sys.stdin.buffer).read1)
 
 
 def _anything_judged(running: Session) -> bool:

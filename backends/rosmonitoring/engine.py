@@ -20,17 +20,29 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
+from .answers import (
+    accused,
+    ask,
+    came,
+    doubtful,
+    finish,
+    judge_answer,
+    judge_part,
+    own,
+    saw,
+    scatter,
+    sure,
+    withdraw,
+)
 from .coverage import Tally
 from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
 from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
 from .pace import SIMULATED, By, Clock, Passage, Timing
 from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
-from .parts import came, finish, judge_part, own, scatter
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .waiting_answers import accused, ask, doubtful, judge_answer, saw, sure, withdraw
 from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text
 from .wires import MappingError
 from .word import Message, Word, follow, word_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -96,23 +96,23 @@ class Session:
 
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """As `run`: lines, and what was found there; often nothing, so that whoever waits can look at the clock."""
-        compiled, line = Compiled(self.monitors, self.told, self.heard), 0
-        if is_bag(path):
-            for _, found in compiled.events(messages(path, origin(self.system), self.listens)):
-                yield 0, found
-        else:
-            for line, found in compiled.run(path):
-                yield line, found
-        yield line, list(self.finish())
+        compiled = Compiled(self.monitors, self.told, self.heard)
+        if not is_bag(path):
+            return self._whole(compiled.run(path))
+        events = compiled.events(messages(path, origin(self.system), self.listens))
+        return self._whole((0, found) for _, found in events)
 
     def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
         """As `run`, of lines of standard input as they come, as `Compiled.lines`. Raises Rejected, OSError."""
+        lines = Compiled(self.monitors, self.told, self.heard).lines(read, "<stdin>")
+        return ((line, violation) for line, found in self._whole(lines) for violation in found)
+
+    def _whole(self, judged: Iterable[tuple[int, list[Violation]]]) -> Iterator[tuple[int, list[Violation]]]:
+        """The same, and what is judged once the run is over."""
         line = 0
-        for line, found in Compiled(self.monitors, self.told, self.heard).lines(read, "<stdin>"):
-            for violation in found:
-                yield line, violation
-        for violation in self.finish():
-            yield line, violation
+        for line, found in judged:
+            yield line, found
+        yield line, list(self.finish())
 
     def told(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
         """What was found at one event, with who is to blame."""

@@ -94,7 +94,7 @@ class Watched:
     outputs: frozenset[str] = frozenset()
     """Those that must all be published anew before it is judged: they are the parts of one answer."""
     fresh: dict[object, dict[str, Part]] = field(default_factory=dict)
-    """The parts of answers that are not whole yet, by what the parts of one answer have in common (`parts`)."""
+    """The parts of answers that are not whole yet, by what the parts of one answer have in common (`answers`)."""
     counted: dict[str, int] = field(default_factory=dict)
     """By order: how many messages each output has had."""
     scattered: bool = False

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..answers import asks, judges_answers_alone, speaks, sure
 from ..engine import Monitor
 from ..options import same_topic
 from ..pace import SEQUENCE, Passage, Timing
 from ..pairing import Asked, ticks_of
 from ..rules import FieldPath
 from ..tuning import TICKS, TIMES_APART
-from ..waiting_answers import asks, judges_answers_alone, speaks, sure
 from ..watched import Violation, Watched
 from .plans import Plan, Watch, below, is_seen
 from .shapes import Shape

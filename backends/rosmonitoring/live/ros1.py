@@ -18,7 +18,7 @@ from functools import partial
 from socketserver import ThreadingMixIn
 from typing import Any
 from urllib.parse import urlparse
-from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+from xmlrpc.server import SimpleXMLRPCServer
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
@@ -34,10 +34,6 @@ HOST = "127.0.0.1"
 
 class _Server(ThreadingMixIn, SimpleXMLRPCServer):
     daemon_threads = True
-
-
-class _Handler(SimpleXMLRPCRequestHandler):
-    rpc_paths = ("/", "/RPC2")
 
 
 class Ros1:
@@ -66,7 +62,7 @@ class Ros1:
 
     def __enter__(self) -> Ros1:
         """Raises Rejected where no master answers, also not while it is asked again for some seconds."""
-        self._slave = _Server((self.host, 0), requestHandler=_Handler, logRequests=False, allow_none=True)
+        self._slave = _Server((self.host, 0), logRequests=False, allow_none=True)
         calls: dict[str, Any] = {"publisherUpdate": self._publishers, "requestTopic": self._requested}
         for name, call in calls.items():
             self._slave.register_function(call, name)
@@ -256,10 +252,6 @@ class Spoken:
             except (OSError, ValueError):
                 if self._listening.fileno() < 0:
                     return
-
-    @property
-    def listeners(self) -> int:
-        return len(self._lines)
 
     def say(self, raw: bytes) -> None:
         with self._lock:
