@@ -20,7 +20,7 @@ from avow.calculus.composition import Composition, argument, asked, composed
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds, Claim
 from avow.calculus.questions import Answer
-from avow.calculus.requirements import requirement_question
+from avow.calculus.requirements import requirement_question, supports
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.subsystem_contracts import innermost
 from avow.calculus.variables import OBSERVED, Frame
@@ -35,7 +35,7 @@ from avow.language.definitions import show_clause
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
 from avow.solving.limits import effort_told
-from avow.system.plan import Endpoint, Requirement, System
+from avow.system.plan import Endpoint, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +249,7 @@ def _requirements(composition: Composition) -> Iterator[Task]:
     scenario = frame.system.plan.scenario
     everything = composition.meanings.all(frozenset(frame.graph.nodes))
     for requirement in frame.system.plan.requirements:
-        question = requirement_question(frame, requirement)
+        question = requirement_question(composition, requirement)
         if question is None:
             continue
         tried = scenario.digest if scenario and requirement.temporal else ""
@@ -264,23 +264,6 @@ def _requirements(composition: Composition) -> Iterator[Task]:
             clauses=supports(composition, requirement),
             span=requirement.span,
         )
-
-
-def supports(composition: Composition, requirement: Requirement) -> tuple[str, ...]:
-    """The guarantees that a requirement names as its support, directly, by node or by derivation."""
-    found: dict[str, None] = {}
-    for name in requirement.supported_by:
-        owner, dot, _ = name.partition(".")
-        goal = next((g for g in composition.goals if g.name == name), None)
-        if goal is not None:
-            nodes = composition.leaves(goal, goal.root.guaranteed)
-        elif dot:
-            found[name] = None
-            continue
-        else:
-            nodes = (owner,)
-        found.update({f"{n}.{g.name}": None for n in nodes for g in composition.frame.node(n).guarantees})
-    return tuple(found)
 
 
 def _task(

@@ -249,16 +249,34 @@ class TemporalQuestion:
         return replace(answer, everything=True)
 
 
-def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuestion | TemporalQuestion | None:
+def requirement_question(
+    composition: Composition, requirement: Requirement
+) -> FormulaQuestion | TemporalQuestion | None:
     """The question behind a requirement; None where it is prose. Raises Rejected for a formula that is wrong."""
-    contract = frame.system.contract
+    frame = composition.frame
     if requirement.formula is not None:
-        support = tuple(name for entry in requirement.supported_by for name in _expand(frame, entry))
-        return formula_question(frame, requirement.id, tuple(dict.fromkeys(support)))
+        return formula_question(frame, requirement.id, supports(composition, requirement))
     if requirement.temporal is not None:
-        formula = parse_property(requirement.temporal, contract, requirement.formula_span)
+        formula = parse_property(requirement.temporal, frame.system.contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
     return None
+
+
+def supports(composition: Composition, requirement: Requirement) -> tuple[str, ...]:
+    """The guarantees that a requirement names as its support, directly, by node or by derivation."""
+    found: dict[str, None] = {}
+    for name in requirement.supported_by:
+        owner, dot, _ = name.partition(".")
+        goal = next((g for g in composition.goals if g.name == name), None)
+        if goal is not None:
+            nodes = composition.leaves(goal, goal.root.guaranteed)
+        elif dot:
+            found[name] = None
+            continue
+        else:
+            nodes = (owner,)
+        found.update({f"{n}.{g.name}": None for n in nodes for g in composition.frame.node(n).guarantees})
+    return tuple(found)
 
 
 def formula_question(frame: Frame, name: str, support: tuple[str, ...]) -> FormulaQuestion:
@@ -275,17 +293,8 @@ def _every_guarantee(frame: Frame) -> tuple[str, ...]:
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:
     names = dict.fromkeys(label.removesuffix(" one step before") for label in labels)
-    known = {f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees}
+    known = frozenset(_every_guarantee(frame))
     return [name for name in names if name in known]
-
-
-def _expand(frame: Frame, entry: str) -> tuple[str, ...]:
-    node, dot, _ = entry.partition(".")
-    if dot:
-        return (entry,)
-    if node in frame.graph.nodes:
-        return tuple(f"{node}.{g.name}" for g in frame.node(node).guarantees)
-    return ()
 
 
 def _meaning(formula: Property) -> str:

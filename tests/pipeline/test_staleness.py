@@ -293,7 +293,7 @@ def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, m
 def test_temporal_requirements_look_at_the_steps_and_others_do_not(tmp_path: Path) -> None:
     system = watched(copied(SHIPPED, tmp_path))
     composition = compose(system)
-    asked = {r.id: requirement_question(composition.frame, r) for r in system.plan.requirements}
+    asked = {r.id: requirement_question(composition, r) for r in system.plan.requirements}
     temporal, formula = asked["REQ4"], asked["REQ3"]
     assert isinstance(temporal, TemporalQuestion)
     assert isinstance(formula, FormulaQuestion)
