@@ -8,7 +8,7 @@ from typing import TypeVar
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
-from avow.formulas.formula import free_variables, substitute
+from avow.formulas.formula import substitute
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term
 from avow.language.sorts import (
@@ -35,6 +35,10 @@ T = TypeVar("T")
 
 Table = Mapping[str, tuple[str, Span]]
 """The plan's `variables`: key as written → meaning as written, and its place."""
+
+
+_Place = tuple[Role, str]
+"""A port's role and name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,102 +214,73 @@ class _Checker:
     # -- what the ports are in the program -----------------------------------------------------------------------------
 
     def _reading(self, entries: tuple[_Entry, ...]) -> Reading:
-        terms: dict[tuple[Role, str], Term] = {}
-        predicates: dict[tuple[Role, str], Predicate] = {}
-        spans: dict[tuple[Role, str], Span] = {}
+        found: dict[_Place, Predicate] = {}
+        spans = {(entry.port.role, entry.port.name): entry.span for entry in entries}
         for entry in entries:
-            at = (entry.port.role, entry.port.name)
-            spans[at] = entry.span
-            if entry.parameters is None:
-                found = self._attempt(lambda entry=entry: self._whole(entry))  # type: ignore[misc]
-                if found is not None:
-                    terms[at] = found
-            else:
-                predicate = self._attempt(lambda entry=entry: self._predicate(entry))  # type: ignore[misc]
-                if predicate is not None:
-                    predicates[at] = predicate
-        mapped = {(entry.port.role, entry.port.name) for entry in entries}
+            meaning = self._attempt(lambda entry=entry: self._meaning(entry))  # type: ignore[misc]
+            if meaning is not None:
+                found[entry.port.role, entry.port.name] = meaning
         for port in (*self.node.inputs, *self.node.outputs):
             at = (port.role, port.name)
-            if at not in mapped and port.name in self.names.sorts:
+            if at not in spans and port.name in self.names.sorts:
                 same = variable(port.name, self.names.sorts[port.name])
                 place = port.span or self.source.span
                 fitted = self._attempt(lambda same=same, port=port, place=place: fit(same, port.sort, place))  # type: ignore[misc]
                 if fitted is not None:
-                    terms[at] = fitted
-        self._givens(terms, predicates)
-        self._outputs(terms, predicates, spans)
+                    found[at] = Predicate((), fitted)
+        self._givens(found)
+        self._outputs(found, spans)
         ghosts: dict[Variable, Term] = dict(self.ghosts)
-        inputs = {at: substitute(t, ghosts) if at[0] is Role.INPUT else t for at, t in terms.items()}
-        relations = {
-            at: Predicate(p.parameters, substitute(p.meaning, ghosts) if at[0] is Role.INPUT else p.meaning)
-            for at, p in predicates.items()
-        }
-        self.ports = {name: t for (role, name), t in inputs.items() if role is Role.INPUT}
-        plain = all(isinstance(t, Variable) for t in terms.values()) and not predicates
-        return Reading(inputs, relations, self._restrictions(terms, predicates), not plain)
+        first = {at: Predicate(p.parameters, substitute(p.meaning, ghosts)) for at, p in found.items()}
+        read = {at: first[at] if at[0] is Role.INPUT else p for at, p in found.items()}
+        terms = {at: p.meaning for at, p in read.items() if not p.parameters}
+        self.ports = {name: t for (role, name), t in terms.items() if role is Role.INPUT}
+        plain = all(isinstance(p.meaning, Variable) and not p.parameters for p in found.values())
+        relations = {at: p for at, p in read.items() if p.parameters}
+        return Reading(terms, relations, self._restrictions(found), not plain)
 
-    def _whole(self, entry: _Entry) -> Term:
-        found = fit(term(entry.meaning, Scope(self.names)), entry.port.sort, entry.span)
-        if isinstance(entry.port.sort, FunctionSort) and not isinstance(found, Variable):
-            raise rejected("HOARE400", "a function can only be read as a function variable of the program", entry.span)
-        return found
-
-    def _predicate(self, entry: _Entry) -> Predicate:
-        assert entry.parameters is not None
+    def _meaning(self, entry: _Entry) -> Predicate:
+        """What a line of the table says; of a whole port without parameters."""
+        if entry.parameters is None:
+            whole = fit(term(entry.meaning, Scope(self.names)), entry.port.sort, entry.span)
+            if isinstance(entry.port.sort, FunctionSort) and not isinstance(whole, Variable):
+                message = "a function can only be read as a function variable of the program"
+                raise rejected("HOARE400", message, entry.span)
+            return Predicate((), whole)
         taken = [p.name for p in entry.parameters if p.name in self.names.vocabulary.values]
         if taken:
             raise rejected("HOARE400", f"`{taken[0]}` is a value of the contract, no name for an argument", entry.span)
         local = {p.name: p for p in entry.parameters}
         return Predicate(entry.parameters, formula(entry.meaning, Scope(self.names, local, quantifiers=True)))
 
-    def _givens(self, terms: Mapping[tuple[Role, str], Term], predicates: Mapping[tuple[Role, str], Predicate]) -> None:
-        for (role, _), found in terms.items():
+    def _givens(self, found: Mapping[_Place, Predicate]) -> None:
+        for (role, _), read in found.items():
             if role is Role.INPUT:
-                self.given.update((v.name, v) for v in free_variables(found))
-        for (role, _), predicate in predicates.items():
-            if role is Role.INPUT:
-                free = free_variables(predicate.meaning) - frozenset(predicate.parameters)
-                self.given.update((v.name, v) for v in free)
-        for name, found in self.given.items():
+                self.given.update((v.name, v) for v in read.free)
+        for name, given in self.given.items():
             if name in self.assigned_names:
-                self.ghosts[found] = variable(f"{name}₀", found.sort)
+                self.ghosts[given] = variable(f"{name}₀", given.sort)
 
-    def _outputs(
-        self,
-        terms: Mapping[tuple[Role, str], Term],
-        predicates: Mapping[tuple[Role, str], Predicate],
-        spans: Mapping[tuple[Role, str], Span],
-    ) -> None:
+    def _outputs(self, found: Mapping[_Place, Predicate], spans: Mapping[_Place, Span]) -> None:
         """What an output is read as must be something that the program sets or is given."""
         known = sorted({*self.assigned_names, *self.given})
-        spoken = [(at, free_variables(t)) for at, t in terms.items()]
-        spoken += [(at, free_variables(p.meaning) - frozenset(p.parameters)) for at, p in predicates.items()]
-        for at, free in spoken:
-            for found in sorted(free, key=lambda v: v.name):
-                if at[0] is Role.OUTPUT and found.name not in known and at in spans:
-                    message = f"the program neither sets nor is given `{found.name}`"
-                    self._problem("HOARE400", message, spans[at], did_you_mean(found.name, known))
+        for at, read in found.items():
+            for used in sorted(read.free, key=lambda v: v.name):
+                if at[0] is Role.OUTPUT and used.name not in known and at in spans:
+                    message = f"the program neither sets nor is given `{used.name}`"
+                    self._problem("HOARE400", message, spans[at], did_you_mean(used.name, known))
 
-    def _restrictions(
-        self, terms: Mapping[tuple[Role, str], Term], predicates: Mapping[tuple[Role, str], Predicate]
-    ) -> tuple[str, ...]:
+    def _restrictions(self, found: Mapping[_Place, Predicate]) -> tuple[str, ...]:
         """Readings of inputs that leave out some of an input's values: the claim is then about the others."""
         said: list[str] = []
         used: set[Variable] = set()
-        for (role, name), found in sorted(terms.items(), key=lambda item: item[0]):
-            if role is not Role.INPUT:
-                continue
-            sort = self.node.input(name).sort
-            if _covers(found, sort, used):
-                continue
-            kind = "" if found.sort == sort else f", {show_sort(found.sort)}"
-            said.append(f"in.{name} is {show_term(found, 'unicode')}{kind}: the plan covers no other value of it")
-        said += [
-            f"in.{name}(…) is {show_term(p.meaning, 'unicode')}: the plan covers no other relation"
-            for (role, name), p in sorted(predicates.items())
-            if role is Role.INPUT
-        ]
+        for (role, name), read in sorted(found.items(), key=lambda item: (bool(item[1].parameters), item[0])):
+            shown = show_term(read.meaning, "unicode")
+            if role is Role.INPUT and read.parameters:
+                said.append(f"in.{name}(…) is {shown}: the plan covers no other relation")
+            elif role is Role.INPUT and not _covers(read.meaning, sort := self.node.input(name).sort, used):
+                kind = "" if read.meaning.sort == sort else f", {show_sort(read.meaning.sort)}"
+                said.append(f"in.{name} is {shown}{kind}: the plan covers no other value of it")
         return tuple(said)
 
     # -- statements ----------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
+from avow.formulas.formula import free_variables
 from avow.language.sorts import DataSort, Sort
 from avow.language.terms import Role, Term, Variable
 
@@ -98,6 +99,11 @@ class Predicate:
 
     parameters: tuple[Variable, ...]
     meaning: Term
+
+    @property
+    def free(self) -> frozenset[Variable]:
+        """The program's variables that it speaks of."""
+        return free_variables(self.meaning) - frozenset(self.parameters)
 
 
 @dataclass(frozen=True, slots=True)
