@@ -132,7 +132,7 @@ def test_the_version_decides(version: str, commands: bool) -> None:
     assert has_commands(version) is commands
 
 
-@pytest.mark.parametrize(("again", "others"), [(VERIFIED, Verdict.PROVED), (None, Verdict.UNKNOWN)])
+@pytest.mark.parametrize(("again", "others"), some([(VERIFIED, Verdict.PROVED), (None, Verdict.UNKNOWN)], 1, slow=1))
 def test_only_the_guarantee_whose_ensures_failed_is_unproved(
     make_job: MakeJob, tmp_path: Path, dafny4: Any, again: dict[str, Any] | None, others: Verdict
 ) -> None:

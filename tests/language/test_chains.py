@@ -86,6 +86,7 @@ def test_a_chain_is_accepted_laid_out_and_translated(name: str) -> None:
     assert time.process_time() - began < 10
 
 
+@pytest.mark.slow
 def test_many_elements_and_many_clauses() -> None:
     names = ", ".join(f"e{i}" for i in range(MANY))
     contract, found = check_text(FRAME.format(names=names, formula="o") + "\n", "f")
