@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -225,7 +225,7 @@ def adopt_orphans() -> None:
         return
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     _LIBC.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-    here.adopted_since = frozenset(_children(os.getpid()))
+    here.adopted_since = frozenset(children(os.getpid()))
 
 
 def forget_orphans() -> None:
@@ -234,18 +234,19 @@ def forget_orphans() -> None:
     here.running.clear()
 
 
-def end_orphans() -> bool:
-    """Kill all that became our child unasked, until nothing is left; whether there was any. See `adopt_orphans`."""
+def end_orphans(own: Collection[int] = ()) -> bool:
+    """Kill all that became our child unasked, until nothing is left; whether there was any but these `own`. See
+    `adopt_orphans`."""
     if here.adopted_since is None:
         return False
     found = False
     for _ in range(1000):  # what is killed may leave children of its own, which become ours
         with here.lock:
             expected = here.adopted_since | here.running
-        orphans = [pid for pid in _children(os.getpid()) if pid not in expected]
+        orphans = [pid for pid in children(os.getpid()) if pid not in expected]
         if not orphans:
             return found
-        found = True
+        found = found or any(pid not in own for pid in orphans)
         for pid in orphans:
             kill_tree(pid)
         for pid in orphans:
@@ -285,7 +286,8 @@ def guard(*, tied: bool) -> None:
         os._exit(128 - code if code < 0 else code)
 
 
-def _children(pid: int) -> list[int]:
+def children(pid: int) -> list[int]:
+    """The processes that one has started itself, or has adopted."""
     return _parents().get(pid, [])
 
 

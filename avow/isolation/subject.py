@@ -115,7 +115,8 @@ class SubjectProcess:
         )
 
     def close(self) -> str:
-        """End it, with all that it started; what it did that no subject may do, in words."""
+        """End it, with all that it started; in words what it did that no subject may do, or why its end says nothing
+        of it (`silent`): no answer counts then."""
         if self.process is not None:
             os.close(self._to)
             self._to = -1
@@ -128,7 +129,7 @@ class SubjectProcess:
                 if not self.silent:
                     self.fault = self.fault or f"the subject does not end as it is asked: {failure}"
         self._stop()
-        return self.fault
+        return self.fault or self.silent
 
     # -- inside ------------------------------------------------------------------------------------------
 
@@ -201,13 +202,15 @@ class SubjectProcess:
     def _stop(self) -> None:
         if self.process is not None:
             self.code = self.process.poll()
+            # of a subject that does not answer the process is strace's child, and becomes ours as both are ended
+            own = process.children(self.process.pid) if self._trace is not None and self.silent else ()
             process.ended_with(self.code)
             process.kill_tree(self.process.pid)
             self.process.wait()
             process.unwatch(self.process.pid)
             for channel in {self._to, self._from} - {-1}:
                 os.close(channel)
-            left = process.end_orphans()
+            left = process.end_orphans(own)
             if self._printed is not None:
                 self._printed.end()
                 self._judge_printed()

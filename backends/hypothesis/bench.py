@@ -346,8 +346,8 @@ class Bench:
         try:
             yield twin
         finally:
-            fault = twin.close()
-            first.fault = first.fault or fault
+            twin.close()
+            first.fault = first.fault or twin.fault
             self.silent = self.silent or twin.silent
 
     def _asked_apart(self) -> list[tuple[Pairs, str]]:
