@@ -299,7 +299,10 @@ def parse_formula(
     other steps; as a `clause`, it may be a response as well. `span` is where the text stands. Raises `Rejected`, with
     every error.
     """
-    return _parse(text, node, contract, span, extra, roles, formula=True, remembers=remembers, clause=clause)
+    tree, reports = syntax_of(text, span)
+    checker = _checker(reports, node, contract, extra, roles, remembers=remembers or clause)
+    read = checker.clause if clause else checker.formula
+    return _sound(None if tree is None else read(tree), reports)
 
 
 def parse_term(
@@ -311,32 +314,14 @@ def parse_term(
     sort: Sort | None = None,
 ) -> Term:
     """As `parse_formula`, of a term of any sort (``move(0, 1)``, ``red``); with `sort`, converted to that."""
-    return _parse(text, node, contract, span, None, BOTH_ROLES, formula=False, sort=sort)
-
-
-def _parse(
-    text: str,
-    node: Node | None,
-    contract: Contract,
-    span: Span | None,
-    extra: Mapping[str, Sort] | None,
-    roles: frozenset[Role],
-    *,
-    formula: bool,
-    sort: Sort | None = None,
-    remembers: bool = False,
-    clause: bool = False,
-) -> Term:
     tree, reports = syntax_of(text, span)
-    term: Term | None = None
-    if tree is not None:
-        checker = _checker(reports, node, contract, extra, roles, remembers=remembers or clause)
-        if formula:
-            term = checker.clause(tree) if clause else checker.formula(tree)
-        elif sort is not None:
-            term = checker.wanted(tree, sort, "this")
-        else:
-            term = checker.term(tree)
+    checker = _checker(reports, node, contract)
+    if tree is None or sort is None:
+        return _sound(None if tree is None else checker.term(tree), reports)
+    return _sound(checker.wanted(tree, sort, "this"), reports)
+
+
+def _sound(term: Term | None, reports: Reports) -> Term:
     if term is None or reports.failed:
         raise Rejected(*in_order(reports))
     return term
@@ -357,15 +342,15 @@ def syntax_of(
 
 def one_step(tree: TermSyntax, reports: Reports, contract: Contract) -> Term | None:
     """A part of a formula's tree, as `parse_formula` without a node; None where `reports` says why."""
-    return _checker(reports, None, contract, None, BOTH_ROLES).formula(tree)
+    return _checker(reports, None, contract).formula(tree)
 
 
 def _checker(
     reports: Reports,
     node: Node | None,
     contract: Contract,
-    extra: Mapping[str, Sort] | None,
-    roles: frozenset[Role],
+    extra: Mapping[str, Sort] | None = None,
+    roles: frozenset[Role] = BOTH_ROLES,
     *,
     remembers: bool = False,
 ) -> Checker:
