@@ -23,12 +23,11 @@ from avow.language.contract import Definition
 from avow.language.definitions import expand
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
-from avow.language.limits import term_extent
 from avow.language.operators import conditional
 from avow.language.printer import show_sort
 from avow.language.scope import Defined
 from avow.language.sorts import BOOL, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
-from avow.language.subterms import subterms
+from avow.language.subterms import subterms, term_extent
 from avow.language.syntax import Syntax, TermSyntax
 from avow.language.terms import (
     And,

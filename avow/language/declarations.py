@@ -20,7 +20,6 @@ from avow.language.checker import Checker
 from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
-from avow.language.limits import sort_extent, term_extent
 from avow.language.scope import Defined, Environment, Scope
 from avow.language.sorts import (
     Constructor,
@@ -34,7 +33,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.source import Reports, Source
-from avow.language.subterms import subterms
+from avow.language.subterms import sort_extent, subterms, term_extent
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
 
 

@@ -14,10 +14,10 @@ from avow.language.declarations import Declarations
 from avow.language.definedness import with_value
 from avow.language.flat import flat
 from avow.language.lexer import Token, unquote
-from avow.language.limits import sort_extent, term_extent
 from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
 from avow.language.source import Reports
+from avow.language.subterms import sort_extent, term_extent
 from avow.language.syntax import ClauseSyntax, NodeSyntax, RosType, UnspecifiedType
 from avow.language.terms import Role, Term
 from avow.ros.calls import part_topic

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
+from avow.language import parser
 from avow.language.contract import Contract, Definition, Node, Port
-from avow.language.lexer import LONG_UNITS, STEPS, UNITS
+from avow.language.lexer import LONG_UNITS, STEPS, UNITS, Token
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.scope import of_contract
 from avow.language.sorts import DataSort, FunctionSort, SequenceSort, Sort, TupleSort, components
 from avow.language.terms import Past, Role
 from avow.lsp.names import Text
-from avow.lsp.places import Place, place_of
 from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE, QUANTIFIERS, SECTIONS
+from avow.system.schema import plan_schema
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +44,126 @@ class Signature:
     about: str = ""
 
 
+# --- where an offset is, by words, so that it is known while a text is being typed ------------------------------------
+
+_TOP = ("CONTEXT", "NODE")
+_SECTIONS = ("INPUTS", "OUTPUTS", "TOPICS", "STEPS", "DEFINE", "ASSUME", "GUARANTEE")
+_WORDS = {"A": "ASSUME", "G": "GUARANTEE"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """`top` is ``CONTEXT``, ``NODE`` or empty; `section` the part of a node, empty between its parts. `before` are the
+    words of the part up to the offset, without the one being typed; `bound` the variables of the quantifiers around."""
+
+    top: str = ""
+    node: str = ""
+    section: str = ""
+    before: tuple[Token, ...] = ()
+    bound: tuple[str, ...] = ()
+
+    @property
+    def last(self) -> str:
+        """The kind of the word before; empty where there is none."""
+        return self.before[-1].type if self.before else ""
+
+    @property
+    def defines(self) -> bool:
+        """Whether it is in a definition."""
+        return self.section == "DEFINE" or any(t.type == "DEFINE" for t in self.before)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Of a definition."""
+        pairs = pairwise(self.before) if self.defines else ()
+        return tuple(t.text for t, then in pairs if t.type == "NAME" and then.type in ("COLON", "COMMA"))
+
+
+def _place_of(text: Text, offset: int) -> _Place | None:
+    """Where an offset is; None within a comment or a string."""
+    if any(c.start < offset and (offset < c.end or _goes_on(c, offset)) for c in text.comments):
+        return None
+    if any(t.type == "STRING" and t.start < offset < t.end for t in text.tokens):
+        return None
+    before = [t for t in text.tokens if t.end < offset or (t.end == offset and not _is_word(t))]
+    return _scan([t for t in before if t.start < offset])
+
+
+def _goes_on(comment: Token, offset: int) -> bool:
+    """Whether what is typed at the end of a comment belongs to it."""
+    return comment.text.startswith("//") and offset == comment.end
+
+
+def _is_word(token: Token) -> bool:
+    return token.text[:1].isalpha() or token.text[:1] == "_"
+
+
+def _scan(found: Sequence[Token]) -> _Place:
+    top, node, section, start, depth, brace, opened = "", "", "", 0, 0, 0, False
+    for at, token in enumerate(found):
+        kind = token.type
+        between = depth == 0 and (not section or opened)
+        if kind == "NAME" and top == "NODE" and brace and between and token.text in _WORDS:
+            kind = _WORDS[token.text]
+        if kind == "NAME" and token.text == Past.STEPS and top == "NODE" and brace and between:
+            kind = "STEPS"
+        if kind in _TOP:
+            top, node, section, start, depth, brace, opened = kind, "", "", at + 1, 0, 0, False
+        elif kind in _SECTIONS and (kind, top) != ("DEFINE", "CONTEXT"):
+            section, start, depth, opened = kind, at + 1, 0, False
+        elif kind == "LPAR":
+            depth, opened = depth + 1, section != "DEFINE"
+        elif kind == "RPAR":
+            depth = max(depth - 1, 0)
+        elif kind == "LBRACE" and depth == 0:
+            brace += 1
+        elif kind == "RBRACE" and depth == 0:
+            brace = max(brace - 1, 0)
+            if brace == 0:
+                top, node, section, start, opened = "", "", "", at + 1, False
+        elif kind == "NAME" and top == "NODE" and not brace and not node:
+            node = token.text
+        elif kind == "SEMICOLON" and depth == 0 and (top == "CONTEXT" or section == "DEFINE"):
+            section, start = "", at + 1
+    if section and opened and depth == 0:
+        section, start = "", len(found)
+    elif section and not opened and section != "DEFINE":
+        section = "HEAD"
+    elif top == "NODE" and not section:
+        section = "" if brace else "HEAD"
+    part = tuple(found[start:])
+    return _Place(top, node, section, part, _bound(part))
+
+
+def _bound(part: Sequence[Token]) -> tuple[str, ...]:
+    """The variables of the quantifiers that are open at the end of a part."""
+    open_: list[tuple[int, list[str], bool]] = []
+    depth = 0
+    for at, token in enumerate(part):
+        if token.type == "LPAR":
+            depth += 1
+            if at and part[at - 1].type in parser.QUANTIFIERS:
+                open_.append((depth, [], True))
+        elif token.type == "RPAR":
+            depth -= 1
+            while open_ and open_[-1][0] > depth:
+                open_.pop()
+        elif open_ and open_[-1][0] == depth and open_[-1][2]:
+            if token.type in ("BAR", "SEMICOLON"):
+                open_[-1] = (depth, open_[-1][1], False)
+            elif token.type == "NAME" and part[at - 1].type in ("LPAR", "COMMA"):
+                following = part[at + 1].type if at + 1 < len(part) else ""
+                if following in ("COMMA", "IN"):
+                    open_[-1][1].append(token.text)
+    return tuple(name for _, names, _ in open_ for name in names)
+
+
+# --- contracts --------------------------------------------------------------------------------------------------------
+
+
 def offers(text: Text, contract: Contract, offset: int) -> tuple[Offer, ...]:
     """All that may be written at an offset of a contract."""
-    place = place_of(text, offset)
+    place = _place_of(text, offset)
     if place is None:
         return ()
     once: dict[str, Offer] = {}
@@ -51,7 +172,7 @@ def offers(text: Text, contract: Contract, offset: int) -> tuple[Offer, ...]:
     return tuple(once.values())
 
 
-def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
+def _offers(place: _Place, contract: Contract) -> Iterator[Offer]:
     node = next((n for n in contract.nodes if n.name == place.node), None)
     match place.top, place.section:
         case "", _:
@@ -89,7 +210,7 @@ def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
             return
 
 
-def _of_topic(place: Place, node: Node | None) -> Iterator[Offer]:
+def _of_topic(place: _Place, node: Node | None) -> Iterator[Offer]:
     words = [t.type for t in place.before]
     if words[-2:-1] in (["IN"], ["OUT"]) and words[-1] == "DOT":
         yield from _ports(node, Role.INPUT if words[-2] == "IN" else Role.OUTPUT, "")
@@ -102,7 +223,7 @@ def _of_topic(place: Place, node: Node | None) -> Iterator[Offer]:
         yield Offer("matches", "keyword", "the input or output that it carries", "matches(${1:in.name})")
 
 
-def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
+def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
     words = [t.type for t in place.before]
     if len(words) > 1 and words[-1] == "DOT" and words[-2] in ("IN", "OUT"):
         yield from _ports(node, Role.INPUT if words[-2] == "IN" else Role.OUTPUT, "")
@@ -136,7 +257,7 @@ def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...
     return node.definitions if node is not None else contract.definitions
 
 
-def _fields(place: Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
+def _fields(place: _Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
     """Those of the record before the point; where it is none of the node's ports, those of all records."""
     chain: list[str] = []
     for token in reversed(place.before):
@@ -182,7 +303,7 @@ def _values(contract: Contract) -> Iterator[Offer]:
 
 def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
     """How what stands before the innermost open parenthesis is applied."""
-    place = place_of(text, offset)
+    place = _place_of(text, offset)
     inside = place is not None and (place.section in ("ASSUME", "GUARANTEE") or place.defines)
     if place is None or not inside:
         return None
@@ -200,7 +321,7 @@ def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
     return None
 
 
-def _of_head(place: Place, opening: int, contract: Contract, active: int) -> Signature | None:
+def _of_head(place: _Place, opening: int, contract: Contract, active: int) -> Signature | None:
     at = opening - 1
     if place.before[at].type == "RSQUARE":
         while at > 0 and place.before[at].type != "LSQUARE":
@@ -221,7 +342,7 @@ def _of_head(place: Place, opening: int, contract: Contract, active: int) -> Sig
     return replace(found, active=min(active, max(len(found.parameters) - 1, 0))) if found is not None else None
 
 
-def _applied(place: Place, name: str, role: str | None, contract: Contract) -> Signature | None:
+def _applied(place: _Place, name: str, role: str | None, contract: Contract) -> Signature | None:
     """A port or constructor of the contract."""
     node = next((n for n in contract.nodes if n.name == place.node), None)
     ports: list[Port] = [p for p in (*node.inputs, *node.outputs) if p.name == name] if node is not None else []
@@ -245,3 +366,91 @@ def _applied(place: Place, name: str, role: str | None, contract: Contract) -> S
         shown = tuple(map(show_sort, parameters))
         return Signature(f"{name}({', '.join(shown)})", shown, 0, f"an element of {sort.name}")
     return None
+
+
+# --- plans: their keys, from the schema, and the names of the contract ------------------------------------------------
+
+_KEY = re.compile(r"^(?P<indent> *)(?P<dashes>(?:- +)*)(?P<key>[A-Za-z_][\w.]*)\s*:(?P<rest>.*)$")
+_TYPING = re.compile(r"^ *(?:- +)*[\w.]*$")
+_NAMED = ("nodes", "compound", "external")
+
+
+def plan_offers(text: str, contract: Contract, offset: int) -> tuple[Offer, ...]:
+    """All that may be written at an offset of a plan.
+
+    After ``node.`` its ports and guarantees; at the start of a line the
+    keys of the schema, and nodes where these are keys; elsewhere nodes."""
+    begin = text.rfind("\n", 0, offset) + 1
+    line = text[begin:offset]
+    if _in_comment(line):
+        return ()
+    owner = re.search(r"([A-Za-z_][A-Za-z0-9_']*)\.(?:(in|out)\.)?[A-Za-z0-9_']*$", line)
+    if owner is not None:
+        return tuple(_of_node(contract, owner[1], owner[2]))
+    nodes = [Offer(node.name, "node", "node") for node in contract.nodes]
+    if not _TYPING.match(line):
+        return tuple(nodes)
+    path = _path(text[:begin].split("\n"), len(line) - len(line.lstrip(" -")))
+    keys = [Offer(key, "key", detail, f"{key}: ") for key, detail in _keys(path)]
+    if path and path[-1] in _NAMED:
+        keys += [Offer(node.name, "node", "node", f"{node.name}:") for node in contract.nodes]
+    return tuple(keys or nodes)
+
+
+def _in_comment(line: str) -> bool:
+    return bool(re.search(r"(^|\s)#", re.sub(r"\"[^\"]*\"|'[^']*'", "", line)))
+
+
+def _of_node(contract: Contract, owner: str, role: str | None) -> Iterator[Offer]:
+    for node in contract.nodes:
+        if owner in ("in", "out") or node.name == owner:
+            side = role or (owner if owner in ("in", "out") else None)
+            for port in (*node.inputs, *node.outputs):
+                if side is None or port.role == side:
+                    yield Offer(port.name, "input" if port in node.inputs else "output", port.type_name)
+        if node.name == owner and role is None:
+            yield from (Offer(c.name, "guarantee", c.sentence or "") for c in node.guarantees)
+
+
+def _path(lines: Sequence[str], indent: int) -> tuple[str, ...]:
+    """The keys around a line with this indentation, outermost first."""
+    found: list[str] = []
+    for line in reversed(lines):
+        match = _KEY.match(line)
+        if match is None:
+            continue
+        at = len(match["indent"]) + len(match["dashes"])
+        if at < indent:
+            found.append(match["key"])
+            indent = len(match["indent"])
+            if match["dashes"]:
+                indent += 1  # what holds the list may stand in the column of its dashes
+    return tuple(reversed(found))
+
+
+def _keys(path: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The keys that the schema has at a path, with what they are."""
+    here = [plan_schema()]
+    for key in path:
+        here = [inner for schema in here for inner in _under(schema, key)]
+    for schema in here:
+        for key, inner in schema.get("properties", {}).items():
+            yield key, str(inner.get("description", ""))
+
+
+def _under(schema: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
+    properties, other = schema.get("properties", {}), schema.get("additionalProperties")
+    for inner in (properties[key],) if key in properties else (other,) if isinstance(other, dict) else ():
+        yield from _resolved(inner)
+
+
+def _resolved(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The schema, or what it refers to, or chooses among, or lists."""
+    if "$ref" in schema:
+        yield from _resolved(plan_schema()["$defs"][schema["$ref"].rsplit("/", 1)[-1]])
+        return
+    for inner in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
+        yield from _resolved(inner)
+    if isinstance(schema.get("items"), dict):
+        yield from _resolved(schema["items"])
+    yield schema

@@ -21,10 +21,9 @@ from avow.language.load import check_in_part, clean_text
 from avow.lsp import features, protocol
 from avow.lsp.appearance import coloured, folds
 from avow.lsp.background import Answer, Asked, askable
-from avow.lsp.completion import offers, signature
+from avow.lsp.completion import offers, plan_offers, signature
 from avow.lsp.features import Document, StatusLookup
 from avow.lsp.names import CLAUSES, Occurrence, What
-from avow.lsp.plan_completion import plan_offers
 from avow.lsp.plan_names import PlanText
 from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines

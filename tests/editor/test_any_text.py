@@ -12,9 +12,8 @@ pytest.importorskip("pygls")
 from editor.test_client import CONTRACT, PLAN
 
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, coloured, folds
-from avow.lsp.completion import offers, signature
+from avow.lsp.completion import offers, plan_offers, signature
 from avow.lsp.features import Document, analyse, definition, hover, name_at, references, symbols
-from avow.lsp.plan_completion import plan_offers
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.protocol import Lines, semantic_tokens, signature_help
 from avow.lsp.renaming import renamed_with

@@ -10,9 +10,9 @@ from avow.base.tuning.sizes import REFERENCES_AHEAD
 from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
-from avow.language.limits import sort_extent, term_extent
 from avow.language.load import check_text
 from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
+from avow.language.subterms import sort_extent, term_extent
 from avow.language.translate import FORMATS
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
