@@ -69,9 +69,11 @@ class Asked:
         """The keys of the nodes that are being asked about."""
         self.task: asyncio.Task[None] | None = None
 
-    def of(self, node: Node) -> tuple[Answer, ...] | None:
-        """What is known of a node; None while it is not asked."""
-        return self.answers.get(_key(node))
+    def about(self, node: Node, clause: str | None) -> tuple[Answer, ...]:
+        """What is known of a clause of a node, or (None) of the node and its outputs; nothing while it is not asked."""
+        others = {each.name for each in node.clauses}
+        found = self.answers.get(_key(node), ())
+        return tuple(a for a in found if (a.subject not in others if clause is None else a.subject == clause))
 
     def ask(self, systems: Sequence[tuple[Sequence[Source], Contract]]) -> None:
         """Ask of the nodes of these systems of which nothing is known yet, one system after the other; whatever else is

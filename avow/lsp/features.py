@@ -28,8 +28,8 @@ from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
 
 StatusLookup = Callable[[str, str], str | None]
 """(node, clause) → what the ledger says of it, in a few words; None where it says nothing."""
-SanityLookup = Callable[[Node], tuple[Answer, ...] | None]
-"""What is known of a node's sanity; None while it is not asked."""
+SanityLookup = Callable[[Node, str | None], tuple[Answer, ...]]
+"""What is known of the sanity of a node's clause, or (None) of the node and its outputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def hover(
     document: Document,
     offset: int,
     status: StatusLookup = lambda node, clause: None,
-    sanity: SanityLookup = lambda node: None,
+    sanity: SanityLookup = lambda node, clause: (),
 ) -> str | None:
     """Markdown about the thing at an offset: its type, where it comes from, and how its guarantee stands."""
     name = name_at(document, offset)
@@ -237,10 +237,8 @@ def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: Sani
 
 def _sane(node: Node | None, subject: str | None, sanity: SanityLookup) -> list[str]:
     """A line for each sanity claim about a clause, or (None) about the node and its outputs."""
-    clauses = {c.name for c in node.clauses} if node is not None else set()
-    found = (sanity(node) or ()) if node is not None else ()
-    mine = [a for a in found if (a.subject == subject if subject is not None else a.subject not in clauses)]
-    lines = [f"- {_plain(f'{a.verdict}: {a.claim} {a.explanation}'.strip())}" for a in mine]
+    found = sanity(node, subject) if node is not None else ()
+    lines = [f"- {_plain(f'{a.verdict}: {a.claim} {a.explanation}'.strip())}" for a in found]
     return ["\n".join(lines)] if lines else []
 
 

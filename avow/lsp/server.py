@@ -146,10 +146,8 @@ class Server:
                 continue
             is_node = name.meaning.what is What.NODE
             node = nodes.get(name.meaning.name if is_node else name.meaning.owner)
-            found = (self.asked.of(node) or ()) if node is not None else ()
-            clauses = {clause.name for clause in node.clauses} if node is not None else set()
-            mine = (a for a in found if (a.subject not in clauses if is_node else a.subject == name.meaning.name))
-            if answered := tuple(mine):
+            clause = None if is_node else name.meaning.name
+            if node is not None and (answered := self.asked.about(node, clause)):
                 yield name, answered
 
     def publish(self, uri: str) -> None:
@@ -179,7 +177,7 @@ class Server:
 
     def hover(self, document: Document, lines: Lines, params: types.HoverParams) -> types.Hover | None:
         offset = lines.offset(params.position)
-        said = features.hover(document, offset, self.status(document.file), self.asked.of)
+        said = features.hover(document, offset, self.status(document.file), self.asked.about)
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
     def definition(self, document: Document, lines: Lines, params: types.DefinitionParams) -> list[types.Location]:
