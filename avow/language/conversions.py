@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -103,9 +102,7 @@ def common(terms: list[Term]) -> list[Term] | None:
     """The terms brought to one sort, or None."""
     if not terms or all(alike(t.sort, terms[0].sort) for t in terms):
         return terms
-    target: Sort | None = terms[0].sort
-    for term in terms:
-        target = widest(target, term.sort) if target is not None else None
+    target = _widest(terms)
     if target is None:
         return None
     return complete(t if alike(t.sort, target) else convert(t, target) for t in terms)
@@ -114,16 +111,14 @@ def common(terms: list[Term]) -> list[Term] | None:
 def joined(terms: list[Term]) -> Sort:
     """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative, also
     within tuples and sequences. Every one of them is a value of it: a variable that ranges over them has this sort."""
-    return functools.reduce(_join, (t.sort for t in terms))
+    found = _widest(terms)
+    assert found is not None, "they are alike"
+    return found
 
 
-def _join(left: Sort, right: Sort) -> Sort:
-    """The sort that has the values of both, which are alike."""
-    if left == right:
-        return left
-    match left, right:
-        case TupleSort(items=a), TupleSort(items=b):
-            return TupleSort(tuple(map(_join, a, b)), left.labels)
-        case SequenceSort(item=a_), SequenceSort(item=b_):
-            return SequenceSort(_join(a_, b_))
-    return INTEGER
+def _widest(terms: list[Term]) -> Sort | None:
+    """The sort in which each of them has a place, if there is one."""
+    found: Sort | None = terms[0].sort
+    for term in terms:
+        found = None if found is None else widest(found, term.sort)
+    return found

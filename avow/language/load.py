@@ -63,7 +63,7 @@ def check_paths(
 def read_in_part(paths: Iterable[Path]) -> Contract:
     """As much of a contract as can be read, whatever is wrong in it: to look names up, never to verify."""
     found = [source for path in paths if isinstance(source := read_source(path), Source)]
-    return _checked(tuple(map(_as_read, found)), frozenset(), True)[0]
+    return _checked(found, frozenset(), True)[0]
 
 
 def syntax_faults(text: str, span: Span | None) -> tuple[Diagnostic, ...]:
@@ -139,16 +139,8 @@ def check_sources(
     shelf: Shelf | None = None,
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
-    contract, diagnostics = _checked(tuple(map(_as_read, sources)), off, partial, shelf)
+    contract, diagnostics = _checked(sources, off, partial, shelf)
     return (None if any(d.is_error for d in diagnostics) else contract), diagnostics
-
-
-_Text = tuple[str, str, int, int]
-"""A source as a value: its file, the text, and where in the file it begins."""
-
-
-def _as_read(source: Source) -> _Text:
-    return source.file, source.text, source.line, source.column
 
 
 def warnings_of(texts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
@@ -172,23 +164,22 @@ _under: dict[tuple[str, ...], tuple[str, ...]] = {}
 """Texts checked lately → the names that they had, each its own."""
 
 
-_lately: dict[tuple[tuple[_Text, ...], frozenset[str], bool], tuple[Contract, tuple[Diagnostic, ...]]] = {}
+_lately: dict[tuple[object, ...], tuple[Contract, tuple[Diagnostic, ...]]] = {}
 """What was checked lately: a run loads a contract, and then asks what there is to say of it."""
 
 
 def _checked(
-    texts: tuple[_Text, ...], off: frozenset[str], partial: bool, shelf: Shelf | None = None
+    sources: Sequence[Source], off: frozenset[str], partial: bool, shelf: Shelf | None = None
 ) -> tuple[Contract, tuple[Diagnostic, ...]]:
-    key = (texts, off, partial)
+    key = (*((s.file, s.text, s.line, s.column) for s in sources), off, partial)
     found = _lately.get(key)
     if found is None:
-        names = tuple(text[0] for text in texts)
+        names = tuple(source.file for source in sources)
         distinct = len(set(names)) == len(names)
         if not off and not partial and distinct:
             if len(_under) >= CONTRACTS_KEPT:
                 _under.clear()
-            _under[tuple(text[1] for text in texts)] = names
-        sources = [Source(*text) for text in texts]
+            _under[tuple(source.text for source in sources)] = names
         if shelf is not None and distinct and not partial:
             found = by_pieces(sources, off, shelf)
         if found is None:
@@ -229,7 +220,7 @@ def check_in_part(
 ) -> tuple[Contract, tuple[Diagnostic, ...]]:
     """As `check_sources`, with as much of the contract as can be read where something is wrong: to help its author,
     never to verify."""
-    return _checked(tuple(map(_as_read, sources)), off, False)
+    return _checked(sources, off, False)
 
 
 def sound_nodes(contract: Contract, files: Sequence[FileSyntax]) -> tuple[Node, ...]:

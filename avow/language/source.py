@@ -88,11 +88,10 @@ class Reports:
         *,
         hint: str | None = None,
         notes: tuple[tuple[str, Span | None], ...] = (),
-        severity: Severity = Severity.ERROR,
     ) -> None:
         if not self.full:
             message, hint = _short(message), hint and _short(hint)
-            self.add(Diagnostic(code, message, self.source.span(start, end), severity, hint, notes))
+            self.add(Diagnostic(code, message, self.source.span(start, end), Severity.ERROR, hint, notes))
 
     def is_torn(self, start: int, end: int) -> bool:
         """Whether something was left out of this part of the text, so that no more should be said of it."""
