@@ -24,6 +24,7 @@ from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.contract import Node, Port
 from avow.language.sorts import (
     BOOL,
+    BUILTINS,
     REAL,
     DataSort,
     FunctionSort,
@@ -36,7 +37,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.terms import Literal, Variable
-from avow.system.names import BASE_SORTS, ports_named
+from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
 
 Point = tuple[Value, ...]
@@ -231,7 +232,7 @@ def world(frame: Frame) -> World:
     """The scenario of a system. Raises CannotRun where there is none, or its values cannot be read."""
     scenario = frame.system.plan.scenario or Scenario()
     found = World(frame, scenario, {})
-    named = {**BASE_SORTS, **dict(frame.system.contract.types)}
+    named = {**BUILTINS, **dict(frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         sort = named.get(name)
         if sort is not None and not isinstance(sort, FunctionSort):
@@ -263,7 +264,7 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
     """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
     leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
     scenario, found = world.scenario, list[Hypothesis]()
-    named = {**BASE_SORTS, **dict(world.frame.system.contract.types)}
+    named = {**BUILTINS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         ports = ports_named(name, world.frame.system.contract.nodes)
         sort = named.get(name) or (ports[0][1].sort if ports else None)

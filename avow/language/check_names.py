@@ -19,8 +19,6 @@ from avow.language.source import Reports
 from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, TermSyntax, Text
 from avow.language.terms import Construct, EnumValue, Item, Literal, Past, Role, Term, Variable
 
-BUILTINS: dict[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
-
 
 class Names(ABC):
     """Literals and names; a formula's scope, and where to report. The scope's `bound` variables change on the way and

@@ -18,7 +18,6 @@ from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import syntax
 from avow.language.chains import equivalence, implication
 from avow.language.check_history import Histories
-from avow.language.check_names import BUILTINS
 from avow.language.contract import Definition
 from avow.language.definitions import expand
 from avow.language.foreign import FOREIGN_TYPES
@@ -26,7 +25,7 @@ from avow.language.lexer import Token
 from avow.language.operators import conditional
 from avow.language.printer import show_sort
 from avow.language.scope import Defined
-from avow.language.sorts import BOOL, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.sorts import BOOL, BUILTINS, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.subterms import subterms, term_extent
 from avow.language.syntax import Syntax, TermSyntax
 from avow.language.terms import (

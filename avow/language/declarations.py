@@ -15,13 +15,13 @@ from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import syntax
-from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.scope import Defined, Environment, Scope
 from avow.language.sorts import (
+    BUILTINS,
     Constructor,
     DataSort,
     EnumSort,
@@ -287,7 +287,7 @@ class Declarations:
         for part in fields:
             label = part.name
             if label.text in seen:
-                notes: tuple[tuple[str, Span | None], ...] = (("the first is here", seen[label.text]),)
+                notes = (("the first is here", seen[label.text]),)
                 reports.error("RCL214", f"two fields `{label.text}`", label.start, label.end, notes=notes)
                 sound = False
             seen[label.text] = reports.source.span(label.start, label.end)

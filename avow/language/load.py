@@ -253,7 +253,7 @@ def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declar
             name = node.name.text
             span = reports.source.span(node.name.start, node.name.end)
             if name and name in places:
-                notes: tuple[tuple[str, Span | None], ...] = ((f"the first node `{name}` is here", places[name]),)
+                notes = ((f"the first node `{name}` is here", places[name]),)
                 reports.error("RCL219", f"a second node `{name}`", node.name.start, node.name.end, notes=notes)
             places.setdefault(name, span)
             ready.append((node, *check_ports(node, declarations, reports), reports))

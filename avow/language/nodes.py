@@ -39,9 +39,7 @@ def check_ports(
         for part in tree.items if tree is not None else ():
             name = part.name
             if name.text in ports:
-                notes: tuple[tuple[str, Span | None], ...] = (
-                    (f"`{name.text}` is first declared here", ports[name.text].span),
-                )
+                notes = ((f"`{name.text}` is first declared here", ports[name.text].span),)
                 message = f"node `{node.name.text}` has two {'in' if role is Role.INPUT else 'out'}puts `{name.text}`"
                 reports.error("RCL214", message, name.start, name.end, notes=notes)
                 continue
@@ -123,7 +121,7 @@ def _clause(
     place = syntax.name or Token("", "", syntax.start, syntax.start + 1)
     span = reports.source.span(place.start, place.end)
     if name in seen:
-        notes: tuple[tuple[str, Span | None], ...] = ((f"`{name}` is first used here", seen[name]),)
+        notes = ((f"`{name}` is first used here", seen[name]),)
         message = f"two clauses of node `{scope.node}` are called `{name}`"
         hint = None if syntax.name is not None else "a clause without a name is called A1, G2, … by its position"
         reports.error("RCL215", message, place.start, place.end, hint=hint, notes=notes)
@@ -194,7 +192,7 @@ def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Rep
         )
     if other is None:
         return True
-    notes: tuple[tuple[str, Span | None], ...] = ((f"`{topic.name}` is first listed here", other.span),)
+    notes = ((f"`{topic.name}` is first listed here", other.span),)
     reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)
     return False
 

@@ -12,6 +12,7 @@ from typing import assert_never
 from avow.base.plain import decimal
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import (
+    BUILTINS,
     REAL,
     BoolSort,
     DataSort,
@@ -78,7 +79,7 @@ def show_sort(sort: Sort, style: StyleName = "rcl", named: Container[str] | None
     chosen = STYLES[style]
     match sort:
         case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
-            return chosen.sorts[_BUILTIN[type(sort)]]
+            return chosen.sorts[_BUILTIN[sort]]
         case EnumSort(name=name) | DataSort(name=name) | OpaqueSort(name=name) | TupleSort(name=name) if (
             name if named is None else name in named
         ):
@@ -122,13 +123,7 @@ def _in_product(sort: Sort, style: StyleName, named: Container[str] | None) -> s
     return f"({shown})" if isinstance(sort, FunctionSort) else shown
 
 
-_BUILTIN = {
-    BoolSort: "BOOL",
-    RealSort: "REAL",
-    IntegerSort: "INTEGER",
-    NaturalSort: "NATURAL",
-    StringSort: "STRING",
-}
+_BUILTIN = {sort: name for name, sort in BUILTINS.items()}
 
 
 class _Printer:

@@ -6,7 +6,7 @@ A declared name is a name for a sort; sets of names become `EnumSort`, sets of c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from itertools import islice
 from typing import assert_never
@@ -125,6 +125,8 @@ REAL = RealSort()
 INTEGER = IntegerSort()
 NATURAL = NaturalSort()
 STRING = StringSort()
+BUILTINS: Mapping[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
+"""The sorts that have names of their own."""
 
 
 def components(*sorts: Sort) -> Iterator[Sort]:

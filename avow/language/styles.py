@@ -9,6 +9,7 @@ from typing import Literal as OneOf
 from avow.base.records import dataclass
 from avow.language.lexer import quote
 from avow.language.operators import OPERATORS
+from avow.language.sorts import BUILTINS
 from avow.language.terms import Past, Quantifier
 
 StyleName = OneOf["unicode", "rcl", "latex", "text"]
@@ -140,12 +141,11 @@ def _latex_limit(text: str) -> str:
     return rf"_{{[{shown}]}}"
 
 
-_SORTS = {name: name for name in ("BOOL", "REAL", "INTEGER", "NATURAL", "STRING")}
 STYLES: dict[StyleName, Style] = {
     "rcl": Style(
         words=_WORDS,
         quantifiers={q: (f"{q.value}(", " | ", ")") for q in Quantifier},
-        sorts=_SORTS,
+        sorts={name: name for name in BUILTINS},
         times=" x ",
         arrow=" --> ",
         unspecified="{}",

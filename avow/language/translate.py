@@ -19,7 +19,7 @@ from avow.language.definitions import show_clause
 from avow.language.format import format_text
 from avow.language.lexer import quote
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.sorts import BOOL, Constructor
+from avow.language.sorts import BOOL, BUILTINS, Constructor
 from avow.language.styles import StyleName, latex_escape, latex_name
 from avow.language.subterms import subterms
 from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term
@@ -275,10 +275,8 @@ def _port_rows(word: str, ports: tuple[Port, ...]) -> Iterable[str]:
 
 
 def _type(port: Port) -> str:
-    if port.type_name.replace("_", "").isalnum():
-        builtins = {"REAL", "INTEGER", "NATURAL", "BOOL", "STRING"}
-        return show_type(port.sort, "latex") if port.type_name in builtins else latex_name(port.type_name)
-    return show_type(port.sort, "latex")
+    is_declared = port.type_name.replace("_", "").isalnum() and port.type_name not in BUILTINS
+    return latex_name(port.type_name) if is_declared else show_type(port.sort, "latex")
 
 
 def _clause_rows(word: str, node: Node, clauses: tuple[Clause, ...]) -> Iterable[str]:

@@ -14,10 +14,8 @@ from avow.language.load import parse_term
 from avow.language.printer import show_type
 from avow.language.sorts import (
     BOOL,
-    INTEGER,
-    NATURAL,
+    BUILTINS,
     REAL,
-    STRING,
     FunctionSort,
     IntegerSort,
     NaturalSort,
@@ -206,11 +204,11 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
         if name == STEP_LENGTH and name not in types:
             yield from _unusable(f"scenario.domains.{name}", texts, REAL, contract, span)
             continue
-        if name not in BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
-            yield _unknown("scenario.domains: type or port", name, [*BASE_SORTS, *types, *everything], span)
+        if name not in BUILTINS and name not in types and not ports_named(name, contract.nodes):
+            yield _unknown("scenario.domains: type or port", name, [*BUILTINS, *types, *everything], span)
             continue
         place = (domains.at(name) or domains).span if domains else root.span
-        named = BASE_SORTS.get(name) or types.get(name)
+        named = BUILTINS.get(name) or types.get(name)
         sorts = [named] if named else [_domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
         if len(set(sorts)) == 1 and not isinstance(sorts[0], FunctionSort):
             yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
@@ -232,8 +230,6 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 
 
 # -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------
-
-BASE_SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
 
 
 def _unusable(where: str, texts: tuple[str, ...], sort: Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:

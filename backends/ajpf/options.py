@@ -14,10 +14,9 @@ from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.renaming import bound_names
 from avow.language.load import parse_formula
-from avow.language.sorts import IntegerSort, NaturalSort, Sort
+from avow.language.sorts import BUILTINS, IntegerSort, NaturalSort, Sort
 from avow.language.subterms import subterms
 from avow.language.terms import Not, Quantified, Role, Term, Variable
-from avow.system.names import BASE_SORTS
 from avow.system.schema import violations
 
 from .environment import Environment, read_environment
@@ -197,7 +196,7 @@ class _OptionsReader:
                     for variable in term.variables:
                         found.setdefault(variable.name, variable.sort)
         for name, sort in self.options.get("variables", {}).items():
-            found[name] = BASE_SORTS[sort]
+            found[name] = BUILTINS[sort]
         ports = {p.name for p in (*self.job.node.inputs, *self.job.node.outputs)}
         return {name: sort for name, sort in found.items() if name not in ports}
 

@@ -13,6 +13,7 @@ from avow.base.records import dataclass
 from avow.language.contract import Contract, Node
 from avow.language.sorts import (
     BOOL,
+    BUILTINS,
     INTEGER,
     NATURAL,
     REAL,
@@ -57,8 +58,7 @@ class Names:
 
 
 def vocabulary(contract: Contract, node: Node) -> Vocabulary:
-    types: dict[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
-    types.update(contract.types)
+    types = {**BUILTINS, **dict(contract.types)}
     values: dict[str, Term] = dict(contract.constants)
     constructors: dict[str, tuple[DataSort, Constructor]] = {}
     for sort in components(*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))):
