@@ -6,6 +6,7 @@ answered whole is handed on.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,21 +14,31 @@ from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
+from avow.base.codec import Unreadable, from_text
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import read_regular
+from avow.base.files import is_intact, read_regular
 from avow.base.plain import one_line
 from avow.base.tuning.running import WORKER_GRACE
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
+from avow.calculus.kept_answers import KeptAnswers
 from avow.evidence.currency import differing
+from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.isolation.observed import Observed, Seen
 from avow.pipeline.executors import Asked, Came, Desk, Elsewhere, Executor, answered
-from avow.pipeline.mutant_systems import Altered
-from avow.pipeline.requests import Request, Unanswered, read_response
+from avow.pipeline.requests import Altered, Request, Unanswered, read_response
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, is_portable, method_backend, planned_method, tool_identities
+from avow.pipeline.work import (
+    COMPOSE,
+    Work,
+    engine_identity,
+    is_portable,
+    method_backend,
+    planned_method,
+    tool_identities,
+)
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
 
@@ -40,14 +51,17 @@ def settle(
     run: Run,
     altered: Altered | None = None,
     kept: Mapping[str, tuple[Any, ...]] | None = None,
-    earlier: str = "",
 ) -> Report:
     """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once, and
     `earlier` what the engine kept for itself. Never raises for what that process does."""
     if lacking := _lacking(work, run):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
-        request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {}, earlier=earlier)
+        request = replace(
+            request_of(workspace, work, obligations, folder, altered),
+            kept=kept or {},
+            earlier=_earlier(workspace, work, run),
+        )
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
     if run.elsewhere is None or request.root:
@@ -218,3 +232,37 @@ def _failed(
 ) -> Report:
     outcomes = tuple(Outcome(o.id, verdict, why, details={RETRY: True}) for o in obligations)
     return Report(outcomes, work.engine, __version__, logs=logs)
+
+
+ANSWERS = "answers.json"
+"""What the calculus proved before, carried from run to run beside the evidence; a run that believes no earlier one gets
+none of it."""
+
+
+def _earlier(workspace: Workspace, work: Work, run: Run) -> str:
+    """The text that the newest record of a work keeps, if it is what was kept."""
+    if run.fresh or work.engine != COMPOSE:
+        return ""
+    for entry in reversed(ledger_of(workspace.ledger(work.system.name)).records()):
+        record = entry.evidence
+        path = next((path for path in record.outputs if path.endswith(f"/{ANSWERS}")), None)
+        if record.method == COMPOSE and path is not None:
+            try:
+                whole = is_intact(workspace.root / path, record.outputs[path])
+                return read_regular(workspace.root / path).decode() if whole else ""
+            except (OSError, UnicodeDecodeError):
+                return ""
+    return ""
+
+
+def read_answers(text: str) -> KeptAnswers:
+    """Those of this engine and solver."""
+    try:
+        said = from_text(dict[str, str], text)
+    except Unreadable:
+        return KeptAnswers()
+    return KeptAnswers.read(said.get("answers", "") if said.get("engine") == engine_identity() else "")
+
+
+def write_answers(answers: KeptAnswers) -> str:
+    return json.dumps({"engine": engine_identity(), "answers": answers.written()})

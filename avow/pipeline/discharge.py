@@ -22,7 +22,6 @@ from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
 from avow.pipeline import asking
-from avow.pipeline.answers_file import earlier
 from avow.pipeline.export import folder, generated
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
@@ -86,9 +85,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     report = (
         _language(todo)
         if work.engine == LANGUAGE
-        else asking.settle(
-            workspace, work, todo, place, run, kept=_kept(workspace, work, todo), earlier=earlier(workspace, work, run)
-        )
+        else asking.settle(workspace, work, todo, place, run, kept=_kept(workspace, work, todo))
     )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)

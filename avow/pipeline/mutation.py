@@ -25,7 +25,7 @@ from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import asking
-from avow.pipeline.mutant_systems import Altered, chosen
+from avow.pipeline.requests import Altered, chosen
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method
 from avow.sanity.mutants import Difference, Mutant, difference

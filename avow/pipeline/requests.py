@@ -5,17 +5,28 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.base.codec import Unreadable, canonical, from_text, to_json
 from avow.base.records import dataclass
-from avow.pipeline.mutant_systems import Altered
+from avow.language.contract import Clause, Node
+from avow.sanity.mutants import Mutant, telling
+from avow.system.plan import System
 
 Tools = tuple[tuple[str, ...], ...]
 """Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Altered:
+    """Which mutant of which guarantee stands in for the guarantee (see `avow.pipeline.mutation`)."""
+
+    clause: str
+    number: int
+    limit: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,3 +129,19 @@ def lay_out(files: Mapping[str, bytes], root: Path) -> None:
             raise ValueError(f"{name} leaves the folder")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
+
+
+def alter(system: System, node: Node, altered: Altered) -> System:
+    """The system with a mutant in place of a guarantee. Raises KeyError and IndexError for one that there is not."""
+    clause = node.clause(altered.clause)
+    mutant = chosen(node, clause, altered.limit)[altered.number]
+    guarantees = tuple(replace(c, formula=mutant.formula) if c.name == clause.name else c for c in node.guarantees)
+    changed = replace(node, guarantees=guarantees)
+    nodes = tuple(changed if n.name == node.name else n for n in system.contract.nodes)
+    return replace(system, contract=replace(system.contract, nodes=nodes))
+
+
+def chosen(node: Node, clause: Clause, limit: int) -> tuple[Mutant, ...]:
+    """The mutants that are tried: the same ones, in the same order, in every process."""
+    others = tuple(g.formula for g in node.guarantees if g.name != clause.name)
+    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit, others=others)

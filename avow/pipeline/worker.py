@@ -32,11 +32,18 @@ from avow.calculus.obligations import settle_each
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import REMARKS, RETRY
 from avow.pipeline import recheck
-from avow.pipeline.answers_file import ANSWERS, read_answers, write_answers
-from avow.pipeline.asking import CHANGED
+from avow.pipeline.asking import ANSWERS, CHANGED, read_answers, write_answers
 from avow.pipeline.blobs import Garbled, decode
-from avow.pipeline.mutant_systems import alter
-from avow.pipeline.requests import Request, Response, Tools, lay_out, read_request, request_digest, response_bytes
+from avow.pipeline.requests import (
+    Request,
+    Response,
+    Tools,
+    alter,
+    lay_out,
+    read_request,
+    request_digest,
+    response_bytes,
+)
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
 from avow.pipeline.work import (
     COMPOSE,

@@ -17,7 +17,7 @@ from avow.calculus.kept_answers import KeptAnswers, keeping
 from avow.calculus.obligations import reestablished
 from avow.evidence.ledger import ledger_of
 from avow.kernel.solvers import Said
-from avow.pipeline.answers_file import earlier, read_answers
+from avow.pipeline.asking import _earlier, read_answers
 from avow.pipeline.discharge import discharge
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
@@ -140,13 +140,13 @@ def test_answers_are_kept_beside_the_evidence_and_bound_to_it(tmp_path: Path) ->
     (folder / "system.rcl").write_text(chain(3))
     (folder / "plan.yaml").write_text("system: made\ncontract: system.rcl\n")
     work = next(w for w in catalogue(load_system(folder)).works if w.engine == COMPOSE)
-    assert earlier(workspace, work, Run("first", False)) == ""
+    assert _earlier(workspace, work, Run("first", False)) == ""
     discharge(workspace, work, Run("first", False))
-    kept = earlier(workspace, work, Run("second", False))
+    kept = _earlier(workspace, work, Run("second", False))
     assert read_answers(kept).before
-    assert earlier(workspace, work, Run("second", True)) == ""  # a fresh run believes no earlier one
+    assert _earlier(workspace, work, Run("second", True)) == ""  # a fresh run believes no earlier one
     record = ledger_of(workspace.ledger("made")).records()[-1].evidence
     assert still_counts(record, tmp_path, work.system, Run("third", False))
     path = tmp_path / next(p for p in record.outputs if p.endswith("/answers.json"))
     path.write_text(kept.replace("unsat", "sat"))
-    assert earlier(workspace, work, Run("third", False)) == ""
+    assert _earlier(workspace, work, Run("third", False)) == ""
