@@ -182,7 +182,7 @@ def test_one_who_listens_and_does_not_read_holds_nobody_up(master: Master) -> No
             wait_for(lambda: len(spoken._lines) == 1)
             for _ in range(100):
                 spoken.say(bytes(1 << 20))
-            assert spoken.listeners == 0
+            assert not spoken._lines
         other._publishers("", "/s", [node.uri])
         wait_for(lambda: len(spoken._lines) == 1)
 
