@@ -294,7 +294,7 @@ class _Scanner:
         self.redeclared(name)
         position = self.tokens.index(name) + 1
         if self.text_at(position) == "(":
-            position = self.matching(position) + 1
+            position = matching(self.tokens, position) + 1
         if self.text_at(position) == "<":
             while position < len(self.tokens) and self.text_at(position) not in ("=", "{", "}"):
                 position += 1
@@ -342,13 +342,10 @@ class _Scanner:
         """The text between the braces of `predicate Env(…) { … }`, of the implementation's module itself."""
         return _body_of_env(self.text, self.tokens, self.impl_module)
 
-    def matching(self, at: int) -> int:
-        return matching(self.tokens, at)
-
     def name_after(self, at: int) -> Token | None:
         position = at + 1
         while self.text_at(position) == "{:":
-            position = self.matching(position) + 1
+            position = matching(self.tokens, position) + 1
         if self.text_at(position) == "opened":
             position += 1
         token = self.tokens[position] if position < len(self.tokens) else None

@@ -8,7 +8,7 @@ from dataclasses import field
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
-from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.evaluation.evaluate import Evaluator, compile_term
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import NATURAL, FunctionSort, Sort
 from avow.language.terms import Term
@@ -152,6 +152,3 @@ class Machine:
         if sort == NATURAL and isinstance(value, int) and value < 0:
             raise Fault(f"{value} for a natural number", at)
         return value
-
-
-__all__ = ["Endless", "Fault", "Machine", "NoEnd", "NotEvaluable", "State"]

@@ -16,7 +16,7 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import conjunction, equation, free_variables, negation
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
-from avow.language.sorts import REAL, BoolSort, EnumSort, Sort
+from avow.language.sorts import REAL, BoolSort, EnumSort
 from avow.language.subterms import subterms
 from avow.language.terms import (
     TRUE,
@@ -35,7 +35,7 @@ from avow.solving.limits import spent, until
 from avow.solving.questions import entails, solve
 from avow.solving.replay import replay
 
-from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from
+from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from, stored
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .outline import one_line
 from .program import Assign, Block, If, Match, Program, Skip, Update, While, has_loops, statements, variable
@@ -138,7 +138,7 @@ def _models(
                 continue
             number = _value(term, tried.values)
             if number is not None:
-                fixed.append(Compare("==", term, _literal(number, term.sort)))
+                fixed.append(Compare("==", term, value_term(stored(number, term.sort), term.sort)))
                 break
     for extra in ([fixed] if fixed else []) + [[]]:
         found = solve([*formulas, *extra], effort=effort)
@@ -164,12 +164,10 @@ def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
 
 
 def _one_of(term: Term, pool: Iterable[Fraction]) -> Term | None:
-    choices = tuple(Compare("==", term, _literal(n, term.sort)) for n in pool if fits(n, term.sort))
+    choices = tuple(
+        Compare("==", term, value_term(stored(n, term.sort), term.sort)) for n in pool if fits(n, term.sort)
+    )
     return Or(choices) if choices else None
-
-
-def _literal(number: Fraction, sort: Sort) -> Literal:
-    return Literal(number, REAL) if sort == REAL else Literal(int(number), sort)
 
 
 def _value(term: Term, values: Mapping[Variable, Value]) -> Fraction | None:

@@ -277,6 +277,3 @@ def _sequence(length: Any, elements: Any) -> Any:
     if not isinstance(elements, FunctionValue):
         return SequenceValue(())
     return SequenceValue(tuple(elements(k) for k in range(count)))
-
-
-__all__ = ["Conditions", "Found"]

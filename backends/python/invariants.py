@@ -205,6 +205,3 @@ def _views(loop: For) -> Iterator[View]:
             for part in parts(statement.value):
                 if isinstance(part, Item) and isinstance(part.index, Name):
                     yield part.view
-
-
-__all__ = ["Sequences", "candidates"]

@@ -115,6 +115,3 @@ def _step(
         return None, (refusal,)
     except RecursionError:
         return None, (Refusal(1, "the program is nested too deeply"),)
-
-
-__all__ = ["Reading", "files", "load"]

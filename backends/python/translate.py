@@ -462,6 +462,3 @@ def _word(statement: ast.stmt) -> str:
     return {"While": "while", "Try": "try", "With": "with", "Raise": "raise", "For": "for … else"}.get(
         type(statement).__name__, type(statement).__name__
     )
-
-
-__all__ = ["Scope", "Translator", "kind_of"]
