@@ -18,9 +18,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.given import file_bytes
+from avow.backend_kit.given import file_bytes, mapping, schema
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system.plan import Located
 from avow.system.schema import violations
@@ -33,38 +32,25 @@ from .tuning import DRAWS
 NOTHING = "nothing"
 KEEP = "keep"
 
-_WORDS = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+_TEXT = {"type": "string"}
+_WORDS = {"type": "array", "items": _TEXT, "minItems": 1}
 _NARROWED = {"type": "object", "additionalProperties": _WORDS}
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "properties": {
-        "about": {"type": "string"},
-        "draws": {
-            "type": "object",
-            "properties": {
-                "at_start": {"type": "boolean"},
-                "at_quiescence": {"enum": ["once", "repeatedly", "never"]},
-                "quiet": {"type": "array", "items": {"type": "string"}},
-            },
-            "additionalProperties": False,
-        },
-        "percepts": {"type": "object", "additionalProperties": _WORDS},
+_DRAWS = {
+    "at_start": {"type": "boolean"},
+    "at_quiescence": {"enum": ["once", "repeatedly", "never"]},
+    "quiet": {"type": "array", "items": _TEXT},
+}
+_SCHEMA = schema(
+    {
+        "about": _TEXT,
+        "draws": mapping(_DRAWS),
+        "percepts": _NARROWED,
         "start": _NARROWED,
         "after": {"type": "object", "additionalProperties": _NARROWED},
-        "fair": {
-            "type": "array",
-            "items": {
-                "type": "object",
-                "properties": {"percept": {"type": "string"}, "because": {"type": "string"}},
-                "required": ["percept", "because"],
-                "additionalProperties": False,
-            },
-        },
+        "fair": {"type": "array", "items": mapping({"percept": _TEXT, "because": _TEXT}, "percept", "because")},
     },
-    "required": ["percepts"],
-    "additionalProperties": False,
-}
+    "percepts",
+)
 
 
 def _listed(names: Sequence[str], last: str = "and") -> str:
@@ -151,7 +137,7 @@ def read_environment(path: Path) -> Environment:
     if problems:
         raise Rejected(*problems)
     located = piece.located()
-    faults = [replace(fault, code="AJPF110") for fault in violations(located, SCHEMA, "environment")]
+    faults = [replace(fault, code="AJPF110") for fault in violations(located, _SCHEMA, "environment")]
     if faults:
         raise Rejected(*faults)
     return _read(located)

@@ -7,6 +7,7 @@ import time
 from array import array
 from typing import Any
 
+from avow.formulas.lasso import monitor
 from avow.formulas.ltl import Automaton
 
 from .builtin import Crash
@@ -51,7 +52,7 @@ def open_part(system: System, wanted: Property, states: int, seconds: float) -> 
     automaton = automaton_of(Not(wanted.formula))
     places = {atom: at for at, atom in enumerate(dict.fromkeys(atoms(wanted.formula)))}
     tests = [compiled(leaf, places) for leaf in automaton.leaves]
-    useful, lost = _useful(automaton), _lost(automaton)
+    useful, lost = monitor(automaton).live, _lost(automaton)
     part = _Part(system)
     labels: list[int] = []
 
@@ -90,20 +91,6 @@ def _followed(part: _Part, number: int) -> bool:
         seen.add(number)
         number = part.after(number)[0]
     return number in seen
-
-
-def _useful(automaton: Automaton[Formula]) -> frozenset[int]:
-    """Nodes from which each acceptance set can be reached: without one, no run from there is accepted."""
-    useful = set(range(len(automaton.successors)))
-    for accepting in automaton.accepting:
-        good = set(accepting)
-        while True:
-            more = {n for n in useful - good if good.intersection(automaton.successors[n])}
-            if not more:
-                break
-            good |= more
-        useful &= good
-    return frozenset(useful)
 
 
 def _lost(automaton: Automaton[Formula]) -> frozenset[int]:

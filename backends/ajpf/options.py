@@ -259,16 +259,15 @@ class _OptionsReader:
     def extras(self, programs: Sequence[Program] | None, instances: Mapping[str, tuple[int, ...]]) -> tuple[Extra, ...]:
         found = []
         for name, entry in self.options.get("properties", {}).items():
-            text = entry if isinstance(entry, str) else entry["psl"]
-            formula = self.psl(text, programs, "properties", name)
+            data: Mapping[str, Any] = {"psl": entry} if isinstance(entry, str) else entry
+            formula = self.psl(data["psl"], programs, "properties", name)
             if formula is None:
                 continue
-            guarantee = None if isinstance(entry, str) else entry.get("guarantee")
+            guarantee = data.get("guarantee")
             if guarantee is not None and guarantee not in [c.name for c in self.job.node.guarantees]:
                 message = f"properties.{name}: there is no guarantee '{guarantee}'"
                 self.fault("AJPF125", message, "properties", name, "guarantee")
                 continue
-            data = {} if isinstance(entry, str) else entry
             own = self.ranges(data.get("instances", {}), "properties", name, "instances")
             ranges = {**self.domains(), **instances, **own}
             indices = {i: ranges[i] for i in sorted(index_names(formula) & set(ranges))}

@@ -6,7 +6,7 @@ Beyond AJPF's syntax, arguments may be index variables and ``i + 1`` of them, to
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from .psl import (
@@ -242,16 +242,12 @@ def _index(value: int) -> Struct:
 
 def index_names(formula: Formula) -> frozenset[str]:
     """Names without arguments in the formula's terms: constants, or index variables."""
-    found: set[str] = set()
+    return frozenset(name for atom in atoms(formula) for arg in atom.term.args for name in _constants(arg))
 
-    def walk(term: Term) -> None:
-        if isinstance(term, Struct):
-            if not term.args:
-                found.add(term.functor)
-            for arg in term.args:
-                walk(arg)
 
-    for atom in atoms(formula):
-        for arg in atom.term.args:
-            walk(arg)
-    return frozenset(found)
+def _constants(term: Term) -> Iterator[str]:
+    if isinstance(term, Struct):
+        if not term.args:
+            yield term.functor
+        for arg in term.args:
+            yield from _constants(arg)

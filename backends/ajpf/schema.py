@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from avow.backend_kit.given import file, schema, text
+from avow.backend_kit.given import file, mapping, schema, text
 
 _TEXT = {"type": "string"}
 _RANGES: dict[str, Any] = {
@@ -43,22 +43,17 @@ SCHEMA = schema(
             "additionalProperties": {
                 "anyOf": [
                     _TEXT,
-                    {
-                        "type": "object",
-                        "properties": {
+                    mapping(
+                        {
                             "psl": _TEXT,
                             "guarantee": text("whose verdict it belongs to"),
                             "counts": {"type": "boolean", "description": "false: listed only; default true"},
                             "instances": {**_RANGES, "description": "narrower ranges than the method's"},
-                            "forbids": {
-                                **_TEXT,
-                                "description": "RCL pattern: what the guarantee forbids; this says when",
-                            },
+                            "forbids": text("RCL pattern: what the guarantee forbids; this says when"),
                             "because": _TEXT,
                         },
-                        "required": ["psl"],
-                        "additionalProperties": False,
-                    },
+                        "psl",
+                    ),
                 ]
             },
         },

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict, bound
@@ -70,18 +70,17 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     own = [*claim.properties, *stand_ins]
     hollow = [p for p in own if frame.results[p.key].vacuous or frame.results[p.key].valid]
     details["properties"] = [_entry(p, frame.results[p.key]) for p in claim.properties]
-    if claim.granted:
-        details["taken_for_granted"] = list(claim.granted)
-    if claim.left:
-        details["left_to_properties"] = {left.forbidden: left.extra for left in claim.left}
-    if claim.settled:
-        details["settled_by_the_scenario"] = list(claim.settled)
-    if attached:
-        details["further_properties"] = [
+    optional: dict[str, Sized] = {
+        "taken_for_granted": list(claim.granted),
+        "left_to_properties": {left.forbidden: left.extra for left in claim.left},
+        "settled_by_the_scenario": list(claim.settled),
+        "further_properties": [
             {"name": e.name, "counts": e.counts, "because": e.because}
             | {"properties": [_entry(p, frame.results[p.key]) for p in ps]}
             for e, ps in attached
-        ]
+        ],
+    }
+    details |= {key: value for key, value in optional.items() if value}
     counterexample = None
     if verdict is Verdict.REFUTED:
         shown = (p for p in counted if frame.results[p.key].verdict is Verdict.REFUTED)
@@ -220,14 +219,11 @@ def _entry(p: Property, result: Settled) -> dict[str, object]:
     }
     if p.trigger is not None:
         entry["vacuous"] = result.vacuous
-    if result.immediate:
-        entry["immediate"] = True
-    if result.valid:
-        entry["tautology"] = True
-    if result.answer not in (None, result.verdict):
-        entry["answer"] = str(result.answer)
-    if result.reason:
-        entry["reason"] = result.reason
-    if result.opinions:
-        entry["second_opinions"] = dict(result.opinions)
-    return entry
+    optional = {
+        "immediate": result.immediate,
+        "tautology": result.valid,
+        "answer": "" if result.answer in (None, result.verdict) else str(result.answer),
+        "reason": result.reason,
+        "second_opinions": dict(result.opinions),
+    }
+    return entry | {key: value for key, value in optional.items() if value}

@@ -78,32 +78,16 @@ def parse(text: str) -> Expression:
 _Eval = Callable[[Mapping[str, Fraction]], Interval]
 
 
-def _minus(a: Interval, b: Interval) -> Interval:
-    return Interval(a.low - b.high, a.high - b.low)
-
-
-def _negative(a: Interval) -> Interval:
-    return Interval(-a.high, -a.low)
-
-
 def _abs(a: Interval) -> Interval:
     if a.low >= 0:
         return a
-    return _negative(a) if a.high <= 0 else Interval(Fraction(0), max(-a.low, a.high))
-
-
-def _square(a: Interval) -> Interval:
-    positive = _abs(a)
-    return Interval(positive.low**2, positive.high**2)
-
-
-def _sqrt(a: Interval) -> Interval:
-    return Interval(root(a.low)[0], root(a.high)[1])
+    return Interval(-a.high, -a.low) if a.high <= 0 else Interval(Fraction(0), max(-a.low, a.high))
 
 
 def _hypot(*items: Interval) -> Interval:
-    squares = [_square(i) for i in items]
-    return _sqrt(Interval(sum((s.low for s in squares), Fraction(0)), sum((s.high for s in squares), Fraction(0))))
+    sides = [_abs(item) for item in items]
+    low, high = sum((s.low**2 for s in sides), Fraction(0)), sum((s.high**2 for s in sides), Fraction(0))
+    return Interval(root(low)[0], root(high)[1])
 
 
 def _max(*items: Interval) -> Interval:
@@ -167,7 +151,11 @@ class _Build:
         one, two = [end.name for end in ends] if len(ends) == 2 else ("", "")
         if one == two or not left.of or not left.of <= {one, two}:
             raise Malformed("half a width is max(a, b) - mean(a, b), of two different columns", left.at, "EXP106")
-        value: _Eval = lambda row: _minus(left.value(row), Interval.of((row[one] + row[two]) / 2))  # noqa: E731
+
+        def value(row: Mapping[str, Fraction]) -> Interval:
+            whole, centre = left.value(row), (row[one] + row[two]) / 2
+            return Interval(whole.low - centre, whole.high - centre)
+
         return _Part(value, (*left.columns, one, two), left.at, left.depth, halves=True)
 
     def call(self, c: list[Any]) -> _Part:
