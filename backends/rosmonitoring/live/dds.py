@@ -211,6 +211,7 @@ class Dds:
             info = sample.sample_info
             writer = self._writers.get(info.publication_handle)
             if info.valid_data and writer is not None and writer.reader is reader:
+                writer.settled = True  # whatever discovery says of it later
                 found.append((info.source_timestamp, reader.heard, sample.data))
         for _, heard, data in sorted(found, key=lambda one: one[0]):
             self.inbox.message(heard.topic, partial(_event, heard, data))
