@@ -20,8 +20,7 @@ from typing import Any
 
 from hypothesis import Phase, assume, given, seed
 from hypothesis import strategies as st
-from hypothesis.errors import FailedHealthCheck, Unsatisfiable
-from hypothesis.internal.conjecture import providers
+from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 
 from avow.base.codec import from_text
 from avow.base.files import text_or_nothing
@@ -59,11 +58,6 @@ from .judging import Trigger, blamed, guarantee, judged
 from .pools import constants, pools
 from .shrink import OutOfTime, configuration, smallest
 from .tuning import AFTER_COUNTING, APART, ASKED_AGAIN, BATCH, CASE_BYTES, COUNTED, EDGES, SCOUT_PATIENCE, TRIED
-
-# Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
-# and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
-if hasattr(providers, "is_local_module_file"):
-    providers.is_local_module_file = lambda path: False
 
 
 class Bench:
@@ -198,12 +192,17 @@ class Bench:
         return 1 if fault or any(found.values()) else 0
 
     def _broken(self, name: str) -> str:
+        """What breaks the guarantee, with all that it takes to see it again; empty where nothing does."""
+
         @seed(self.seed)
         @configuration(self, tuple(Phase))
         @given(self.inputs)
         def every(inputs: Inputs) -> None:
             assume(self.assumed(inputs))
-            found = self.run(inputs)
+            try:
+                found = self.run(inputs)
+            except SubjectFailed as error:
+                raise AssertionError(f"{name}: {error}, of {told(inputs, {})}") from error
             held = self.guarantees[name].judged.holds(self.values_of(inputs, found))
             if not held:
                 what = "is broken:" if held is False else "cannot be judged of"
@@ -211,7 +210,9 @@ class Bench:
 
         try:
             every()
-        except (AssertionError, SubjectFailed, Unsatisfiable, FailedHealthCheck) as fault:
+        except AssertionError as broken:
+            return str(broken)
+        except (Flaky, Unsatisfiable, FailedHealthCheck) as fault:
             return f"{name}: {fault}"
         return ""
 

@@ -289,10 +289,10 @@ class SequenceBench(Bench):
         if not self._swept:
             self._swept = True
             self._sweep()
-        each = self.guarantees[name]
         if self.crash is not None:
-            return f"{name}: {self.crash[1]}"
-        return f"{name}: {told(*each.failure)}" if each.failure is not None else ""
+            return f"{name}: {self.crash[1]}{_run_told(', of ', self.traces.get('crash', []))}"
+        broken = self.guarantees[name].failure is not None
+        return f"{name} is broken{_run_told(': ', self.traces[name])}" if broken else ""
 
     # -- what was found ----------------------------------------------------------------------------------
 
@@ -443,6 +443,11 @@ class SequenceBench(Bench):
         trace = self.traces[name]
         case = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
         return replace(found, case=case, trace=tuple(pairs(*step) for step in trace) if len(trace) > 1 else ())
+
+
+def _run_told(before: str, trace: Trace) -> str:
+    """The steps that show it, where there are any."""
+    return f"{before}{'; then '.join(told(*step) for step in trace)}" if trace else ""
 
 
 def _as_host(data: Any, but: Collection[str] = ()) -> Any:

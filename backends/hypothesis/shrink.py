@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from hypothesis import HealthCheck, Phase, assume, given, seed, settings
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
+from hypothesis.internal.conjecture import providers
 
 from .convention import Case, told
 from .generate import Inputs, Source
@@ -16,6 +17,12 @@ from .tuning import SHRINKING_SECONDS
 
 if TYPE_CHECKING:
     from .bench import Bench
+
+
+# Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
+# and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
+if hasattr(providers, "is_local_module_file"):
+    providers.is_local_module_file = lambda path: False
 
 
 class OutOfTime(BaseException):

@@ -71,7 +71,7 @@ ELSEWHERE = {
     "avow/system/schema.plan_schema": ONCE,
     "avow/system/schema._validator": ONCE,
     "backends/ajpf/spin_tool.version": ONCE,
-    "backends/hypothesis/bench.providers.is_local_module_file": PATCHED,
+    "backends/hypothesis/shrink.providers.is_local_module_file": PATCHED,
 }
 """What outlives a call in the other rooms, and why it may."""
 FUNCTIONS = {"attrgetter", "itemgetter"}
