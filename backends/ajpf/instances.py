@@ -1,5 +1,6 @@
 """A guarantee as properties: one instance for each value of its index variables, read as `avow.backends.ajpf.reading`
-says."""
+says. What is told of them: what no instance covers, and words that neither program nor environment ever has (mostly
+slips of the pen: what no agent of this program could do is forbidden for nothing)."""
 
 from __future__ import annotations
 

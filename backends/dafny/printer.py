@@ -1,4 +1,4 @@
-"""Typed terms as Dafny expressions.
+"""Typed terms as Dafny expressions, and the contract's names as Dafny identifiers.
 
 Every quantifier becomes a call of a named predicate that holds its body: bare nested quantifiers leave Dafny without
 terms to trigger on, and an implementation can name a witness (``assert Contract.exit_ex1(in_map, out_command, x, y)``).

@@ -1,4 +1,5 @@
-"""An input on which the program really breaks a triple: found by the solver, then shown by running the program.
+"""An input on which the program really breaks a triple, or never ends: found by the solver, then shown by running the
+program.
 
 Simple numbers are tried first: those between the thresholds that program and triple mention, then the thresholds.
 """

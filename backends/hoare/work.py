@@ -1,4 +1,5 @@
-"""A job, read: program and table held against the node, and the triples that are to be proved."""
+"""A job, read: program and table held against the node, and the triples that are to be proved; the program as a model
+that can be run on single inputs; and where its numbers are others than the contract's."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from avow.backend_kit.given import job_for
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular, write
+from avow.base.persons import wrong_day
 from avow.language.contract import Node
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -65,7 +66,7 @@ def stamp_record(
         raise Rejected(*(Diagnostic("REV121", message, span, hint=hint) for message, span in changed))
     date = piece.entries.get("date")
     if editor.changed and renewed is not None and date is not None:
-        if renewed < date.text:
+        if not wrong_day(date.text) and renewed < date.text:  # what is no day, or still to come, is mended by it
             message = f"the review of {date.text} cannot have been renewed on {renewed}"
             raise Rejected(Diagnostic("REV112", message, date.span))
         editor.replace(date.span, renewed)

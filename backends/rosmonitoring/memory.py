@@ -2,7 +2,7 @@
 
 A step is a judgement of the clause. Where one went by unseen (a message was lost, could not be read, or an answer never
 was whole), all that is remembered is unknown from then on, until the steps that follow say it anew: what depends on it
-is not decided, and never held.
+is not decided, and never held. Of a clause with limits in seconds, also when silence breaks it between its steps.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a field of a known type holds, as a value: every number is the one that the message carries, in any transport.
+"""What a field holds, as a value: every number is the one that the message carries, in any transport.
 
 A `float32` or `float64` means its exact binary number: digits of a JSON text are first rounded to the type, as they are
-in the node that reads the message.
+in the node that reads the message. Where the type is not known, they mean what they say.
 """
 
 from __future__ import annotations

@@ -84,6 +84,16 @@ def test_a_changed_contract_must_be_read_again(folder: Path, capsys: pytest.Capt
     assert read_record(folder / "review.yaml").date == "2026-11-21"
 
 
+@pytest.mark.parametrize("day", ["TBD", "2999-01-01", "21.11.2026"])
+def test_a_date_that_none_was_is_mended_by_renewing(folder: Path, day: str) -> None:
+    stamp(folder, "n", method="review")
+    (folder / "s.rcl").write_text(CONTRACT.replace("120", "121"))
+    record = folder / "review.yaml"
+    record.write_text("".join(f"date: {day}\n" if x.startswith("date:") else x for x in record.open()))
+    assert main([str(folder), "n", "--method", "review", "--renewed", "2026-11-21"]) == 0
+    assert read_record(record).date == "2026-11-21"
+
+
 @pytest.mark.parametrize("arguments", [["nobody"], ["n", "--method", "third"]])
 def test_what_is_not_there_is_told(folder: Path, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(folder), *arguments]) == 2
