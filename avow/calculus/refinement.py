@@ -33,9 +33,9 @@ from avow.kernel.check import Established, Kernel, Refused
 from avow.kernel.statements import Claimed, Place, Statement, Wiring, statements
 from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.printer import show_type
-from avow.language.sorts import INTEGER, NATURAL, DataSort, Sort, parts, rebuilt
+from avow.language.sorts import DataSort, Sort, parts, rebuilt
 from avow.language.subterms import ports_of
-from avow.language.terms import Compare, Literal, Quantified, Role, Term, Variable
+from avow.language.terms import Quantified, Role, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.sanity.viability import viable
 from avow.solving.limits import NO_ANSWER
@@ -114,11 +114,10 @@ def refines(
     faults = _ports(concrete, abstract)
     if faults:
         return Refinement(concrete.name, abstract.name, faults, ())
-    recast = _recasting(concrete, abstract)
+    concrete, abstract = _of_same_ports(concrete, abstract)
     if remembers(concrete) or remembers(abstract):
-        return _over_runs(_recast(concrete, recast), abstract, bounds)
+        return _over_runs(concrete, abstract, bounds)
     given = {f"{abstract.name}.{a.name} (assumed)": a.formula for a in abstract.assumptions}
-    given |= _narrower(abstract.inputs, concrete.inputs)
     demands: list[Demand] = []
 
     def ask(node: str, clause: Clause, goal: Term, hypotheses: dict[str, Term]) -> None:
@@ -129,22 +128,21 @@ def refines(
         demands.append(Demand(node, clause, answer.verdict, answer.needed, shown, answer.reason, answer.vacuous))
 
     for clause in concrete.assumptions:
-        ask(concrete.name, clause, recast(clause.formula), given)
-    offered = given | _narrower(concrete.outputs, abstract.outputs)
-    offered |= {f"{concrete.name}.{a.name} (assumed)": recast(a.formula) for a in concrete.assumptions}
-    offered |= {f"{concrete.name}.{g.name}": recast(g.formula) for g in concrete.guarantees}
+        ask(concrete.name, clause, clause.formula, given)
+    offered = given | {f"{concrete.name}.{a.name} (assumed)": a.formula for a in concrete.assumptions}
+    offered |= {f"{concrete.name}.{g.name}": g.formula for g in concrete.guarantees}
     for clause in abstract.guarantees:
         ask(abstract.name, clause, clause.formula, offered)
-    found = _certified(Refinement(concrete.name, abstract.name, (), tuple(demands)), concrete, abstract, recast)
-    return _kept_by_something(found, concrete, abstract, recast, bounds) if found.verdict is Verdict.PROVED else found
+    found = _certified(Refinement(concrete.name, abstract.name, (), tuple(demands)), concrete, abstract)
+    return _kept_by_something(found, concrete, abstract, bounds) if found.verdict is Verdict.PROVED else found
 
 
-def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term]) -> Refinement:
+def _certified(found: Refinement, concrete: Node, abstract: Node) -> Refinement:
     """A refinement as far as the kernel establishes it."""
     if found.verdict is not Verdict.PROVED:
         return found
 
-    certificate, shown = _established(_recast(concrete, recast), abstract)
+    certificate, shown = _established(concrete, abstract)
     demands = []
     for at, demand in enumerate(found.demands):
         kind = Claimed.ASSUMPTION if at < len(concrete.assumptions) else Claimed.REQUIREMENT
@@ -156,22 +154,31 @@ def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callab
     return replace(found, demands=tuple(demands), certificates=(certificate,))
 
 
-def _recast(concrete: Node, recast: Callable[[Term], Term]) -> Node:
-    """The node in the other's types."""
+def _of_same_ports(concrete: Node, abstract: Node) -> tuple[Node, Node]:
+    """Both nodes over the same ports: the inputs that the second is given, and the outputs that the first gives, in the
+    second's types. Where one has a NATURAL and the other an INTEGER, both then speak of the NATURAL that it is."""
+    recast = _recasting(concrete, abstract)
+    given = {port.name: port for port in abstract.inputs}
+    inputs = tuple(given[port.name] for port in concrete.inputs)
+    outputs = tuple(replace(port, sort=recast(port.variable).sort) for port in concrete.outputs)
+    made = {port.name: port.variable for port in outputs}
+    same = {
+        cast(Variable, recast(old.variable)): new.variable for old, new in zip(concrete.inputs, inputs, strict=True)
+    }
+    same |= {port.variable: made[port.name] for port in abstract.outputs}
 
-    def changed(clauses: tuple[Clause, ...]) -> tuple[Clause, ...]:
-        return tuple(replace(clause, formula=recast(clause.formula)) for clause in clauses)
+    def over(node: Node, change: Callable[[Term], Term]) -> Node:
+        assumptions, guarantees = (
+            tuple(replace(clause, formula=substitute(change(clause.formula), same)) for clause in clauses)
+            for clauses in (node.assumptions, node.guarantees)
+        )
+        return replace(node, assumptions=assumptions, guarantees=guarantees)
 
-    return replace(
-        concrete,
-        outputs=tuple(replace(port, sort=recast(port.variable).sort) for port in concrete.outputs),
-        assumptions=changed(concrete.assumptions),
-        guarantees=changed(concrete.guarantees),
-    )
+    return over(replace(concrete, inputs=inputs, outputs=outputs), recast), over(abstract, lambda term: term)
 
 
 def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
-    """Where clauses speak of other steps, of every run; `concrete` in the types of `abstract`."""
+    """Where clauses speak of other steps, of every run; of the same ports."""
     answers, certificates = _answered(concrete, abstract, bounds)
 
     def demand(node: str, clause: Clause, answer: Answer) -> Demand:
@@ -200,18 +207,12 @@ def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
             return replace(found, doubt=lasting.reason or NO_ANSWER)
 
 
-def _kept_by_something(
-    found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term], bounds: Bounds
-) -> Refinement:
-    def mine(ports: tuple[Port, ...]) -> tuple[Variable, ...]:
-        return tuple(cast(Variable, recast(port.variable)) for port in ports)
-
-    unread = tuple(port.variable for port in abstract.inputs if port.name not in {p.name for p in concrete.inputs})
+def _kept_by_something(found: Refinement, concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
     answer = realizable(
-        (*mine(concrete.inputs), *unread),
-        mine(concrete.outputs),
-        {a.name: a.formula for a in abstract.assumptions} | _narrower(abstract.inputs, concrete.inputs),
-        {g.name: recast(g.formula) for g in concrete.guarantees},
+        tuple(port.variable for port in abstract.inputs),
+        tuple(port.variable for port in concrete.outputs),
+        {a.name: a.formula for a in abstract.assumptions},
+        {g.name: g.formula for g in concrete.guarantees},
         effort=bounds.effort,
         seed=bounds.seed,
         doubtful=True,
@@ -224,16 +225,6 @@ def _kept_by_something(
             return found
         case _:  # no answer: a doubt, never a proof
             return replace(found, doubt=answer.reason or NO_ANSWER)
-
-
-def _narrower(sources: tuple[Port, ...], targets: tuple[Port, ...]) -> dict[str, Term]:
-    """What a value's narrower type says of it where the other node has a wider one: a NATURAL for an INTEGER."""
-    types = {port.name: port.sort for port in sources}
-    return {
-        f"{port.variable.qualified} is a NATURAL": Compare(">=", port.variable, Literal(0, INTEGER))
-        for port in targets
-        if port.sort == INTEGER and types.get(port.name) == NATURAL
-    }
 
 
 def renamed(node: Node, names: Mapping[str, str]) -> Node:

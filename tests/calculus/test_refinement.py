@@ -124,6 +124,19 @@ def test_a_natural_where_the_other_has_an_integer() -> None:
     assert refines(only(negative), only(narrow)).holds
 
 
+def test_a_natural_where_the_other_has_an_integer_over_runs() -> None:
+    """A clause speaks of the port as it is, whatever the step: an earlier input was taken for the one of now, and what
+    had been put out for a value that nothing is known of."""
+    copies = node("n", "r : INTEGER", "x : INTEGER", "G same: out.x == in.r")
+    constant = node("n", "r : NATURAL", "x : INTEGER", "G kept: out.x == previous(out.x, out.x)")
+    assert refines(only(copies), only(constant)).verdict is Verdict.REFUTED
+    three = node("n", "r : INTEGER", "x : NATURAL", "G same: out.x == 3")
+    fed_back = node(
+        "n", "r : INTEGER", "x : INTEGER", "A above: in.r > previous(out.x, 3)", "G kept: out.x == 3 and in.r > 3"
+    )
+    assert refines(only(three), only(fed_back)).verdict is not Verdict.REFUTED  # every run has it
+
+
 def test_ports_must_fit() -> None:
     missing = refines(only(node("n", "r : REAL", "z : REAL")), only(BASE))
     assert missing.verdict is Verdict.REFUTED

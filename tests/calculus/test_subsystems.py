@@ -248,6 +248,16 @@ def test_requirements_rest_on_what_is_shown_inside(tmp_path: Path) -> None:
     } <= {h.name for h in found["R"].rests_on}
 
 
+@pytest.mark.parametrize("support", ["front", "grader", "grader.grade"])
+def test_a_derivation_is_support_as_the_nodes_are_whose_guarantees_it_derives(tmp_path: Path, support: str) -> None:
+    wanted = f"{{R: {{text: t, formula: grader.level == low, supported_by: [source, {support}]}}}}"
+    plan = f"subsystems: {{front: {{nodes: [reader, grader]}}}}\nrequirements: {wanted}"
+    told = outcomes(make(tmp_path, CONTEXT + READER + GRADER + SOURCE, plan))["R"]
+    assert told.verdict is Verdict.PROVED
+    needed = "reader.scaled, grader.grade, source.small"
+    assert told.summary == f"follows at every step from {needed} (not named as its support: reader.scaled)"
+
+
 def test_environment_assumptions_reach_into_subsystems(tmp_path: Path) -> None:
     text = CONTEXT + READER + GRADER
     plan = 'environment: {in.raw: {assume: "0 <= in.raw and in.raw <= 10", because: "a 10 V supply"}}'

@@ -289,3 +289,19 @@ requirements:
     found = outcomes(make(tmp_path, text, plan))
     assert found["SAME"].verdict is Verdict.CHECKED
     assert found["ALWAYS"].verdict is Verdict.REFUTED
+
+
+@pytest.mark.parametrize("when", ["initial", "walk", "look_for_cuts"])
+def test_what_cannot_be_run_is_unknown_whenever_that_comes_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
+    """Also after every step has been looked at: it was told as a fault of Avow's own."""
+
+    def cannot(*_: object, **__: object) -> None:
+        raise CannotRun("what a clause remembers has no value")
+
+    monkeypatch.setattr(Machine, when, cannot)
+    plan = WIRES + requirement("always count.n <= 3")
+    found = outcomes(make(tmp_path, COUNTER, plan))["R"]
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.summary == "the contracts cannot be run over the scenario: what a clause remembers has no value"
