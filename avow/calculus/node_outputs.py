@@ -1,7 +1,8 @@
 """What one node answers: given what it reads, which outputs do its guarantees allow, over the scenario's values?
 
 Relations are found by Z3, a bit for each point at which they may hold; everything else by narrowing. Values that are
-open (`avow.calculus.narrowing`) are asked for only where a clause looks at them.
+open (`avow.calculus.narrowing`) are asked for only where a clause looks at them. And where do the scenario's values cut
+runs off: which outputs that its contract allows were not looked at (`first_cut`)?
 """
 
 from __future__ import annotations

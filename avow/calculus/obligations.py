@@ -1,6 +1,7 @@
 """Composition and requirement obligations: what has to be shown for the system's derivations to stand.
 
-Each obligation is made from a `Task`, which says how it is settled (`avow.calculus.discharge` asks the solver).
+Each obligation is made from a `Task`, which says how it is settled (`avow.calculus.discharge` asks the solver). What an
+answer rests on is told as other obligations, which the case then asks for.
 """
 
 from __future__ import annotations

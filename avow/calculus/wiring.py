@@ -2,6 +2,10 @@
 
 Cells, in which clauses remember, are outputs of their own (`SoundWithMemory` in proofs/kernel.dfy: what a step leaves
 there is a definition); several publishers of a topic are a node that puts out what one of them does.
+
+Of a loop it is asked whether there are first values, and of a guarantee in a circle whether the situation that it is
+about can arise. From these claims nothing is derived: the kernel asks for values that meet them, and takes no proof
+that there are none for an answer.
 """
 
 from __future__ import annotations

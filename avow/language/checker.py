@@ -1,8 +1,8 @@
 """Surface formulas to typed terms: every name resolved, every widening explicit, every error reported.
 
 A part in error becomes None and is not mentioned again, so that one run reports every independent error of a formula.
-Recursion is as deep as the formula, which the parser bounds (`NESTING`). The checker is a class
-in four parts: `check_names`, `check_terms`, `check_history`, and here connectives, quantifiers and definitions.
+Recursion is as deep as the formula, which the parser bounds (`NESTING`). The checker is a class in four parts:
+`check_names`, `check_terms`, `check_history`, and here connectives, quantifiers and definitions.
 """
 
 from __future__ import annotations

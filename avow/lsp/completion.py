@@ -1,4 +1,7 @@
-"""What may be written at a place, and what the arguments of an operator or function are."""
+"""What may be written at a place of a contract or plan, and what the arguments of an operator or function are.
+
+It works on words, so that it does while a text is being typed.
+"""
 
 from __future__ import annotations
 
