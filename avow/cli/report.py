@@ -14,6 +14,7 @@ from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Ledger
 from avow.pipeline.report_check import check, stale
 from avow.pipeline.run_info import sign_with
+from avow.pipeline.state import task_name
 from avow.pipeline.tasks import execute
 
 
@@ -40,9 +41,8 @@ def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json:
     place = workspace()
     systems = require_systems(place, systems)
     sign_with(key)
-    return execute(
-        place.root, [f"report:{name}" for name in systems] or ["report"], answer=sys.stdout if as_json else None
-    )
+    wanted = [f"report:{task_name(name)}" for name in systems] or ["report"]
+    return execute(place.root, wanted, answer=sys.stdout if as_json else None)
 
 
 def _check(folder: Path, as_json: bool) -> int:

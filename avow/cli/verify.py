@@ -44,13 +44,14 @@ def command(
     """Verify every system under contracts/, or only each SYSTEM (its name or folder)."""
     from avow.base.workspace import require_systems, workspace
     from avow.pipeline.run_info import asked_of_runs, sign_with
+    from avow.pipeline.state import task_name
     from avow.pipeline.tasks import execute
 
     place = workspace()
     systems = require_systems(place, systems)
     sign_with(key)
     asked_of_runs(fresh=fresh, explain=explain, sandbox=sandbox, seconds=seconds)
-    wanted = [f"verify:{name}" for name in systems] or ["verify"]
+    wanted = [f"verify:{task_name(name)}" for name in systems] or ["verify"]
     cluster, elsewhere = _cluster(address) if address else (None, None)
     if jobs is None:
         jobs = max(2, cluster.slots) if cluster else 2

@@ -52,8 +52,8 @@ def settle(
     altered: Altered | None = None,
     kept: Mapping[str, tuple[Any, ...]] | None = None,
 ) -> Report:
-    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once, and
-    `earlier` what the engine kept for itself. Never raises for what that process does."""
+    """Settle the obligations in a process of their own, here or elsewhere, with what its engine kept for itself; `kept`
+    are cases that refuted them once. Never raises for what that process does."""
     if lacking := _lacking(work, run):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:

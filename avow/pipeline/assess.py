@@ -7,6 +7,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -85,6 +86,7 @@ def is_settled(state: State) -> bool:
 
 def render(assessment: Assessment) -> Result:
     """Build the case and write every format, unless what stands in reports/ already says the same."""
+    system = assessment.surveyed.system
     ledger = ledger_of(assessment.workspace.ledger(assessment.system))
     acknowledge(assessment.workspace, ledger)
     key = _key(assessment)
@@ -103,7 +105,9 @@ def render(assessment: Assessment) -> Result:
         write_note(assessment.stamp, Rendering(key, files, result))
         assessment.state.changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
-    return result
+    plans = [(Path(d.span.file), f"{d.message} [{d.code}]") for d in checking.left_out(system) if d.span]
+    beside = ((assessment.workspace.relative(path), why) for path, why in plans)
+    return replace(result, left_out=(*result.left_out, *beside))
 
 
 def certify(assessment: Assessment) -> KernelRun:

@@ -25,6 +25,7 @@ from avow.base.tuning.shown import WARNINGS
 from avow.base.workspace import Workspace, plans_below
 from avow.language.load import check_paths
 from avow.pipeline import export as exporting
+from avow.pipeline.state import task_name
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
 from avow.system import launched
@@ -101,7 +102,7 @@ def of_plan(
         *requirement_sentences(system),
         *without_words(system),
         *unconfirmed(system),
-        *(not_verified(path, system.name, Severity.WARNING) for path in _left_out(system)),
+        *left_out(system),
     ]
     for plan in system.plan.nodes:
         for method in plan.methods:
@@ -114,10 +115,13 @@ def of_plan(
     return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
 
 
-def _left_out(system: System) -> tuple[Path, ...]:
-    """The plans below the system's that it does not take in."""
+def left_out(system: System) -> tuple[Diagnostic, ...]:
+    """The plans below the system's that it does not take in, a warning each; none where the plan switches them off."""
+    if "CLI021" in system.plan.lints_off:
+        return ()
     taken_in = {path.resolve() for path in system.plan.included}
-    return tuple(path for path in plans_below(system.plan.root) if path.resolve() not in taken_in)
+    below = (path for path in plans_below(system.plan.root) if path.resolve() not in taken_in)
+    return tuple(not_verified(path, system.name, Severity.WARNING) for path in below)
 
 
 def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERROR) -> Diagnostic:
@@ -244,7 +248,7 @@ def refuse(rejected: Rejected) -> TaskError:
 
 
 def refuse_quietly(name: str) -> TaskError:
-    return TaskError(f"{name} cannot be read; see check:{name}")
+    return TaskError(f"{name} cannot be read; see check:{task_name(name)}")
 
 
 def _stamp(workspace: Workspace, surveyed: Survey) -> Any:
@@ -256,5 +260,5 @@ def _key(surveyed: Survey) -> str:
     plan = surveyed.system.plan
     graph = plan.model.data.get("graph") if isinstance(plan.model.data, dict) else None
     # No obligation depends on the ROS graph, or on plans that are not taken in: only this stage reads them.
-    left_out = [str(path) for path in _left_out(surveyed.system)]
-    return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys, left_out])
+    beside = [str(found.span) for found in left_out(surveyed.system)]
+    return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys, beside])

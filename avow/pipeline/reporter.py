@@ -9,13 +9,14 @@ import sys
 import threading
 import time
 from typing import IO, Any
+from urllib.parse import unquote
 
 from doit.reporter import ConsoleReporter
 
 from avow.base import process
 from avow.base.files import PART
 from avow.base.workspace import Workspace
-from avow.pipeline.state import State
+from avow.pipeline.state import State, system_of
 
 _SILENT = ("certify", "verify")
 """Stages whose result is the report and the final table, not a line of their own; they are done in every run that
@@ -82,7 +83,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             self._running.pop(task.name, None)
             if not getattr(fail, "report", True):
                 return
-            stage, _, subject = task.name.partition(":")
+            stage, _, subject = unquote(task.name).partition(":")
             message = fail.get_msg().strip().splitlines()
             if type(fail).__name__ != "UnmetDependency" and message:
                 self._line(f"  {stage:<11} {subject:<40} {message[-1]}")
@@ -109,8 +110,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         if any(name.split(":")[0] == "obligations" for name in self._selected):
             print_obligations(self._selected, self.outstream)
         broken = sorted(
-            {f["task"].name.split(":")[1] for f in self.failures if ":" in f["task"].name}
-            - set(self._state.results.finished)
+            {name for f in self.failures if (name := system_of(f["task"].name))} - set(self._state.results.finished)
         )
         print_summary(results.all, broken, self._earlier(), self._done, time.monotonic() - self._start, self.outstream)
         append_job_summary(results.all, broken)

@@ -24,7 +24,7 @@ from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
 from avow.pipeline.assess import Assessment, certify, gate, report
 from avow.pipeline.discharge import discharge, open_obligations
-from avow.pipeline.state import State
+from avow.pipeline.state import State, task_name
 from avow.pipeline.work import LANGUAGE, Work
 from avow.pipeline.workload import Survey, survey, write_obligations
 
@@ -41,6 +41,9 @@ STAGES = {
     "report": "render the assurance reports from the ledger",
     "verify": "everything, and the policy's gates",
 }
+
+_OF_A_SYSTEM = ("check", "obligations", "certify", "report", "verify")
+"""Those of which each system has one task."""
 
 
 def stages(state: State) -> Iterator[Task]:
@@ -63,6 +66,9 @@ def stages(state: State) -> Iterator[Task]:
             yield from _rejected(name, surveyed)
         else:
             yield from _system(state, surveyed)
+            called = task_name(same[0].name)
+            for stage in _OF_A_SYSTEM if called not in map(task_name, folders) else ():  # by its folder, too
+                yield {"basename": stage, "name": called, "actions": None, "task_dep": [f"{stage}:{name}"]}
     systems = [surveyed.system for surveyed in found.values() if not isinstance(surveyed, Rejected)]
     taken_in = {path.resolve() for system in systems for path in system.plan.included}
     for path in state.workspace.stray_plans() if len(systems) == len(found) else ():
@@ -96,14 +102,13 @@ def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected
 
 def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
     """A system that cannot be read: its stages say so, the other systems go on."""
-    name = name.replace("=", "-")  # doit would refuse all tasks for one such name
     for stage in STAGES:
         action = (
             partial(checking.refuse, rejected)
             if stage in ("check", "report", "verify")
             else partial(checking.refuse_quietly, name)
         )
-        yield {"basename": stage, "name": name, "actions": [action], "uptodate": [False]}
+        yield {"basename": stage, "name": task_name(name), "actions": [action], "uptodate": [False]}
 
 
 def _system(state: State, surveyed: Survey) -> Iterator[Task]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import field
 from typing import IO, TYPE_CHECKING
+from urllib.parse import unquote
 
 from avow.base.records import dataclass
 from avow.base.workspace import Workspace
@@ -39,3 +41,13 @@ class State:
 
     def __post_init__(self) -> None:
         self.shortcut = Shortcut(self.workspace)
+
+
+def task_name(folder: str) -> str:
+    """A folder's name as part of a task's: doit would refuse all tasks for one ``=``, and ``:`` parts names."""
+    return re.sub("[%:=]", lambda found: f"%{ord(found[0]):02X}", folder)
+
+
+def system_of(task: str) -> str:
+    """The system, or the folder, that a task is of, by the task's name; empty where it is of all."""
+    return unquote(task.partition(":")[2].partition(":")[0])

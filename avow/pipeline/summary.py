@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -13,6 +13,7 @@ from rich.table import Table
 
 from avow.base.codec import Unreadable, document, from_text
 from avow.base.files import read_regular
+from avow.base.rendering import printable
 from avow.base.tuning.shown import GATE_REASON
 from avow.base.verdict import said
 from avow.pipeline.results import Result
@@ -56,6 +57,9 @@ def print_summary(
             if not passed:
                 console.print(f"[red]✗[/] {r.system}: ", end="")
                 console.print(f"{title}: {_few(reason)}", markup=False)
+    for file, why in _left_out(results):
+        console.print("[yellow]–[/] ", end="")
+        console.print(printable(f"{file}: {why}"), markup=False)
     console.print()
     if results:
         index = str(Path(results[0].report).parent.parent / "index.html")
@@ -75,11 +79,17 @@ def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequ
             "counts": dict(r.counts),
             "gates": [{"title": title, "passed": passed, "reason": reason} for title, passed, reason in r.gates],
             "report": r.report,
+            "left_out": [{"file": file, "reason": why} for file, why in r.left_out],
         }
         for r in sorted(results, key=lambda r: r.system)
     ]
     whole = {"systems": listed, "not_done": list(broken), "earlier_state": list(earlier)}
     return document({**whole, "exit_code": 2 if broken else exit_code}) + "\n"
+
+
+def _left_out(results: Sequence[Result]) -> Iterable[tuple[str, str]]:
+    """What was left out, and why: told in every run, and once for all systems."""
+    return dict.fromkeys(row for r in results for row in r.left_out)
 
 
 def _few(reason: str) -> str:
@@ -118,6 +128,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
     lines += [f"| {name} | {'| ' * len(shown)}❌ not done |" for name in broken]
     failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]
     lines += ["", *(f"- **{_inline(system)}**: {_inline(title)}: {_inline(why)}" for system, title, why in failing)]
+    lines += [f"- {_inline(file)}: {_inline(why)}" for file, why in _left_out(results)]
     return "\n".join(lines) + "\n"
 
 

@@ -293,6 +293,9 @@ def test_a_plan_below_another_is_told(begun: Path, tmp_path: Path) -> None:
     done = verify(robot, "check")
     assert done.returncode == 0, done.stderr
     assert f"warning[CLI021]: {deep}:1: this plan is not verified: 'thermostat' does not take it in" in done.stderr
+    for _ in range(3):  # the last of them has nothing to do
+        assert f"{deep}: this plan is not verified: 'thermostat' does not take it in" in verify(robot).stdout
+    assert "CLI021" in verify(robot).stdout
     edit(robot, "policy:", "lints_off: [CLI021]\npolicy:", "plan.yaml")
     assert "CLI021" not in verify(robot, "check").stderr
     edit(robot, "lints_off: [CLI021]", "subsystems: {spare: {system: spare}}", "plan.yaml")

@@ -1,0 +1,89 @@
+"""What no run looks at, and folders with names that are none of a task: told each time, and they stop nothing else."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from avow.base.workspace import Workspace
+from avow.pipeline.check import left_out
+from avow.pipeline.results import Result
+from avow.pipeline.stages import stages
+from avow.pipeline.state import State, system_of, task_name
+from avow.pipeline.summary import job_summary, print_summary, results_json
+from avow.system.load import load_system
+
+CONTRACT = "node n { inputs() outputs( y : REAL ) topics() guarantee low ( out.y <= 1 ) }\n"
+
+
+def system(folder: Path, plan: str = "") -> Path:
+    folder.mkdir(parents=True)
+    (folder / "s.rcl").write_text(CONTRACT)
+    (folder / "plan.yaml").write_text(f"{plan}nodes: {{n: {{criticality: low}}}}\n")
+    return folder
+
+
+def tasks(root: Path) -> Iterator[tuple[str, object]]:
+    for task in stages(State(Workspace(root))):
+        if task["name"] is not None:
+            yield f"{task['basename']}:{task['name']}", task.get("task_dep", ())
+
+
+def test_every_folder_has_a_task_that_doit_takes(tmp_path: Path) -> None:
+    contracts = tmp_path / "contracts"
+    broken = ["a=b", "a-b", "a%3Db", "x:y", "x"]
+    for name in broken:
+        (contracts / name).mkdir(parents=True)
+        (contracts / name / "plan.yaml").write_text("system: [")
+    names = [name for name, _ in tasks(tmp_path)]
+    assert len(names) == len(set(names))
+    assert not [name for name in names if "=" in name]
+    assert {system_of(name) for name in names if name.startswith("verify:")} == set(broken)
+    assert {task_name(name) for name in broken} >= {"a-b", "x"}  # most are as they are written
+
+
+def test_a_system_is_asked_for_by_its_folder_too(tmp_path: Path) -> None:
+    system(tmp_path / "contracts/c=d")
+    system(tmp_path / "contracts/other", "system: crane\n")
+    found = dict(tasks(tmp_path))
+    assert found["verify:c%3Dd"] == ["verify:c_d"]
+    assert found["report:other"] == ["report:crane"]
+    assert "verify:crane" in found
+
+
+def test_a_plan_in_no_systems_folder_has_tasks_of_its_own(tmp_path: Path) -> None:
+    contracts = tmp_path / "contracts"
+    system(contracts / "crane")
+    system(contracts / "heap/spare")
+    assert "verify:contracts/heap/spare" in dict(tasks(tmp_path))
+    (contracts / "crane/plan.yaml").write_text("system: crane\nsubsystems: {one: {system: ../heap/spare}}\n")
+    assert "verify:contracts/heap/spare" not in dict(tasks(tmp_path))
+
+
+@pytest.mark.parametrize(("more", "told"), [("", True), ("lints_off: [CLI021]\n", False)])
+def test_a_plan_below_a_system_that_does_not_take_it_in_is_left_out(tmp_path: Path, more: str, told: bool) -> None:
+    place = system(tmp_path / "crane", more)
+    system(place / "spare")
+    found = left_out(load_system(place))
+    assert [(d.code, d.is_error, d.span and Path(d.span.file)) for d in found] == [
+        ("CLI021", False, place / "spare/plan.yaml")
+    ] * told
+
+
+def test_what_is_left_out_is_told_in_every_summary_once() -> None:
+    pdf, plan = ("report.pdf", "typst is not installed"), ("contracts/crane/spare/plan.yaml", "not verified [CLI021]")
+    gates = (("all", True, "fine"),)
+    found = [
+        Result("crane", 0, {"proved": 3}, "reports/crane/index.html", gates, (pdf, plan)),
+        Result("hook", 0, {"proved": 3}, "reports/hook/index.html", gates, (pdf,)),
+    ]
+    out = io.StringIO()
+    print_summary(found, (), (), 0, 0.1, out)
+    for text in (out.getvalue(), job_summary(found, ())):
+        assert text.count("typst is not installed") == text.count("CLI021") == 1
+    said = json.loads(results_json(found, (), (), 0))["systems"]
+    assert [[row["file"] for row in s["left_out"]] for s in said] == [[pdf[0], plan[0]], [pdf[0]]]
