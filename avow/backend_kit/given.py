@@ -1,4 +1,5 @@
-"""Reading what a plan gives a method, and telling what is wrong with it, in one way for all backends."""
+"""Reading what a plan gives a method, and telling what is wrong with it, in one way for all backends; and the options
+that say how messages are read."""
 
 from __future__ import annotations
 

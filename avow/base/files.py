@@ -1,4 +1,5 @@
-"""Files, written so that a reader never sees half of one, and their digests."""
+"""Files, written so that a reader never sees half of one, and their digests; paths that stay in a folder; and by what
+it is known that a file is as it was."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is the same in every command: how a system is named, `--json`, `--seconds`, `--seed`."""
+"""What is the same in every command: paths, how a system is named, `--json`, `--seconds`, `--seed`."""
 
 from __future__ import annotations
 

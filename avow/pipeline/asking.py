@@ -1,7 +1,7 @@
 """A work is asked of a worker (`avow.pipeline.worker`), and what comes back is judged.
 
 A worker that crashes, hangs, answers something else or too little becomes a verdict. Only what is asked here and
-answered whole is handed on.
+answered whole is handed on. What the calculus proved before goes with it, from run to run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The names in a plan, held against the contract: nodes, ports, guarantees, tables' arities, all located."""
+"""The names in a plan, held against the contract: nodes, ports, guarantees, tables' arities, and whether a scenario's
+values are of the types that they are given for; all located."""
 
 from __future__ import annotations
 

@@ -100,7 +100,8 @@ def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | 
 
 def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
     found = [d for error in _validator()(schema).iter_errors(piece.data) for d in _explain(error, piece, whole)]
-    return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
+    # of what YAML repeats (`*name`) the faults stand at one place, and the validator goes by sets
+    return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column, d.message) if d.span else (0, 0, d.message)))
 
 
 def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:

@@ -170,6 +170,14 @@ def test_depth_is_bounded_also_through_aliases() -> None:
         read_yaml("\n".join(lines).encode(), "plan.yaml")
 
 
+def test_faults_of_what_is_repeated_have_an_order(tmp_path: Path) -> None:
+    """They stand at one place, and are told in the same order by every process."""
+    said = "{says: 7, because: it is so, who: A. Person, until: 2030-01-01}"
+    goals = [f"  g{n}: {{select: [a], persistence: {'*p' if n else f'&p {said}'}}}\n" for n in range(7)]
+    found = [d.message for d in faults(tmp_path, f"compose:\n{''.join(goals)}")]
+    assert [message.partition(":")[0] for message in found] == [f"compose.g{n}.persistence.says" for n in range(7)]
+
+
 def test_aliases_work() -> None:
     piece, problems = read_yaml(b"a: &x {n: 1}\nb: *x\n", "plan.yaml")
     assert not problems
