@@ -105,7 +105,7 @@ PRIVATE = {
     # Lark's own loop takes about twice as long; its tables are read once. The version is held below 2.
     ("avow/language/parser.py", "lark.parsers.lalr_analysis"),
     # Without this, the same seed draws other cases in a checkout than from a wheel. Left out where it is not there.
-    ("backends/hypothesis/bench.py", "hypothesis.internal.conjecture"),
+    ("backends/hypothesis/shrink.py", "hypothesis.internal.conjecture"),
 }
 """What no release of a library promises, and why it is used all the same."""
 
