@@ -301,8 +301,8 @@ _SEGMENTS = frozenset(("NAME", *KEYWORDS.values()))
 
 
 def _topic_names(tokens: Sequence[Token]) -> list[Token]:
-    """The tokens of a list of topics, each name that has several segments as one NAME. A word of the language is an
-    ordinary segment (`/arm/in`)."""
+    """The tokens of a list of topics, each name that has several segments (`/robot1/scan`, `~scan`) as one NAME. White
+    space sets type and name apart; a word of the language is an ordinary segment (`/arm/in`)."""
     found: list[Token] = []
     runs = 0
     for run in _runs(tokens):

@@ -107,7 +107,10 @@ def end_cvc5() -> None:
 
 
 def to_smtlib(contract: Contract) -> str:
-    """One script; between nodes the solver is reset. Raises `Rejected` where SMT-LIB cannot say a formula."""
+    """One script, which asks of each node whether its assumptions and guarantees can hold together; between nodes the
+    solver is reset. Of clauses that speak of other steps it is one step, whatever was before: what is remembered are
+    constants, and what the step leaves is said by an equation for each; first values are told in the comment. Raises
+    `Rejected` where SMT-LIB cannot say a formula."""
     scripts = []
     for node in contract.nodes:
         compiled = compile_node(node)
