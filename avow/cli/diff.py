@@ -22,7 +22,7 @@ from avow.base.files import write_out
 from avow.base.plain import count
 from avow.base.tuning.shown import DIFF_REASONS
 from avow.base.workspace import Workspace, workspace
-from avow.cli.options import json_option
+from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Entry, Ledger, readable
 from avow.pipeline.workload import survey
 
@@ -31,7 +31,7 @@ from avow.pipeline.workload import survey
 @click.argument("old")
 @click.argument("new", required=False)
 @json_option()
-@click.option("--html", "page", type=click.Path(dir_okay=False), help="Write a page to this file, too.")
+@click.option("--html", "page", type=PathArgument(dir_okay=False), help="Write a page to this file, too.")
 @click.option(
     "--fail-on",
     type=click.Choice(["worse", "never"]),
@@ -39,7 +39,7 @@ from avow.pipeline.workload import survey
     show_default=True,
     help="Exit code 1 where less is shown or more supposed than before, or never.",
 )
-def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on: str) -> int:
+def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on: str) -> int:
     """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.
 
     Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
@@ -75,13 +75,13 @@ def _tell(changes: list[Change]) -> None:
         click.echo(f"  asked again, with the same verdict: {count(len(again), 'claim')}")
 
 
-def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
+def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
     """Raises Rejected where the page cannot be written."""
     from avow.report.comparison import render_comparison
 
     text = render_comparison(old, new or "the workspace as it is", changes)
     try:
-        write_out(Path(page), text.encode("utf-8", "replace").decode())
+        write_out(page, text.encode("utf-8", "replace").decode())
     except OSError as error:
         raise Rejected(Diagnostic("DIFF002", f"{page} cannot be written: {error.strerror}")) from None
 

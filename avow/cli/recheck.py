@@ -16,7 +16,7 @@ from avow.calculus.certificates import scope_of
 from avow.calculus.induction import with_lemmas
 from avow.calculus.variables import frame
 from avow.calculus.wiring import wiring
-from avow.cli.options import ContractArgument, json_option
+from avow.cli.options import ContractArgument, PathArgument, json_option
 from avow.kernel.certificate import Certificate, How
 from avow.kernel.check import Kernel, Refused
 from avow.kernel.statements import statements
@@ -59,7 +59,7 @@ class Founded:
 
 @click.command()
 @click.argument("path", metavar="SYSTEM", type=ContractArgument())
-@click.argument("certificates", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("certificates", type=PathArgument(exists=True, dir_okay=False))
 @json_option()
 def command(path: Path, certificates: Path, as_json: bool) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.

@@ -14,9 +14,9 @@ from avow.cli.options import PathArgument, json_option
 @click.command()
 @click.argument("file", type=PathArgument(exists=True, dir_okay=False))
 @json_option()
-def command(file: str, as_json: bool) -> int:
+def command(file: Path, as_json: bool) -> int:
     """The requirements in FILE (CSV or ReqIF) as the `requirements:` section of a plan.yaml, on standard output."""
-    found = read_requirements(Path(file))
+    found = read_requirements(file)
     if as_json:
         keys = ("id", "text", "formula", "temporal", "supported_by")
         listed = [{key: getattr(r, key) for key in keys} for r in found]
