@@ -26,7 +26,7 @@ BUILTINS: dict[t.Builtin, Callable[..., str]] = {
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
     t.Builtin.MAX: lambda *all_: reduce(lambda a, b: f"(ite (> {b} {a}) {b} {a})", all_),
 }
-assert BUILTINS.keys() == set(t.Builtin), "each operator has its text"
+assert BUILTINS.keys() == set(t.Builtin), f"no text in {__file__} for {set(t.Builtin) ^ BUILTINS.keys()}"
 
 # what a free variable is called, with its sort (an INTEGER input may read a NATURAL output); what a bound one is
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]

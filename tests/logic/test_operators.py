@@ -15,22 +15,39 @@ import z3
 from helpers import some
 from oracle.values import Meaning
 
+from avow.backend_kit.protocol import Limits
+from avow.backends.dafny.modules import generate
+from avow.backends.dafny.runner import verify
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
+from avow.evaluation.compiler import member_of
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.formula import digest, free_variables, normalise
 from avow.formulas.negation_normal_form import push_negations
+from avow.isolation.outside import Outside
 from avow.kernel.text import Text
 from avow.language.contract import Node
 from avow.language.definedness import defined
 from avow.language.load import check_text, parse_formula
-from avow.language.operators import OPERATORS, Operator, Why, definition
+from avow.language.operators import OPERATORS, Operator, Typing, Why, definition, operation
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, Sort
 from avow.language.styles import STYLES
 from avow.language.subterms import subterms
-from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Iff, Literal, Operation, Term, Variable
+from avow.language.terms import (
+    And,
+    Arithmetic,
+    Builtin,
+    Compare,
+    Conditional,
+    Iff,
+    Literal,
+    Not,
+    Operation,
+    Term,
+    Variable,
+)
 from avow.sanity.mutants import mutants
 from avow.solving.questions import entails, solve
 from avow.solving.smtlib import ask_cvc5, formulas_script
@@ -263,6 +280,84 @@ def test_a_divisor_stays_positive_in_mutants() -> None:
             if isinstance(part, Operation) and part.operator in (Builtin.MOD, Builtin.DIV):
                 assert isinstance(part.arguments[1], Literal)
                 assert int(part.arguments[1].value) > 0
+
+
+NUMBERS: dict[Sort, tuple[Any, ...]] = {
+    NATURAL: (0, 1, 3),
+    INTEGER: (-7, -1, 0, 2),
+    REAL: (Fraction(-3, 2), Fraction(0), Fraction(1, 2), Fraction(2)),
+}
+"""Values of every type that an operator may be of, below, at, and above 0."""
+
+
+def every_use() -> list[tuple[Builtin, Sort]]:
+    """Each operator with each type of what it may be of."""
+    taken = {Typing.WHOLE: (NATURAL, INTEGER), Typing.FORMULA: (BOOL,), Typing.FORMULAS: (BOOL,)}
+    return [(name, sort) for name in Builtin for sort in taken.get(OPERATORS[name].typing, tuple(NUMBERS))]
+
+
+def uses(name: Builtin, sort: Sort) -> list[tuple[Operation, Any]]:
+    """The operator of values of the type, with what enumeration says that it yields."""
+    takes = OPERATORS[name].takes
+    assert not isinstance(takes, Why)
+    least, most = takes
+    values = NUMBERS.get(sort, (False, True))
+    whole = OPERATORS[name].typing is Typing.WHOLE
+    found = []
+    columns = (values, (1, 3)) if whole else (values,) * (most or least + 1)
+    for given in product(*columns):
+        sorts = (sort, NATURAL) if whole else (sort,) * len(given)
+        term = operation(name, [Literal(v, s) for v, s in zip(given, sorts, strict=True)], None)
+        assert isinstance(term, Operation)
+        found.append((term, Meaning().value(term, [{}])))
+    return found
+
+
+def said_equal(term: Operation, value: Any) -> Term:
+    return term if value is True else Not(term) if value is False else Compare("==", term, Literal(value, term.sort))
+
+
+@pytest.mark.parametrize(("name", "sort"), every_use())
+def test_an_operator_means_the_same_of_every_type(name: Builtin, sort: Sort) -> None:
+    """What it yields is a value of the type that the checker gives it, for every pass the one that enumeration says,
+    whatever it is of: whole numbers, naturals, or reals."""
+    claims = []
+    for term, value in uses(name, sort):
+        got = evaluate(term, {})
+        assert got == value, show_term(term, "rcl")
+        belongs = member_of(term.sort, {})
+        assert belongs is None or belongs(got), f"{show_term(term, 'rcl')} is of type {term.sort}, and yields {got}"
+        claim = said_equal(term, value)
+        by_definition = definition(term)
+        assert by_definition is None or by_definition.sort == term.sort
+        for form in (normalise(claim), push_negations(claim), lifted(claim)):
+            assert evaluate(form, {}) is True, show_term(term, "rcl")
+        claims.append(claim)
+    every = And(tuple(claims))
+    assert entails([], every).verdict is Verdict.PROVED
+    text = Text()
+    solver = z3.Solver()
+    solver.from_string(text.script([f"(not {text.formula(every, lambda variable: (variable.name, variable.sort))})"]))
+    assert solver.check() == z3.unsat
+
+
+@pytest.mark.slow
+@pytest.mark.needs_dafny
+def test_dafny_proves_of_every_type_what_an_operator_yields() -> None:
+    """In the text that `backends/dafny/modules.py` has for each type, which nothing but Dafny reads."""
+    claims = [And(tuple(said_equal(*use) for use in uses(*each))) for each in every_use() if each[1] != NATURAL]
+    clauses = "\n".join(f"guarantee g{k} ( {show_term(claim, 'rcl')} )" for k, claim in enumerate(claims))
+    contract, found = check_text(CONTRACT.replace("guarantee( q )", f"\n{clauses}\n"), "f")
+    assert contract is not None, found
+    made = generate(contract.nodes[0], [g.name for g in contract.nodes[0].guarantees])
+    assert made.uncovered == ()
+    lemmas = [f"  lemma Is{k}() ensures Contract.g{k}() {{}}" for k in range(len(claims))]
+    check = "\n".join(["module Check {", "  import Contract", *lemmas, "}", ""])
+    files = {made.types_file: made.types, made.contract_file: made.contract, "check.dfy": check}
+    run = verify(files, Limits(seconds=400), Outside(()))
+    assert run.members is not None, run.output
+    proved = {m.name for m in run.members if m.kind == "Impl" and m.outcome == "correct"}
+    assert [show_term(claim, "rcl") for k, claim in enumerate(claims) if f"Is{k}" not in proved] == []
 
 
 # -- generated formulas ------------------------------------------------------------------------------------------------
