@@ -78,6 +78,18 @@ def test_every_file_that_the_map_names_is_there() -> None:
     rows = re.findall(r"^\|[^|]*\| `(\w+)` \|[^|]*\| (.*) \|$", page, re.MULTILINE)
     rooms = {p.parent.name for p in (ROOT / "avow").glob("*/__init__.py")} - {"backends"}
     assert rooms <= {room for room, _ in rows}
+    first = re.findall(r"^\|[^|]*\| `([\w/*]+)` \|[^|]*\| (.*) \|$", page, re.MULTILINE)
+    assert first[-1][0] == "base"
+    told = [(room, name) for room, names in first for name in re.findall(r"`([\w./]+)`", names)]
+    assert len(told) > len(rows)
+    backends = [f"backends/{folder.parent.name}" for folder in (ROOT / "backends").glob("*/__init__.py")]
+    folders = {"backends/*": backends} | {room: [f"avow/{room}"] for room, _ in rows}
+    assert [
+        (folder, name)
+        for room, name in told
+        for folder in folders[room]
+        if not name.startswith("avow/") and not (ROOT / folder / name).exists()
+    ] == []
     for room, doors in rows:
         for door in re.findall(r"`([\w/]+\.py)`", doors):
             assert (ROOT / "avow" / room / door).is_file() or (ROOT / door).is_file(), (room, door)
