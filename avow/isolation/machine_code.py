@@ -31,6 +31,12 @@ _OF_MODULES = {
     "_uuid": ("random numbers", "generate_time_safe"),
 }
 """Modules in C: what their functions ask for that no record can hold; of one without functions, what it is for."""
+_OF_LOOPS = {
+    "asyncio.base_events": "BaseEventLoop.call_at",
+    "asyncio.events": "TimerHandle.when TimerHandle.__repr__ TimerHandle.__hash__",
+    "asyncio.timeouts": "timeout_at Timeout.when Timeout.reschedule Timeout.__repr__",
+}
+"""Of modules of the library, what tells by a loop's clock when something is due, or takes such a time."""
 _SOCKETS = ("getsockopt", "setsockopt", "recvmsg", "recvmsg_into")
 """What asks a socket, even one of a pair, for the user, the numbers of a process or the clock; no audit event tells."""
 
@@ -54,6 +60,10 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
         for name in names.split():
             if hasattr(module, name):
                 setattr(module, name, outer(getattr(module, name), "outside", what))
+        for names in _OF_LOOPS.get(module.__name__, "").split():
+            of, _, name = names.rpartition(".")
+            owner = getattr(module, of) if of else module
+            setattr(owner, name, outer(getattr(owner, name), "outside", "the clock"))
         if module.__name__ == "_signal":
             module.signal = _frameless(module.signal)
         elif module.__name__ == "_socket":
@@ -68,11 +78,12 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
         Watched.__name__, Watched.__qualname__, Watched.__module__ = "socket", "socket", "_socket"
         return Watched
 
-    for name in _OF_MODULES.keys() & sys.modules.keys():
+    for name in (_OF_MODULES | _OF_LOOPS).keys() & sys.modules.keys():
         loaded(sys.modules[name])
     if "threading" in sys.modules:
         setattr(sys.modules["threading"], "get_native_id", sys.modules["_thread"].get_native_id)  # noqa: B010
-    loaders: tuple[Any, ...] = (importlib.machinery.ExtensionFileLoader, importlib.machinery.BuiltinImporter)
+    machinery = importlib.machinery
+    loaders: tuple[Any, ...] = (machinery.BuiltinImporter, machinery.ExtensionFileLoader, machinery.SourceFileLoader)
     for loader in loaders:
         inner = loader.exec_module
 
@@ -80,7 +91,7 @@ def watch_modules(told: Told, asked: Callable[..., bool]) -> None:
             inner(*arguments)
             loaded(arguments[-1])
 
-        loader.exec_module = executed if loader is loaders[0] else staticmethod(executed)
+        loader.exec_module = executed if loader is not loaders[0] else staticmethod(executed)
     time.tzset = outer(time.tzset, "program", "the C library")
     _locale.setlocale = outer(_locale.setlocale, "program", "the C library")
     if "locale" in sys.modules:

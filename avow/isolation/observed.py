@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import site
 import stat
@@ -26,6 +27,7 @@ from avow.base.tools import program_digest
 from avow.base.tuning.sizes import FOLDED
 from avow.base.verdict import Isolation
 from avow.isolation.level import Unavailable, available, wanted
+from avow.isolation.watching import way
 
 
 class Seen(StrEnum):
@@ -242,7 +244,9 @@ def _kind(event: str, path: str) -> Seen | None:
         return None
     looked = event in ("state", "kind", "link")
     if f"{path}/".startswith("/proc/"):  # processes come and go
-        return None if looked and (path == "/proc" or f"{path}/".startswith(_OF_EVERY_PROCESS)) else Seen.OUTSIDE
+        return None if event in ("state", "kind") and _OF_EVERY_PROCESS.fullmatch(path) else Seen.OUTSIDE
+    if _by_process(path):
+        return Seen.OUTSIDE
     if f"{path}/".startswith("/sys/") and not looked:
         return Seen.OUTSIDE
     try:
@@ -260,7 +264,16 @@ def _kind(event: str, path: str) -> Seen | None:
     return None if path in _EMPTY else Seen.OUTSIDE
 
 
-_OF_EVERY_PROCESS = ("/proc/self/", "/proc/thread-self/")
+_OF_EVERY_PROCESS = re.compile(r"/proc(/(thread-)?self(/(?!(cwd|root)$)\w+|/fd/\d+)?)?")
+"""What is there for every process. Where a link of it leads, and what lies beyond, is each one's own."""
+
+
+def _by_process(path: str) -> bool:
+    """Whether a link on the way leads through ``/proc/self``: whoever looks again comes to another place."""
+    place, links = way(path, whole=True)
+    return any(f"{one}/".startswith("/proc/") for one in (place, *links))
+
+
 _EMPTY = ("/dev/null", "/dev/zero", "/dev/full")
 
 _PYTHON = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")))

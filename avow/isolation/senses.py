@@ -20,6 +20,7 @@ import posix
 import pwd
 import random
 import resource
+import stat
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -262,7 +263,7 @@ class _State:
     def _looked(self, name: str) -> None:
         caller = sys._getframe(2).f_code.co_filename
         match name:
-            case "st_size" | "st_mode":
+            case "st_size" | "st_mode" if name == "st_mode" or not stat.S_ISDIR(self._real.st_mode):
                 if self._path is not None and not (name == "st_mode" and caller.startswith(_OF_KIND)):
                     self._told("state", self._path)
             case "st_ino" | "st_dev" if caller.startswith(_OF_KIND):

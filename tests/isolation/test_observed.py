@@ -286,6 +286,22 @@ UNRECORDABLE = {
     ),
     "the clock of a log, its part of a second": "import logging\nlogging.makeLogRecord({}).msecs\ntop = 10\n",
     "the clock of a loop": "import asyncio\nasyncio.base_events.BaseEventLoop().time()\ntop = 10\n",
+    "when something is due": "import asyncio\nasyncio.new_event_loop().call_later(1, print).when()\ntop = 10\n",
+    "when something is due, as text": "import asyncio\nstr(asyncio.new_event_loop().call_later(1, id))\ntop = 10\n",
+    "a time of a loop": "import asyncio\nasyncio.new_event_loop().call_at(99, print)\ntop = 10\n",
+    "a time-out's time": (
+        "import asyncio\nasync def f():\n  async with asyncio.timeout(1) as t: t.when()\nasyncio.run(f())\ntop = 10\n"
+    ),
+    "the size of a folder": "import os\nos.path.getsize('.')\ntop = 10\n",
+    "a process by its link": "import os\nos.readlink('/proc/self')\ntop = 10\n",
+    "a pipe's place by its link": "import os\nos.readlink('/proc/self/fd/1')\ntop = 10\n",
+    "a thread by its folder": "import os\nos.path.exists('/proc/self/task/1')\ntop = 10\n",
+    "a file by where it runs": "import os\nos.path.exists('/proc/self/cwd/top.txt')\ntop = 10\n",
+    "a file by its root": "import os\nos.path.exists('/proc/thread-self/root/etc/top.txt')\ntop = 10\n",
+    "a file by its descriptor's folder": "import os\nos.path.exists(f'/dev/fd/{os.open(\".\", 0)}/x')\ntop = 10\n",
+    "a file by a link to where it runs": "import os\nos.path.exists('here/top.txt')\ntop = 10\n",
+    "what is read by such a link": "open('here/m.py').close()\ntop = 10\n",
+    "what is listed by such a link": "import os\nos.listdir('here/.')\ntop = 10\n",
     "the time of a file of its own": "import os, tempfile\np = tempfile.mkstemp()[1]\nos.stat(p).st_mtime\ntop = 10\n",
     "the time of an open file": "import os\nf = open(__file__)\nos.fstat(f.fileno())[8]\ntop = 10\n",
     "the time of an entry": "import os\n[e.stat().st_mtime_ns for e in os.scandir('.')]\ntop = 10\n",
@@ -373,6 +389,7 @@ def test_what_machine_code_reads_is_told_by_a_trace_or_undeclared(
 def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str) -> None:
     if name == "a pipe":
         subprocess.run(["mkfifo", str(tmp_path / "pipe")], check=True)
+    (tmp_path / "here").symlink_to("/proc/self/cwd")
     assert outside(tmp_path, UNRECORDABLE[name])
 
 
