@@ -177,7 +177,7 @@ def watch(
             told("program", f"the program {str(arguments[0])[:200]}")
             told("variable", "PATH")  # it is looked for there, and what it starts
         elif event.startswith(_NETWORK):
-            if event != "socket.__new__" or not _wakes_a_loop():
+            if event != "socket.__new__" or arguments[1] != _OF_A_PAIR or not _wakes_a_loop():
                 told("outside", "the network")
         elif event == "fcntl.ioctl":
             told("outside", "the state of a device")
@@ -235,6 +235,10 @@ def _looks_around(event: str) -> bool:
     if frame is None:
         return False
     return not _is_library(frame.f_code.co_filename)
+
+
+_OF_A_PAIR = 1
+"""The family of a pair of sockets, AF_UNIX: one of another (NETLINK) answers without being connected."""
 
 
 def _wakes_a_loop() -> bool:

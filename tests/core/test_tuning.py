@@ -34,6 +34,7 @@ NOT_TUNED = {
     ("avow/base/rendering.py", "_TAB"),  # columns of a drawing
     ("avow/formulas/ltl.py", "_START"),  # a node that is none
     ("avow/isolation/watching.py", "_MOST_LINKS"),  # as Linux
+    ("avow/isolation/watching.py", "_OF_A_PAIR"),  # as Linux
     ("avow/isolation/tracing.py", "_SECTIONS"),  # a place in a format
     ("avow/language/format.py", "WIDTH"),  # the canonical layout
     ("avow/language/format.py", "_STEP"),

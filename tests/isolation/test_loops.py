@@ -15,7 +15,8 @@ from .test_observed import outside
 
 LOOP = """import asyncio, socket
 l = asyncio.new_event_loop()
-try: {}
+try:
+    {}
 except OSError: pass
 l.close()
 top = 10
@@ -28,6 +29,10 @@ OF_A_PAIR = {
     "by another name": "socket.socket(fileno=l._ssock.fileno()).detach()",
     "copied": "l._ssock.dup().close()",
     "a server": "l.run_until_complete(l.create_server(asyncio.Protocol, 'localhost', 0))",
+    "of another family": """socket.AF_UNIX, socket.socketpair.__defaults__ = 16, (None, 3, 0)
+none = type("F", (), {"detach": lambda self: None})()
+socket._socket = type("S", (), {"socket": socket._socket.socket, "socketpair": lambda *more: (none, none)})
+asyncio.selector_events.BaseSelectorEventLoop._make_self_pipe(l)""",
     "behind what tells": "socket.socket.__mro__[2].getsockopt(l._ssock, 1, 17, 12)",
 }
 
@@ -44,5 +49,5 @@ def test_the_pair_by_which_a_loop_wakes_itself_tells_nothing_else(
         pytest.skip("the trust model says so")
     for module in (subject_module, tracing) if not traced else ():
         monkeypatch.setattr(module, "traces", lambda: False)
-    assert "the network" in outside(tmp_path, LOOP.format(OF_A_PAIR[name]))
+    assert "the network" in outside(tmp_path, LOOP.format(OF_A_PAIR[name].replace("\n", "\n    ")))
     assert "the network" not in outside(tmp_path, LOOP.format("pass"))
