@@ -8,6 +8,8 @@ import unicodedata
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from avow.base.tuning.sizes import DIGITS
+
 if TYPE_CHECKING:
     from fractions import Fraction
 
@@ -84,6 +86,19 @@ def listed(items: Sequence[str], most: int = 8) -> str:
     """So many items at most, and how many more there are: ``a, b and 3 more``."""
     more = f" and {len(items) - most} more" if len(items) > most else ""
     return ", ".join(items[:most]) + more
+
+
+def exact(text: str) -> Fraction:
+    """A number of a table or a plan (``2.5``, ``1/3``, ``1e-3``), exactly. Raises ValueError for any other text, and
+    for a number that has more digits, written out, than one in a contract may have."""
+    from fractions import Fraction
+
+    if len(text) > DIGITS or abs(int(text.lower().partition("e")[2] or 0)) > DIGITS:
+        raise ValueError(text)
+    try:
+        return Fraction(text)
+    except ZeroDivisionError:
+        raise ValueError(text) from None
 
 
 def decimal(value: Fraction) -> str | None:

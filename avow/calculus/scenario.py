@@ -10,7 +10,7 @@ from contextlib import suppress
 from fractions import Fraction
 
 from avow.base.diagnostics import Rejected
-from avow.base.plain import listed
+from avow.base.plain import exact, listed
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
 from avow.base.tuning.shown import DOMAIN_VALUES
@@ -212,13 +212,13 @@ class World:
             return text
         try:
             if isinstance(sort, RealSort):
-                return Fraction(text)
+                return exact(text)
             if isinstance(sort, IntegerSort | NaturalSort):
                 number = int(text)
                 if number < 0 and isinstance(sort, NaturalSort):
                     raise CannotRun(f"scenario: {text} is no natural number")
                 return number
-        except (ValueError, ZeroDivisionError):
+        except ValueError:
             pass
         try:
             return evaluate(parse_term(text, None, self.frame.system.contract, sort=sort), {})

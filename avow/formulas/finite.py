@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from fractions import Fraction
 from itertools import product
 from math import prod
 
+from avow.base.plain import exact
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import VALUES_WRITTEN_OUT
 from avow.formulas.formula import conjunction, disjunction, negation, substitute
@@ -102,7 +102,7 @@ def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -
     try:
         table = scenario.table(said[0])
         cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(said[1], sorts, strict=True)]
-    except (KeyError, ValueError, ZeroDivisionError):
+    except (KeyError, ValueError):
         return None
     return list(zip(*cells, strict=True))
 
@@ -111,7 +111,7 @@ def _value(text: str, sort: Sort) -> Value:
     """Raises ValueError."""
     match sort:
         case RealSort():
-            return Fraction(text)
+            return exact(text)
         case IntegerSort():
             return int(text)
         case NaturalSort() if int(text) >= 0:

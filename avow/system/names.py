@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.plain import exact
 from avow.base.suggestions import suggest
 from avow.base.tuning.bounds import VALUES_LOOKED_AT
 from avow.language.contract import Contract, Node, Port
@@ -258,8 +258,8 @@ def _wrong(text: str, sort: Sort, contract: Contract) -> str | None:
             return None
         case RealSort() | IntegerSort() | NaturalSort():
             try:
-                number = Fraction(text)
-            except (ValueError, ZeroDivisionError):
+                number = exact(text)
+            except ValueError:
                 pass  # perhaps arithmetic, or a constant's name
             else:
                 if isinstance(sort, RealSort) or number.denominator == 1:

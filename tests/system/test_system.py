@@ -98,6 +98,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("model: {compound: {navi: [x]}}", "PLAN106", 1, "navi", ""),
         ("scenario: {t: [{v: 1}], interpret: {in.r: t(v)}}", "PLAN109", 1, "function or relation", "domains"),
         ("scenario: {domains: {in.r: [1, 1/3, blue]}}", "PLAN109", 1, "'blue' is no value of REAL", ""),
+        ("scenario: {domains: {in.r: [1e400000000]}}", "PLAN109", 1, "'1e400000000' is no value of REAL", ""),
         ("scenario: {domains: {NATURAL: [0, -1]}}", "PLAN109", 1, "it is negative", ""),
         ("scenario: {domains: {INTEGER: [-1, 1.5]}}", "PLAN109", 1, "it is not whole", ""),
         ("scenario: {domains: {in.r: 0..100000000000}}", "PLAN109", 1, "more than 100000 values", ""),
