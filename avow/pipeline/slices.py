@@ -75,7 +75,7 @@ def compose_slice(system: System) -> ComposeSlice:
         model=NOWHERE,
         messages=(),
         requirements=tuple(replace(r, confirmed=None, linked="") for r in system.plan.requirements),
-        nodes=tuple(replace(node, criticality="", methods=(), source=None) for node in system.plan.nodes),
+        nodes=tuple(NodePlan(node.node, "", (), node.span) for node in system.plan.nodes),
         policy=NOWHERE,
         expected=None,
         accepted=(),

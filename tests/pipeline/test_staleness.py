@@ -29,7 +29,7 @@ from avow.pipeline.work import catalogue, method_job, planned_method
 from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
-from avow.system.plan import Scenario, System
+from avow.system.plan import NodePlan, Scenario, System
 
 ROOT = Path(__file__).parents[2]
 FERRY = ROOT / "tests" / "pipeline" / "fixtures" / "ferry"
@@ -460,6 +460,10 @@ def test_what_the_calculus_sees_of_a_plan_is_in_its_key() -> None:
         else:
             seen |= {field.name} if getattr(cut, field.name) is value else set()
     assert seen == KEYED.keys(), "avow/pipeline/slices.py: leave it out there, or put it into a key and name it here"
+    node = NodePlan(**{f.name: Opaque() for f in fields(NodePlan)})
+    (left,) = compose_slice(replace(system, plan=replace(system.plan, nodes=(node,)))).system.plan.nodes
+    kept = {f.name for f in fields(node) if getattr(left, f.name) is getattr(node, f.name)}
+    assert kept == {"node", "span"}, "what else the plan says of a node is in no key of the calculus"
 
 
 @pytest.mark.parametrize(
