@@ -272,6 +272,8 @@ class Backend(ABC):
     uses_source: bool = False
     """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. Where it is False they are not
     in the job at all."""
+    uses_criticality: bool = False
+    """Whether an answer may depend on the node's `criticality:`. Where it is False, that is empty in the job."""
     claims: tuple[ProgramClaim, ...] = ()
     """What it says of the node's program besides its guarantees (`Job.claims`)."""
     runs_models: bool = False

@@ -106,6 +106,8 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
         kind = [] if declared.kind is Driving.STEP else [declared.kind.value]
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
+    if tool.uses_criticality:
+        parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
     return json.dumps(parts)
 
 

@@ -174,7 +174,8 @@ def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str])
     methods = (job.method, *others.values())
     if told:  # in the plan's order, in which the key has them
         methods = tuple(sorted(methods, key=lambda m: [each.id for each in node.methods].index(m.id)))
-    return replace(node, methods=methods, source=node.source if tool.uses_source else None)
+    level = node.criticality if tool.uses_criticality else ""
+    return replace(node, criticality=level, methods=methods, source=node.source if tool.uses_source else None)
 
 
 def _told(node: NodePlan, backends: Collection[str]) -> NodePlan:

@@ -29,6 +29,7 @@ class ExperimentBackend(Backend):
     version = "4"
     strength = Verdict.TESTED
     uses_scenario = False
+    uses_criticality = True
     uses_wiring = False
     link = Link.GUIDED
     of = Object.RECORDING

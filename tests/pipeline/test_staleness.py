@@ -17,14 +17,14 @@ from helpers import edit, some
 from same_meaning import CONTRACT_EDITS, PLAN_EDITS
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
-from avow.backend_kit.registry import backend
+from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
 from avow.calculus.variables import frame
 from avow.pipeline.evidence_keys import surroundings
-from avow.pipeline.slices import compose_slice, sanity_slice
+from avow.pipeline.slices import compose_slice, method_slice, sanity_slice
 from avow.pipeline.work import catalogue, method_job, planned_method
 from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import survey
@@ -424,6 +424,34 @@ def test_a_change_in_one_node_of_the_case_study_leaves_the_others(tmp_path: Path
 
 def test_keys_do_not_depend_on_where_the_workspace_is(tmp_path: Path) -> None:
     assert keys(copied(FERRY, tmp_path / "a")) == keys(copied(FERRY, tmp_path / "b"))
+
+
+def test_an_experiment_is_judged_again_where_more_is_asked_of_its_node(tmp_path: Path) -> None:
+    """Its least rate of success follows from the criticality: five runs that do at `low` show too little at `high`."""
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee close( out.y - in.x <= 1 ) }"
+    )
+    (tmp_path / "runs.csv").write_text("x,y\n" + "".join(f"1,1.{k}\n" for k in range(5)))
+    (tmp_path / "plan.yaml").write_text(
+        "system: s\ncontract: system.rcl\nnodes:\n  n:\n    criticality: low\n    methods:\n"
+        "      - experiment: {data: runs.csv, measure: abs(y - x), within: 1}\n"
+        "      - hypothesis: {subject: 'n.py:step'}\n"
+    )
+    (tmp_path / "n.py").write_text("def step(x):\n    return {'y': x}\n")
+    before = keys(tmp_path)
+    edit(tmp_path / "plan.yaml", ("criticality: low", "criticality: high"))
+    assert changed(before, keys(tmp_path)) == {("n/guarantee/close", "experiment")}
+
+
+@pytest.mark.parametrize("name", names())
+def test_no_backend_sees_a_criticality_that_is_in_no_key_of_its(name: str) -> None:
+    tool = backend(name)
+    system = load_system(FERRY)
+    node = next(n for n in system.plan.nodes if n.criticality)
+    method = replace(node.methods[0], backend=name)
+    job = Job(system, system.contract.node(node.node), method, ())
+    seen = method_slice(tool, job, ()).system.plan.node(node.node).criticality
+    assert (seen == node.criticality) is tool.uses_criticality
 
 
 # -- what an engine sees of a plan --------------------------------
