@@ -198,8 +198,13 @@ class NoModel(Exception):  # noqa: N818 - it names a state
 _IN_WORKERS = frozenset({"discharge", "model", "steps"})
 """Methods that only a worker's process asks: what they raise is the verdict `error`, with the traceback as its log."""
 
-_MADE_WHOLE: Mapping[str, Callable[[Any], Any]] = {"tools": tuple, "check": tuple, "files": tuple, "export": dict}
-"""Methods whose answer is gone through at once, so that what a generator raises is theirs, too."""
+_MADE_WHOLE: Mapping[str, tuple[Callable[[Any], Any], type]] = {
+    "tools": (tuple, Tool),
+    "check": (tuple, Diagnostic),
+    "files": (tuple, Path),
+    "export": (dict, str),
+}
+"""Methods whose answer is gone through at once, so that what a generator raises is theirs, too; and what it has."""
 
 
 @contextlib.contextmanager
@@ -209,7 +214,7 @@ def asking(name: str, part: str) -> Iterator[None]:
         yield
     except Rejected:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         why = f"{type(error).__name__}: {error}, at {place.filename}:{place.lineno}"
         raise Rejected(Diagnostic("BACKEND008", f"the backend '{name}' failed in {part}: {why}")) from error
@@ -217,12 +222,19 @@ def asking(name: str, part: str) -> Iterator[None]:
 
 def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
     """A method of a backend, of which whoever calls it is told that what it raises is the backend's defect."""
-    whole = _MADE_WHOLE.get(name, lambda made: made)
 
     @functools.wraps(method)
     def told(tool: Backend, *arguments: Any, **named: Any) -> Any:
         with asking(tool.name, name):
-            return whole(method(tool, *arguments, **named))
+            made = method(tool, *arguments, **named)
+            if name not in _MADE_WHOLE:
+                return made
+            gather, kind = _MADE_WHOLE[name]
+            whole = gather(made)
+            for one in whole.values() if isinstance(whole, dict) else whole:
+                if not isinstance(one, kind):
+                    raise TypeError(f"{one!r} is no {kind.__name__}")
+            return whole
 
     return told
 

@@ -11,7 +11,7 @@ the ledgers stands ``index``, a file of chained lines of its own:
 - ``acknowledged``: a person has seen what the lines before say is lost or damaged, and why; with name and reason. What
   comes to light later is another matter.
 
-Reports and attestations name the head as well (`stated_head`), and may be kept elsewhere. Nothing of this is secret:
+Reports and attestations name the head as well (`stated_heads`), and may be kept elsewhere. Nothing of this is secret:
 somebody who writes ledger, index *and* reports anew is only found out by a signature or by a copy kept elsewhere.
 """
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import pytest
@@ -177,6 +178,34 @@ def test_what_an_installed_backend_raises_ends_a_command_with_a_message(
     registry.backend.cache_clear()
     assert (done.returncode, "Traceback" in done.stderr) == (2, False), done.stderr
     assert f"error[BACKEND008]: the backend 'coin' failed in {part}: KeyError: 'odd', at " in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("part", "made", "told"),
+    [
+        ("tools", ["dot"], "'dot' is no Tool"),
+        ("check", ["wrong"], "'wrong' is no Diagnostic"),
+        ("files", ["e.txt"], "'e.txt' is no Path"),
+        ("files", None, "'NoneType' object is not iterable"),
+        ("export", {"a": b"x"}, "b'x' is no str"),
+    ],
+)
+def test_an_answer_of_another_type_is_told_as_the_backends_defect(part: str, made: object, told: str) -> None:
+    """Names in the place of paths ended a run with a traceback."""
+    odd: Any = type("Odd", (Backend,), {"name": "odd", "discharge": None, part: lambda self: made})()
+    with pytest.raises(Rejected, match=f"the backend 'odd' failed in {part}: TypeError: {told}"):
+        getattr(odd, part)()
+
+
+def test_a_backend_that_ends_the_program_is_told_as_its_defect() -> None:
+    """`sys.exit` in `check` ended the run without a word on what had happened."""
+
+    def check(self: object) -> object:
+        raise SystemExit(0)
+
+    odd: Any = type("Odd", (Backend,), {"name": "odd", "discharge": None, "check": check})()
+    with pytest.raises(Rejected, match="the backend 'odd' failed in check: SystemExit: 0"):
+        odd.check()
 
 
 @pytest.mark.parametrize("part", ASKED)
