@@ -50,7 +50,8 @@ node second { inputs( b : REAL ) outputs( c : REAL ) topics()
 
 
 def test_every_shipped_backend_has_its_row() -> None:
-    assert set(SEEDED) == set(shipped.installed())
+    ours = {name for name, point in shipped.installed().items() if point.value.startswith("avow.backends.")}
+    assert set(SEEDED) == ours
 
 
 def written(name: str, root: Path) -> Path:
