@@ -239,7 +239,8 @@ WORKSPACE_CODES = register(
         "CLI021",
         "plan that is not verified",
         "A plan lies elsewhere than in `contracts/NAME/`, and `avow verify` leaves it out: the system around it does "
-        "not take it in (a warning), or there is none around it, and none takes it in (an error).",
+        "not take it in (a warning), or there is none around it, and none takes it in (an error). So does a file that "
+        "is nearly called plan.yaml (plan.yml).",
         "Move its folder into `contracts/`, or take it in under `subsystems`; where a warning's plan is to be left "
         "out, `lints_off: [CLI021]` in the plan of the system around it says so.",
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -49,17 +49,17 @@ class Workspace:
         return self.reports / system
 
     def systems(self) -> tuple[Path, ...]:
-        """The folders under contracts/ that hold a plan, by name. A folder without one is no system."""
+        """The folders under contracts/ that hold a plan, by name. A folder without one is no system; one whose plan is
+        a link that leads nowhere is a system that cannot be read."""
         if not self.contracts.is_dir():
             return ()
-        return tuple(sorted(p.parent for p in self.contracts.glob("*/plan.yaml")))
+        return tuple(sorted(p for p in self.contracts.iterdir() if os.path.lexists(p / "plan.yaml")))
 
     def stray_plans(self) -> tuple[Path, ...]:
-        """The plans under contracts/ that are in no system's folder."""
-        own = self.contracts / "plan.yaml"
-        below = [path for path in plans_below(self.contracts) if path.relative_to(self.contracts).parts[2:]]
+        """The plans under contracts/ that are in no system's folder, one of each folder."""
         held = set(self.systems())
-        return (*[own] * own.is_file(), *(path for path in below if held.isdisjoint(path.parents)))
+        found = (path for path in plans_within(self.contracts) if held.isdisjoint(path.parents))
+        return tuple({path.parent: path for path in found}.values())
 
     def relative(self, path: Path) -> str:
         """A path as records and reports show it: relative to the workspace, where it lies within."""
@@ -69,14 +69,12 @@ class Workspace:
             return path.as_posix()
 
 
-def plans_below(folder: Path) -> tuple[Path, ...]:
-    """The plans in the folders below one, but for hidden folders and what lies behind links."""
-    found = []
+def plans_within(folder: Path) -> Iterator[Path]:
+    """The plans in a folder and those below it, but for hidden folders and what lies behind links. Also what was meant
+    to be one (plan.yml, Plan.yaml): no run reads it."""
     for place, names, files in os.walk(folder):
         names[:] = sorted(name for name in names if not name.startswith("."))
-        if "plan.yaml" in files and Path(place) != folder:
-            found.append(Path(place, "plan.yaml"))
-    return tuple(found)
+        yield from (Path(place, file) for file in sorted(files) if file.lower() in ("plan.yaml", "plan.yml"))
 
 
 def find_workspace(start: Path) -> Workspace | None:

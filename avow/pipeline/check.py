@@ -22,7 +22,7 @@ from avow.base.records import dataclass
 from avow.base.remembered import Shelf
 from avow.base.rendering import printable, render
 from avow.base.tuning.shown import WARNINGS
-from avow.base.workspace import Workspace, plans_below
+from avow.base.workspace import Workspace, plans_within
 from avow.language.load import check_paths
 from avow.pipeline import export as exporting
 from avow.pipeline.state import task_name
@@ -116,11 +116,12 @@ def of_plan(
 
 
 def left_out(system: System) -> tuple[Diagnostic, ...]:
-    """The plans below the system's that it does not take in, a warning each; none where the plan switches them off."""
+    """The plans in and below the system's folder that it does not take in, a warning each; none where the plan switches
+    them off."""
     if "CLI021" in system.plan.lints_off:
         return ()
-    taken_in = {path.resolve() for path in system.plan.included}
-    below = (path for path in plans_below(system.plan.root) if path.resolve() not in taken_in)
+    taken_in = {path.resolve() for path in (system.plan.path, *system.plan.included)}
+    below = (path for path in plans_within(system.plan.root) if path.resolve() not in taken_in)
     return tuple(not_verified(path, system.name, Severity.WARNING) for path in below)
 
 
@@ -128,6 +129,8 @@ def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERR
     """What is to be said of a plan that no run looks at; `around`: the system in whose folder it lies."""
     why = f"'{around}' does not take it in" if around else "its folder is not one of contracts/ itself"
     hint = "move its folder into contracts/, or take it in under `subsystems` of another plan"
+    if path.name != "plan.yaml":
+        why, hint = "a plan's file is called plan.yaml", "rename it, or remove it"
     return Diagnostic("CLI021", f"this plan is not verified: {why}", Span(str(path), 1, 1, 1, 1), severity, hint)
 
 

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from avow.base.codec import Unreadable, document, from_text
 from avow.base.files import read_regular
+from avow.base.plain import count
 from avow.base.rendering import printable
 from avow.base.tuning.shown import GATE_REASON
 from avow.base.verdict import said
@@ -65,7 +66,7 @@ def print_summary(
         index = str(Path(results[0].report).parent.parent / "index.html")
         console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
     idle = "nothing to do" if not broken else "nothing could be run"
-    console.print(f"({f'{done} stages run' if done else idle}, {seconds:.1f} s)")
+    console.print(f"({count(done, 'stage') + ' run' if done else idle}, {seconds:.1f} s)")
 
 
 def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequence[str], exit_code: int) -> str:

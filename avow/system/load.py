@@ -41,6 +41,9 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], she
     """`within`: the folders of the systems that take this one in; `known`: those loaded already."""
     path = folder / PLAN_FILE
     if not path.is_file():
+        if path.is_symlink() and not path.exists():
+            hint = "mend the link, or give the plan's text a file of its own"
+            raise Rejected(Diagnostic("PLAN100", f"{path} is a link that leads nowhere", hint=hint))
         if path.exists() or not folder.is_dir():
             raise Rejected(Diagnostic("PLAN100", f"there is no folder {folder} with a {PLAN_FILE}"))
         files = sorted(folder.glob("*.rcl"))

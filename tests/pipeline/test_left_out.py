@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.diagnostics import Rejected
 from avow.base.workspace import Workspace
 from avow.pipeline.check import left_out
 from avow.pipeline.results import Result
@@ -62,6 +63,28 @@ def test_a_plan_in_no_systems_folder_has_tasks_of_its_own(tmp_path: Path) -> Non
     assert "verify:contracts/heap/spare" in dict(tasks(tmp_path))
     (contracts / "crane/plan.yaml").write_text("system: crane\nsubsystems: {one: {system: ../heap/spare}}\n")
     assert "verify:contracts/heap/spare" not in dict(tasks(tmp_path))
+
+
+def test_a_plan_of_another_name_is_told(tmp_path: Path) -> None:
+    """Its system was left out without a word, and nothing failed."""
+    contracts = tmp_path / "contracts"
+    for name in ("plan.yml", "Plan.yaml"):
+        (contracts / "hook").mkdir(parents=True, exist_ok=True)
+        (contracts / "hook" / name).write_text("nodes: {}\n")
+    (system(contracts / "crane") / "plan.yml").write_text("nodes: {}\n")
+    assert "verify:contracts/hook" in dict(tasks(tmp_path))
+    (found,) = left_out(load_system(contracts / "crane"))
+    assert found.span is not None
+    assert (found.code, Path(found.span.file).name) == ("CLI021", "plan.yml")
+
+
+def test_a_plan_that_is_a_link_to_nowhere_is_told(tmp_path: Path) -> None:
+    folder = system(tmp_path / "contracts/crane")
+    (folder / "plan.yaml").unlink()
+    (folder / "plan.yaml").symlink_to("nowhere")
+    assert "verify:crane" in dict(tasks(tmp_path))
+    with pytest.raises(Rejected, match="link that leads nowhere"):
+        load_system(folder)
 
 
 @pytest.mark.parametrize(("more", "told"), [("", True), ("lints_off: [CLI021]\n", False)])
