@@ -217,7 +217,7 @@ def test_nothing_outlives_a_process_that_is_killed_on_the_way(odd: Path, way: st
     thread = threading.Thread(target=lambda: found.append(settle(odd, "hangs")[0]))
     thread.start()
     started = pids(odd)
-    (above,) = [pid for pid in process._descendants(os.getpid()) if started[0] in process._children(pid)]
+    (above,) = [pid for pid in process._descendants(os.getpid()) if started[0] in process.children(pid)]
     os.kill(started[0] if whose == "the work's process" else above, signal.SIGKILL)
     thread.join(120)
     assert found[0].verdict is Verdict.ERROR
