@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from assurance.sample import case, evidence, guarantee, node_plan, system
 
-from avow.base.files import digest
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.report import LeftOut, formats
 from avow.system.plan import Requirement
@@ -35,7 +35,7 @@ def main() -> None:
     )
     path = "contracts/rover/system.rcl"
     start = time.process_time()
-    found = case(subject, obligations, records, digests={path: digest(text)}, sources={path: text})
+    found = case(subject, obligations, records, digests={path: sha256(text)}, sources={path: text})
     print(
         f"{'the case':18} {time.process_time() - start:6.2f} s   {len(obligations)} obligations, {len(records)} records"
     )
