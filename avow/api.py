@@ -1,11 +1,11 @@
 """The small public face of Avow, for scripts and notebooks: what stands here keeps its meaning from version to version.
 
-Everything else may move. See `docs/api.md`.
+Everything else may move. See `docs/developers/api.md`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from avow.system.plan import System
 
 if TYPE_CHECKING:
     from avow.assurance.model import Case
+    from avow.base.verdict import Outcome
     from avow.calculus.composition import Composition
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "compose",
     "load",
     "read_case",
+    "settle",
     "verify",
 ]
 
@@ -48,7 +50,7 @@ def check(path: Path | str) -> tuple[Diagnostic, ...]:
     """All that there is to say of a system before any solver is asked: errors and warnings, as `avow check` has them
     and, for a folder with a plan, what each backend says of its options."""
     from avow.language.load import check_paths
-    from avow.pipeline.check import diagnostics
+    from avow.pipeline.plan_check import diagnostics
 
     place = Path(path)
     if not place.is_dir():
@@ -60,10 +62,21 @@ def check(path: Path | str) -> tuple[Diagnostic, ...]:
 
 
 def compose(system: System) -> Composition:
-    """The system's derivations (`goals`), by the rules R1 to R4; `stands(goal, Bounds())` asks the solver."""
+    """The system's derivations (`goals`), by the rules R1 to R4; `settle` asks the solver."""
     from avow.calculus.composition import compose
 
     return compose(system)
+
+
+def settle(composition: Composition, *, seconds: float = 10.0) -> Mapping[str, Outcome]:
+    """What `avow compose` finds of the side conditions and of the requirements that have a formula, by their ids
+    (``x/system/requirement/REQ1``). `seconds`: about how long a question may take."""
+    from avow.calculus.discharge import Bounds
+    from avow.calculus.obligations import all_tasks, settle_each
+    from avow.solving.limits import from_seconds
+
+    asked = [task.obligation for task in all_tasks(composition)]
+    return {outcome.obligation: outcome for outcome in settle_each(composition, asked, Bounds(from_seconds(seconds)))}
 
 
 def verify(workspace: Path | str, systems: Sequence[str] = (), *, jobs: int = 2) -> int:

@@ -12,7 +12,7 @@ from assurance.sample import case, evidence, guarantee, node_plan, system
 
 from avow.base.files import sha256
 from avow.base.verdict import Verdict
-from avow.report import LeftOut, formats
+from avow.report import formats
 from avow.system.plan import Requirement
 
 
@@ -41,7 +41,7 @@ def main() -> None:
     )
     start = time.process_time()
     for name, content in formats(found):
-        size = content.reason if isinstance(content, LeftOut) else f"{len(content) / 1e6:.1f} MB"
+        size = f"{len(content) / 1e6:.1f} MB"
         print(f"{name:18} {time.process_time() - start:6.2f} s   {size}")
         start = time.process_time()
 

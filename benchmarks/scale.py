@@ -23,10 +23,11 @@ from scale.made import chain, fan, programs, seconds  # noqa: E402
 from avow.backend_kit.protocol import Limits  # noqa: E402
 from avow.base.workspace import Workspace  # noqa: E402
 from avow.calculus.obligations import composition_obligations  # noqa: E402
-from avow.pipeline.asking import request_of  # noqa: E402
 from avow.pipeline.blobs import decode  # noqa: E402
+from avow.pipeline.dispatch import request_of  # noqa: E402
+from avow.pipeline.methods import method_backend, method_job  # noqa: E402
 from avow.pipeline.requests import read_request, request_bytes  # noqa: E402
-from avow.pipeline.work import Work, catalogue, method_backend, method_job, planned_method  # noqa: E402
+from avow.pipeline.work import Work, catalogue, planned_method  # noqa: E402
 from avow.pipeline.worker import answer, keys_of  # noqa: E402
 from avow.system.load import load_path, load_system  # noqa: E402
 from avow.system.plan import System  # noqa: E402

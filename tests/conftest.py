@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from _pytest.runner import runtestprotocol
 
 ROOT = Path(__file__).parent.parent
 
@@ -42,7 +41,6 @@ _NEEDS = {
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
     "needs_ros1": lambda: _runs("/usr/bin/python3", "-c", "import diagnostic_msgs, rosmaster, rospy"),
     "needs_roscpp": lambda: shutil.which("g++") is not None and _runs("pkg-config", "--exists", "roscpp"),
-    "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
 }
 
 
@@ -64,48 +62,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for name in {mark.name for mark in item.iter_markers()} & _NEEDS.keys():
             if not _NEEDS[name]():
                 item.add_marker(pytest.mark.skip(reason=f"{name}: not on this machine"))
-
-
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool:
-    """A test that fails is run once more, for what hangs on a busy machine; it is told as RERUN, and is to be mended.
-
-    The plugin pytest-rerunfailures does so too, and talks with xdist's master for each test: 40 ms, thousands of times.
-    """
-    shown = not hasattr(item.config, "workerinput") or item.config.option.verbose > 0
-    if shown:  # else each is a message of xdist's that its master does nothing with
-        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    reports = runtestprotocol(item, nextitem=nextitem, log=False)
-    if any(report.failed for report in reports):
-        for report in reports:
-            if report.failed:
-                report.outcome = "rerun"  # type: ignore[assignment]
-                item.ihook.pytest_runtest_logreport(report=report)
-        item._initrequest()  # type: ignore[attr-defined]
-        reports = runtestprotocol(item, nextitem=nextitem, log=False)
-    for report in reports:
-        if _tells(report, item.config):
-            item.ihook.pytest_runtest_logreport(report=report)
-    if shown:
-        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
-
-
-def _tells(report: pytest.TestReport, config: pytest.Config) -> bool:
-    """Whether a report is more than that setting up and taking down went well: with xdist each costs some tenths of a
-    millisecond, and two of three are no more. Who asks how long each phase took, or for JUnit's file, gets them all."""
-    asked = config.option.durations is not None or config.option.xmlpath is not None
-    return asked or report.when == "call" or not report.passed or bool(report.sections)
-
-
-def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, tuple[str, dict[str, bool]]] | None:
-    """How a run that is followed by another is shown."""
-    return ("rerun", "R", ("RERUN", {"yellow": True})) if str(report.outcome) == "rerun" else None
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Which tests passed or failed at the second time only."""
-    for report in terminalreporter.stats.get("rerun", ()):
-        terminalreporter.write_line(f"RERUN {report.nodeid}")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import io
+import math
 import os
 import subprocess
 import sys
@@ -132,3 +133,38 @@ def _marked(case: Any, mark: pytest.MarkDecorator) -> Any:
     if isinstance(case, ParameterSet):
         return pytest.param(*case.values, marks=[*case.marks, mark], id=case.id)
     return pytest.param(*case if isinstance(case, tuple) else (case,), marks=mark)
+
+
+def warehouse_bag(path: Path) -> None:
+    """What a warehouse robot records in 20 seconds, with messages of its own: it is too fast between 0.5 and 1 m, and
+    lifts as if its battery were full. The battery does not measure its charge, which is NaN."""
+    import numpy
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, field in (("Clearance", "distance"), ("Command", "speed"), ("Lift", "force")):
+        kind = f"warehouse_msgs/msg/{name}"
+        store.register(get_types_from_msg(f"std_msgs/Header header\nfloat64 {field}\n", kind))
+    made: Any = store.types
+    topics = {
+        "/clearance": "warehouse_msgs/msg/Clearance",
+        "/battery": "sensor_msgs/msg/BatteryState",
+        "/speed_limiter/command": "warehouse_msgs/msg/Command",
+        "/lifter/force": "warehouse_msgs/msg/Lift",
+    }
+    empty = numpy.array([], dtype=numpy.float32)
+    with Writer(path, version=9) as writer:
+        opened = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in topics.items()}
+        for k in range(400):
+            sec, nanosec = divmod(10**9 + k * 50_000_000, 10**9)
+            stamp = made["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+            header = made["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+            distance = abs(10 - k % 20) / 4
+            left = 1 - k / 800
+            state = (24.0, 20.0, -2.0, math.nan, math.nan, 20.0, left, 2, 1, 2, True, empty, empty, "", "")
+            values = ((distance,), state, (min(1.5, distance),), (0.0 if distance < 1 else 90.0,))
+            for at, (topic, value) in enumerate(zip(topics, values, strict=True)):
+                message = made[topics[topic]](header, *value)
+                time = sec * 10**9 + nanosec + at * 1_000_000
+                writer.write(opened[topic], time, store.serialize_cdr(message, topics[topic]))

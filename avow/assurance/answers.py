@@ -1,7 +1,7 @@
 """The five answers that a report gives first, as data: words and counts that no format computes again.
 
 What is claimed, on what is it based, what is the weakest evidence, what is supposed without being shown, and what
-changed since the last signed report. Evidence and suppositions are two orders, never one: a person's reason is not weak
+changed since the last signed report. Evidence and assumptions are two orders, never one: a person's reason is not weak
 evidence, it is none.
 """
 
@@ -13,13 +13,14 @@ from enum import StrEnum
 
 from avow.base.codec import LATER
 from avow.base.records import dataclass
+from avow.system.statements import GENERAL
 
 
 class Tone(StrEnum):
     """A colour; it never stands without a mark and a word."""
 
     GREEN = "green"
-    """Derived without bounds, on proofs and exhaustive checks only, every supposition owned and in date."""
+    """Derived without bounds, on proofs and exhaustive checks only, every assumption owned and in date."""
     AMBER = "amber"
     """It holds, but less is known than that."""
     RED = "red"
@@ -38,36 +39,50 @@ class Tone(StrEnum):
         return {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}[self]
 
 
-class How(StrEnum):
-    """How a requirement comes to hold."""
+class Level(StrEnum):
+    """How far a requirement, or the whole case, is shown: the least of what lies below it. Best first."""
 
-    DERIVED = "derived"
-    """A tool concluded its formula from the guarantees."""
-    BOUNDED = "derived, bounded"
-    """The same, but only within the plan's finite scenario."""
+    SHOWN = "shown"
+    """Every guarantee below is proved, or checked exhaustively, of what runs."""
+    MODELS = "shown of models"
+    """Some guarantee below is proved or checked of a model only: what runs may differ."""
+    TESTS = "shown by tests"
+    """Some guarantee below, or the requirement itself, is sampled: tests, recordings, measurements."""
     ARGUED = "argued"
-    """A person says that the guarantees amount to the sentence."""
-    OPEN = "open"
-    """Refuted, missing or stale, or resting on something that is; or on a supposition that has expired."""
+    """A person says that the guarantees named amount to the sentence, or that some guarantee below holds."""
+    NOT_SHOWN = "not shown"
+    """Missing, stale, refuted below, not validated, or resting on an assumption that has expired."""
+    REFUTED = "refuted"
+    """There is a counterexample."""
+    EXAMINED = "examined, not relied upon"
+    """Of a case only: known-bad material that is as bad as its plan expects, or a plan that names no requirement."""
+
+    @property
+    def holds(self) -> bool:
+        return self in (Level.SHOWN, Level.MODELS, Level.TESTS, Level.ARGUED)
 
 
 MEANINGS = {
-    How.DERIVED: "a tool concluded it from guarantees",
-    How.BOUNDED: "only within a finite scenario",
-    How.ARGUED: "a person says guarantees amount to it",
-    How.OPEN: "not shown, or what it rests on is not",
+    Level.SHOWN: "everything below is proved, or checked exhaustively, of what runs",
+    Level.MODELS: "something below is proved or checked of a model only: what runs may differ",
+    Level.TESTS: "something below is sampled: tests, recordings or measurements",
+    Level.ARGUED: "something below rests on a person's word",
+    Level.NOT_SHOWN: "missing, stale, not validated, or resting on what is not shown",
+    Level.REFUTED: "there is a counterexample",
+    Level.EXAMINED: "known-bad material, or a plan that names no requirement",
 }
-"""How a requirement stands, for who meets the word for the first time."""
+"""The words of verdicts, in a phrase each; docs/reading-a-report.md has the same table."""
 
 
 class Sort(StrEnum):
-    """What a supposition is about."""
+    """What an assumption is about."""
 
     WORLD = "the world"
     PLATFORM = "the platform"
     MODELS = "models"
     SAMPLING = "sampling"
     MEANING = "meaning"
+    TOOLS = "tools"
 
 
 ABOUT = {
@@ -76,25 +91,20 @@ ABOUT = {
     Sort.MODELS: "about models",
     Sort.SAMPLING: "about samples",
     Sort.MEANING: "about requirements' meaning",
+    Sort.TOOLS: "about trusted tools",
 }
-"""What a supposition of each sort is about, after its number: ``2 about the world``."""
+"""What an assumption of each sort is about, after its number: ``2 about the world``."""
 
 
-class Headline(StrEnum):
-    """The verdict on the whole case; never another word."""
-
-    HOLDS = "Holds"
-    CONDITIONAL = "Holds if"
-    NOT_SHOWN = "Not shown"
-    EXAMINED = "Examined, not relied upon"
+PLATFORM, MODELS, SAMPLES, START, TOOLS = GENERAL
 
 
 @dataclass(frozen=True, slots=True)
-class Supposition:
+class Assumption:
     """Something that requirements, or other guarantees, rest on without its being shown, each once."""
 
     number: str
-    """``S1``: on this report's pages only; `key` is what stays."""
+    """``A1``: on this report's pages only; `key` is what stays."""
     key: str
     sort: Sort
     says: str
@@ -115,7 +125,12 @@ class Supposition:
     @property
     def owned(self) -> bool:
         """Whether somebody keeps it true, and until when."""
-        return bool(self.who and self.until)
+        return bool(self.who and (self.until or self.sort is Sort.MEANING))  # a validation ends when a text changes
+
+    @property
+    def general(self) -> bool:
+        """Whether it arises with any evidence of its kind."""
+        return self.key in GENERAL
 
     @property
     def term(self) -> str:
@@ -131,8 +146,8 @@ class Supposition:
             return self.says
         section, _, rest = self.key.partition(".")
         method, of_text, _ = rest.partition(":")
-        if section == "suppositions":
-            where = f"suppositions.{method}.WORD, with a word of its text" if of_text else self.key
+        if section == "assumptions":
+            where = f"assumptions.{method}.WORD, with a word of its text" if of_text else self.key
         elif section == "assumption":
             where = "environment, in an entry that assumes it"
         else:
@@ -141,7 +156,7 @@ class Supposition:
 
     @property
     def needing(self) -> tuple[str, ...]:
-        """Whose supposition it is, for the column *needed by*."""
+        """Whose assumption it is, for the column *needed by*."""
         return self.needed_by or ("guarantees only",)
 
 
@@ -150,7 +165,7 @@ EARLIER = "As of an earlier state"
 
 
 @dataclass(frozen=True, slots=True)
-class Weakening:
+class Deficit:
     """One kind of reason for which the case says less than it seems to. `why` says what a reader should make of it."""
 
     key: str
@@ -196,7 +211,7 @@ class NodeBasis:
 
 @dataclass(frozen=True, slots=True)
 class SupposedLine:
-    """One line for all suppositions of a sort: how many, and the most needed."""
+    """One line for all assumptions of a sort: how many, and the most needed."""
 
     sort: Sort
     count: int
@@ -212,12 +227,12 @@ class SupposedLine:
 
     @property
     def more(self) -> str:
-        """``also S2 to S6``: where the others of the sort are; empty where there is no other."""
+        """``also A2 to A6``: where the others of the sort are; empty where there is no other."""
         return f"also {', '.join(_ranges(self.others))}" if self.others else ""
 
 
 def _ranges(numbers: Sequence[str]) -> Iterator[str]:
-    """``S1``, ``S3 to S6``: three or more that follow one another as their ends."""
+    """``A1``, ``A3 to A6``: three or more that follow one another as their ends."""
     at = 0
     while at < len(numbers):
         end = at
@@ -243,9 +258,9 @@ class Baseline:
     """(id, digest of its words and formula, how, formula)."""
     guarantees: tuple[tuple[str, str, str, str, str], ...]
     """(id, digest of its meaning, status, formula, mark of the records that count)."""
-    suppositions: tuple[tuple[str, str, str], ...]
+    assumptions: tuple[tuple[str, str, str], ...]
     """(key, words, until)."""
-    weakenings: tuple[tuple[str, int], ...]
+    deficits: tuple[tuple[str, int], ...]
     checked: str = ""
     """How its signature was verified, in words."""
 
@@ -255,7 +270,7 @@ class ChangeLine:
     """One change since the signed report, worst kinds first."""
 
     kind: str
-    """``open``, ``weaker``, ``gone``, ``meaning``, ``supposition``, ``expired``, ``weakening``, ``better``."""
+    """``open``, ``weaker``, ``gone``, ``meaning``, ``assumption``, ``expired``, ``deficit``, ``better``."""
     subject: str
     words: str
     before: str = ""
@@ -277,14 +292,32 @@ class Changes:
 
 
 @dataclass(frozen=True, slots=True)
+class TrustLine:
+    """A part of what has to be trusted: what it is, which one, and what was done about it."""
+
+    what: str
+    which: str
+    mitigation: str
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A gate that fails, for the banner: its title, why, and the next step; empty where there is none to suggest."""
+
+    title: str
+    reason: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
 class Answers:
     """The first screen in words."""
 
-    headline: Headline
+    headline: Level
     verdict: str
-    """``Holds if 12 suppositions hold``."""
+    """The headline with what bounds it: ``Shown by tests (failure rate: at most 6.2 % …)``."""
     tone: Tone
-    by_how: tuple[tuple[How, int], ...]
+    by_level: tuple[tuple[Level, int], ...]
     counts: str
     weakened: str
     gates: str
@@ -310,19 +343,21 @@ class Answers:
     warned: str = field(default="", metadata=LATER)
     """``WARNED: 13 findings known``, beside the verdict; empty where nothing is known to be bad."""
     owners: str = field(default="", metadata=LATER)
-    """Who answers for the suppositions, and until when; empty where nobody does."""
+    """Who answers for the assumptions, and until when; empty where nobody does."""
     weakened_by: str = field(default="", metadata=LATER)
     """Which the ways are in which the case is weakened; empty where there is none."""
 
+    trusted: tuple[TrustLine, ...] = field(default=(), metadata=LATER)
+    """What has to be trusted."""
+    failures: tuple[Failure, ...] = field(default=(), metadata=LATER)
+    """The gates that fail, in the order of the gates."""
     objects: str = field(default="", metadata=LATER)
     """What the words mean that say what was looked at: *model*, *source*…"""
 
     @property
     def legend(self) -> str:
-        """What the words in the column *how it stands* mean, of those that are used, and how strong they are."""
-        told = "; ".join(f"{how}: {MEANINGS[how]}" for how, _ in self.by_how)
-        holds = any(how is not How.OPEN for how, _ in self.by_how)
-        return f"{told}. None is stronger than its evidence" if holds else told
+        """What the words in the column *how it stands* mean, of those that are used."""
+        return "; ".join(f"{level}: {MEANINGS[level]}" for level, _ in self.by_level)
 
     @property
     def beside(self) -> str:

@@ -37,14 +37,17 @@ from dataclasses import replace
 from datetime import date
 
 from avow.assurance.answers import EARLIER
+from avow.assurance.assumptions import Statements, assumptions
 from avow.assurance.certification import ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
 from avow.assurance.closure import Closure
+from avow.assurance.deficits import deficits
 from avow.assurance.facts import Facts, facts_of_case
 from avow.assurance.findings import handle
 from avow.assurance.first_screen import answers, weakest_of, with_signature
-from avow.assurance.gap import independent
+from avow.assurance.gap import independent, missing_tools
 from avow.assurance.gates import exit_code, gates, suggestion_for
+from avow.assurance.hazards import hazard_views
 from avow.assurance.model import (
     Case,
     Currency,
@@ -52,7 +55,6 @@ from avow.assurance.model import (
     DerivationView,
     EvidenceView,
     Grade,
-    HypothesisView,
     ObligationView,
     OpenItem,
     RunInfo,
@@ -61,20 +63,21 @@ from avow.assurance.naming import derivation_claim, sanity_property, short
 from avow.assurance.relied import relied_upon
 from avow.assurance.remarks import remarks
 from avow.assurance.requirement_views import held, requirement_view
+from avow.assurance.risk_gates import standard_gate
+from avow.assurance.standards import standard_view
 from avow.assurance.summary import limits, not_shown, open_items
 from avow.assurance.support import (
     Names,
+    assumption_claims,
     criticality,
     derivation_claims,
     obligation_claim,
     open_conditions,
     requirement_claim_of,
-    supposition_claims,
 )
-from avow.assurance.suppositions import Statements, suppositions
-from avow.assurance.weakenings import weakenings
+from avow.assurance.trust import trust_lines
 from avow.base.plain import count
-from avow.base.verdict import Link, Verdict, in_words
+from avow.base.verdict import Link, Verdict
 from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind, Obligation
@@ -99,6 +102,7 @@ def conclude(facts: Facts) -> Case:
     statuses = {
         o.id: roll_up((e.evidence for e in counting[o.id]), outdated=bool(evidence[o.id])) for o in facts.obligations
     }
+    statuses |= {o.id: Status.UNWRITTEN for o in facts.obligations if o.unwritten}
     by_program = shown_by_programs(facts.obligations, statuses, counting)
     statuses |= {name: status for name, (status, _) in by_program.items()}
     findings = (
@@ -110,7 +114,7 @@ def conclude(facts: Facts) -> Case:
     claims = [
         obligation_claim(o, statuses[o.id], *resting[o.id], _link(counting[o.id]), names) for o in facts.obligations
     ]
-    claims += supposition_claims((h for o in facts.obligations for h in resting[o.id][0]), findings)
+    claims += assumption_claims((h for o in facts.obligations for h in resting[o.id][0]), findings)
     claims += [requirement_claim_of(r, names, statuses) for r in facts.requirements]
     claims += derivation_claims(facts, names)
     standings = judge(claims)
@@ -125,7 +129,7 @@ def conclude(facts: Facts) -> Case:
     closure = Closure(views, facts.nodes, rests, standings)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])
-    supposed = suppositions(facts, views, relied, closed, whole, said)
+    supposed = assumptions(facts, views, relied, closed, whole, said)
     by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}
     requirements = tuple(
         held(requirement_view(r, names, standings, statuses), closed[r.id], by_id, relied, supposed, titles)
@@ -135,7 +139,12 @@ def conclude(facts: Facts) -> Case:
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)
     grade, reason = _grade(facts, proofs)
-    found = gates(facts, views, requirements, derived, findings, proofs, relied, fresh)
+    hazards = hazard_views(facts.hazards, requirements, views, relied, facts.nodes)
+    found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh)
+    standard = None
+    if facts.policy.standard:
+        standard = standard_view(facts.policy.standard, facts.policy.level, found, requirements, views, hazards)
+        found = (*found, standard_gate(standard))
     listed = (
         *open_items(facts, views, requirements, derived, findings),
         *(OpenItem("program", name, text, advice=True) for name, (_, text) in by_program.items()),
@@ -143,7 +152,9 @@ def conclude(facts: Facts) -> Case:
     )
     single = _single(views)
     basis = whole.claims if not closed else {n for c in closed.values() for n in c.claims}
-    weakened = weakenings(views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id)
+    weakened = deficits(
+        views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id, missing_tools(facts)
+    )
     changed = changes(facts.baseline, requirements, views, supposed, weakened)
     weakest = weakest_of(basis, by_id, relied, titles)
     following = weakest_of(basis, by_id, relied, titles, beside=weakest.node) if weakest else None
@@ -164,6 +175,7 @@ def conclude(facts: Facts) -> Case:
         changed,
         weakest,
         following,
+        trust_lines(proofs, facts.kernel, supposed, facts.run.id),
         strict=facts.expected is not None,
         passed=code == 0,
     )
@@ -185,14 +197,13 @@ def conclude(facts: Facts) -> Case:
         digests=facts.digests,
         answers=told,
         requirements=requirements,
-        suppositions=supposed,
-        weakenings=weakened,
+        assumptions=supposed,
+        deficits=weakened,
         changes=changed,
         open_items=listed,
         nodes=facts.nodes,
         obligations=views,
         derivations=derived,
-        hypotheses=_assumed(views, derived),
         environment=facts.environment,
         findings=findings,
         gates=found,
@@ -205,6 +216,8 @@ def conclude(facts: Facts) -> Case:
         audited=facts.discrepancies is not None,
         strict=facts.expected is not None,
         orphans=orphans,
+        hazards=hazards,
+        standard=standard,
         graph_svg=facts.graph_svg,
         maps=facts.maps,
         statements=facts.statements,
@@ -356,18 +369,6 @@ def _derivation(
     return DerivationView(
         derivation, standing.status, *standing.weakest, standing.below, rests[claim], open_conditions(derivation, names)
     )
-
-
-def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
-    found: dict[str, list[str]] = {}
-    for view in views:
-        counted = view.records
-        for text in dict.fromkeys(h for e in counted for h in in_words(e.rests_on, e.hypotheses)):
-            found.setdefault(text, []).append(view.id)
-    for d in derived:
-        for text in d.conditional:
-            found.setdefault(text, []).append(derivation_claim(d.derivation.name))
-    return tuple(HypothesisView(text, tuple(claims)) for text, claims in sorted(found.items()))
 
 
 def _single(views: Sequence[ObligationView]) -> tuple[str, ...]:

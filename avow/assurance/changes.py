@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from avow.assurance.answers import Baseline, ChangeLine, Changes, How, Supposition, Weakening
+from avow.assurance.answers import Assumption, Baseline, ChangeLine, Changes, Deficit, Level
+from avow.assurance.deficits import words_of
 from avow.assurance.model import Case, ObligationView, RequirementView
-from avow.assurance.relied import word
-from avow.assurance.weakenings import words_of
 from avow.base.codec import canonical
 from avow.base.files import sha256
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 
-KINDS = ("open", "gone", "weaker", "meaning", "expired", "supposition", "weakening", "new", "better")
+KINDS = ("open", "gone", "weaker", "meaning", "expired", "assumption", "deficit", "new", "better")
 """Worst first."""
 MARKS = {"open": "✘", "better": "▲", "meaning": "≠", "new": "+"}
-_HOW_RANK = {How.DERIVED: 3, How.BOUNDED: 2, How.ARGUED: 1, How.OPEN: 0}
+_RANK = {level: -at for at, level in enumerate(Level)}
 _PASSING = ("believed",)
-"""Weakenings of the run, not of the case."""
+"""Deficits of the run, not of the case."""
 
 
 def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", until: str = "") -> Baseline:
@@ -32,24 +31,24 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         until=until,
         content="",
         verdict=case.answers.verdict,
-        requirements=tuple((r.id, _meaning(r), r.how.value, r.formal) for r in case.requirements),
+        requirements=tuple((r.id, _meaning(r), r.level.value, r.formal) for r in case.requirements),
         guarantees=tuple(map(_guarantee, case.guarantees)),
-        suppositions=tuple((s.key, s.words, s.until) for s in case.suppositions),
-        weakenings=tuple((w.key, w.count) for w in case.weakenings if w.key not in _PASSING),
+        assumptions=tuple((s.key, s.words, s.until) for s in case.assumptions),
+        deficits=tuple((w.key, w.count) for w in case.deficits if w.key not in _PASSING),
     )
     return replace(found, content=content_of(found))
 
 
 def content_of(of: Baseline) -> str:
-    """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
+    """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, assumptions, deficits."""
     return sha256(
         canonical(
             {
                 "verdict": of.verdict,
                 "requirements": [list(item) for item in of.requirements],
                 "guarantees": [list(item[:-1]) for item in of.guarantees],
-                "suppositions": [list(item) for item in of.suppositions],
-                "weakenings": [list(item) for item in of.weakenings],
+                "assumptions": [list(item) for item in of.assumptions],
+                "deficits": [list(item) for item in of.deficits],
             }
         )
     )
@@ -59,8 +58,8 @@ def changes(
     old: Baseline | None,
     requirements: Sequence[RequirementView],
     views: Sequence[ObligationView],
-    suppositions: Sequence[Supposition],
-    weakenings: Sequence[Weakening],
+    assumptions: Sequence[Assumption],
+    deficits: Sequence[Deficit],
 ) -> Changes:
     """What is otherwise than in the signed report, worst first."""
     if old is None:
@@ -71,7 +70,7 @@ def changes(
     titles = {view.id: view.obligation.claim for view in guarantees}
     shown = [*_requirements(old, requirements), *_guarantees(then, now, titles)]
     lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
-    entries = [*shown, *_suppositions(old, suppositions), *_weakenings(old, weakenings)]
+    entries = [*shown, *_assumptions(old, assumptions), *_deficits(old, deficits)]
     if lost:  # what less is claimed also supposes less, and has less to be weakened: that is no gain
         entries = [e for e in entries if e.kind != "better" or e in shown]
     again = sum(
@@ -98,16 +97,16 @@ def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Ite
     then = {item[0]: item for item in old.requirements}
     for r in requirements:
         if r.id not in then:
-            kind = "open" if r.how is How.OPEN else "new"
-            yield ChangeLine(kind, r.id, f"{r.id} is new, and {r.how}", "", r.how.value)
+            kind = "open" if not r.level.holds else "new"
+            yield ChangeLine(kind, r.id, f"{r.id} is new, and {r.level}", "", r.level.value)
             continue
         _, meaning, how, formula = then[r.id]
-        was = How(how)
-        if _HOW_RANK[r.how] < _HOW_RANK[was]:
-            kind = "open" if r.how is How.OPEN else "weaker"
-            yield ChangeLine(kind, r.id, f"{r.id} was {was}, and is {r.how}", was.value, r.how.value)
-        elif _HOW_RANK[r.how] > _HOW_RANK[was]:
-            yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.how}", was.value, r.how.value)
+        was = Level(how)
+        if _RANK[r.level] < _RANK[was]:
+            kind = "open" if not r.level.holds else "weaker"
+            yield ChangeLine(kind, r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
+        elif _RANK[r.level] > _RANK[was]:
+            yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
         if meaning != _meaning(r):
             yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formal)
     for name in then:
@@ -123,7 +122,7 @@ def _guarantees(
     for name, (_, meaning, status, formula, _) in now.items():
         title = f"“{titles[name]}”"
         if name not in then:
-            yield ChangeLine("new", name, f"new guarantee, {word(Status(status))}: {title}", "", status)
+            yield ChangeLine("new", name, f"new guarantee, {status}: {title}", "", status)
             continue
         _, old_meaning, old_status, old_formula, _ = then[name]
         is_, was = Status(status), Status(old_status)
@@ -131,36 +130,36 @@ def _guarantees(
             yield ChangeLine("meaning", name, f"{title} means something else", old_formula, formula)
         if is_ is not was:
             kind = "better" if is_.rank > was.rank else "weaker" if is_.supports else "open"
-            yield ChangeLine(kind, name, f"{word(was)} → {word(is_)}: {title}", old_status, status)
+            yield ChangeLine(kind, name, f"{was} → {is_}: {title}", old_status, status)
     for name, item in then.items():
         if name not in now:
             yield ChangeLine("gone", name, "a guarantee is not there any more", item[2], "")
 
 
-def _suppositions(old: Baseline, suppositions: Sequence[Supposition]) -> Iterator[ChangeLine]:
-    then = {key: (words, until) for key, words, until in old.suppositions}
-    for s in suppositions:
+def _assumptions(old: Baseline, assumptions: Sequence[Assumption]) -> Iterator[ChangeLine]:
+    then = {key: (words, until) for key, words, until in old.assumptions}
+    for s in assumptions:
         if s.key not in then:
-            yield ChangeLine("supposition", s.key, f"new supposition: {s.words}", "", s.words)
+            yield ChangeLine("assumption", s.key, f"new assumption: {s.words}", "", s.words)
         elif s.words != then[s.key][0]:
-            yield ChangeLine("supposition", s.key, f"another supposition: {s.words}", then[s.key][0], s.words)
+            yield ChangeLine("assumption", s.key, f"another assumption: {s.words}", then[s.key][0], s.words)
         if s.expired:
             yield ChangeLine(
                 "expired", s.key, f"expired on {s.until}: {s.words}", then.get(s.key, ("", ""))[1], s.until
             )
     for key in then:
-        if key not in {s.key for s in suppositions}:
-            yield ChangeLine("better", key, f"supposed no more: {then[key][0]}", then[key][0], "")
+        if key not in {s.key for s in assumptions}:
+            yield ChangeLine("better", key, f"assumed no more: {then[key][0]}", then[key][0], "")
 
 
-def _weakenings(old: Baseline, weakenings: Sequence[Weakening]) -> Iterator[ChangeLine]:
-    then = dict(old.weakenings)
-    for w in weakenings:
+def _deficits(old: Baseline, deficits: Sequence[Deficit]) -> Iterator[ChangeLine]:
+    then = dict(old.deficits)
+    for w in deficits:
         was = then.get(w.key, 0)
         if w.key not in _PASSING and w.count > was:
-            yield ChangeLine("weakening", w.key, f"{w.words}: {was or 'none'} → {w.count}", str(was), str(w.count))
-    now = {w.key: w.count for w in weakenings}
-    for key, was in old.weakenings:
+            yield ChangeLine("deficit", w.key, f"{w.words}: {was or 'none'} → {w.count}", str(was), str(w.count))
+    now = {w.key: w.count for w in deficits}
+    for key, was in old.deficits:
         if now.get(key, 0) < was:
             yield ChangeLine(
                 "better",

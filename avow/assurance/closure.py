@@ -66,7 +66,7 @@ class Closure:
             found, more = self._walk((*found, *self._together()))
             open_assumptions |= more
         claims_of = tuple(sorted(name for name in found if name in self.views))
-        accepted = tuple(sorted(name for name in found if name.startswith("supposition:")))
+        accepted = tuple(sorted(name for name in found if name.startswith("assumption:")))
         failing = tuple(
             name
             for name in (*claims_of, *accepted)

@@ -6,16 +6,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from avow.assurance.answers import How
 from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
 from avow.base.plain import listed
-from avow.base.verdict import said
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, roll_up
 
-ORDER = ("gate", "worse", "removed", "supposition", "meaning", "added", "better", "rerun")
+ORDER = ("gate", "worse", "removed", "assumption", "meaning", "added", "better", "rerun")
 """Kinds of changes, what a reader must know first."""
 
 
@@ -51,7 +49,7 @@ class Snapshot:
     told: Mapping[str, Told] = field(default_factory=dict)
     reasons: Mapping[str, str] = field(default_factory=dict)
     """Gate → why it fails or passes."""
-    suppositions: Mapping[str, str] | None = None
+    assumptions: Mapping[str, str] | None = None
     """Key → words; None where nothing is known of them (a bare ledger)."""
 
 
@@ -76,25 +74,25 @@ class Change:
             return self.after == "fails"
         if self.kind == "meaning":
             return {self.before, self.after} <= set(Status) and Status(self.after).rank < Status(self.before).rank
-        return self.kind in ("worse", "removed", "supposition")
+        return self.kind in ("worse", "removed", "assumption")
 
     @property
     def text(self) -> str:
         match self.kind:
             case "added":
-                return f"new: {self.subject} ({said(self.after)})"
+                return f"new: {self.subject} ({self.after})"
             case "removed":
-                return f"gone: {self.subject} (was {said(self.before)})"
+                return f"gone: {self.subject} (was {self.before})"
             case "meaning":
-                return f"changed meaning: {self.subject} ({said(self.before)} → {said(self.after)})"
-            case "supposition":
-                return f"supposed now: {self.after}" + (f" (was: {self.before})" if self.before else "")
+                return f"changed meaning: {self.subject} ({self.before} → {self.after})"
+            case "assumption":
+                return f"assumed now: {self.after}" + (f" (was: {self.before})" if self.before else "")
             case "gate":
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
-                return f"asked again: {self.subject} (still {said(self.after)})"
+                return f"asked again: {self.subject} (still {self.after})"
             case _:  # worse, better, gate: all are told the same way
-                return f"{self.kind}: {self.subject}: {said(self.before)} → {said(self.after)}"
+                return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
 
 def of_case(case: Case) -> Snapshot:
@@ -112,13 +110,13 @@ def of_case(case: Case) -> Snapshot:
         {g.title: g.passed for g in case.gates},
         told,
         {g.title: g.reason for g in case.gates},
-        {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.suppositions},
+        {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.assumptions if not s.general},
     )
 
 
 def _standing(requirement: RequirementView) -> Status:
     """A requirement whose own evidence is good is open all the same where what it rests on fails or has expired."""
-    fallen = requirement.how is How.OPEN and requirement.status.supports
+    fallen = not requirement.level.holds and requirement.status.supports
     return Status.UNSUPPORTED if fallen else requirement.status
 
 
@@ -166,7 +164,7 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
             elif any(_asked_again(before, after)):
                 changes.append(Change("rerun", name, was, is_, title, why))
     lost = any(change.kind in ("worse", "removed") for change in changes)  # what less is shown also supposes less
-    changes += (c for c in _suppositions(old, new) if not lost or c.kind != "better")
+    changes += (c for c in _assumptions(old, new) if not lost or c.kind != "better")
     word = {True: "passes", False: "fails"}
     for gate, passed in new.gates.items():
         if gate in old.gates and old.gates[gate] != passed:
@@ -175,15 +173,15 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
     return tuple(sorted(changes, key=lambda change: ORDER.index(change.kind)))
 
 
-def _suppositions(old: Snapshot, new: Snapshot) -> Iterator[Change]:
-    if old.suppositions is None or new.suppositions is None:
+def _assumptions(old: Snapshot, new: Snapshot) -> Iterator[Change]:
+    if old.assumptions is None or new.assumptions is None:
         return
-    for key, words in new.suppositions.items():
-        if old.suppositions.get(key) != words:
-            yield Change("supposition", key, old.suppositions.get(key, ""), words)
-    for key, words in old.suppositions.items():
-        if key not in new.suppositions:
-            yield Change("better", key, f"supposed: {words}", "supposed no more")
+    for key, words in new.assumptions.items():
+        if old.assumptions.get(key) != words:
+            yield Change("assumption", key, old.assumptions.get(key, ""), words)
+    for key, words in old.assumptions.items():
+        if key not in new.assumptions:
+            yield Change("better", key, f"assumed: {words}", "assumed no more")
 
 
 def _answers(view: ObligationView) -> dict[str, Answer]:

@@ -35,7 +35,7 @@ from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause
 from avow.system.names import ports_named
-from avow.system.plan import Finding, Plan, Requirement, Statement, System
+from avow.system.plan import Finding, Hazard, Plan, Requirement, Statement, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +68,7 @@ class Facts:
     kernel: KernelRun = field(default_factory=KernelRun)
     earlier: bool = False
     history: History = field(default_factory=History)
+    hazards: tuple[Hazard, ...] = ()
 
 
 def facts_of_system(
@@ -152,6 +153,7 @@ def facts_of_system(
         baseline=baseline,
         kernel=kernel or KernelRun(),
         history=told,
+        hazards=tuple(replace(h, span=_relative(h.span, plan)) for h in plan.hazards),
     )
 
 
@@ -204,8 +206,9 @@ def facts_of_case(case: Case) -> Facts:
                 r.temporal or None,
                 r.supported_by,
                 r.span,
-                confirmed=r.confirmed,
+                validation=r.validation,
                 linked=r.linked,
+                source=r.source,
             )
             for r in case.requirements
         ),
@@ -228,6 +231,7 @@ def facts_of_case(case: Case) -> Facts:
         kernel=case.kernel,
         earlier=case.earlier,
         history=case.history,
+        hazards=tuple(view.hazard for view in case.hazards),
     )
 
 

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 from avow.assurance.answers import (
     Answers,
+    Assumption,
     Baseline,
     Changes,
-    Headline,
-    How,
+    Deficit,
+    Failure,
+    Level,
     NodeBasis,
     Sort,
     SupposedLine,
-    Supposition,
     Tone,
-    Weakening,
+    TrustLine,
     WeakestEvidence,
 )
 from avow.assurance.changes import MARKS, baseline_of
+from avow.assurance.deficits import briefly, of_deficits
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
 from avow.assurance.relied import (
     EVIDENCE,
@@ -32,28 +35,23 @@ from avow.assurance.relied import (
     linked,
     looked_at,
     seen,
-    stands,
     weakness,
-    word,
 )
-from avow.assurance.weakenings import briefly, of_weakening
 from avow.base.plain import count, listed
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
 """So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes; owners."""
-_HOW_ORDER = (How.OPEN, How.ARGUED, How.BOUNDED, How.DERIVED)
+_WORST_FIRST = tuple(reversed(Level))
 
 
-def tone_of(how: How, relied: Iterable[Relied], supposed: Iterable[Supposition]) -> Tone:
-    """A requirement's colour. Green is for what is derived without bounds, on proofs and exhaustive checks alone, every
-    supposition owned and in date."""
-    supposed = tuple(supposed)
-    if how is How.OPEN or any(s.expired for s in supposed):
+def tone_of(level: Level, supposed: Iterable[Assumption], *, bounded: bool = False) -> Tone:
+    """A requirement's colour. Green is for what is shown of what runs, without bounds, every assumption owned and in
+    date."""
+    if not level.holds:
         return Tone.RED
-    sure = all(item.status in EXHAUSTIVE for item in relied)
-    return Tone.GREEN if how is How.DERIVED and sure and all(s.owned for s in supposed) else Tone.AMBER
+    return Tone.GREEN if level is Level.SHOWN and not bounded and all(s.owned for s in supposed) else Tone.AMBER
 
 
 def weakest_of(
@@ -82,7 +80,7 @@ def weakest_of(
         name,
         o.node,
         titles.get(o.node, "the whole"),
-        word(relied[name].status),
+        relied[name].status.value,
         o.claim.rstrip("."),
         seen(relied[name]),
     )
@@ -98,40 +96,45 @@ def answers(
     nodes: Sequence[NodeView],
     views: Sequence[ObligationView],
     relied: Mapping[str, Relied],
-    suppositions: Sequence[Supposition],
-    weakenings: Sequence[Weakening],
+    assumptions: Sequence[Assumption],
+    deficits: Sequence[Deficit],
     gates: Sequence[Gate],
     changes: Changes,
     weakest: WeakestEvidence | None,
     following: WeakestEvidence | None,
+    trusted: tuple[TrustLine, ...],
     *,
     strict: bool,
     passed: bool,
 ) -> Answers:
     """Everything that the first screen says, but whether it is signed."""
-    number = Counter(r.how for r in requirements)
-    headline, verdict, tone = _verdict(requirements, suppositions, gates, strict=strict, passed=passed)
+    number = Counter(r.level for r in requirements)
+    headline, verdict, tone = _verdict(requirements, gates, strict=strict, passed=passed)
+    unrun = next((d.count for d in deficits if d.key == "programs"), 0)
+    if unrun and headline.holds:  # nothing is known of the programs
+        verdict = f"{verdict}; {count(unrun, 'claim')} about programs not run"
+        tone = min(tone, Tone.AMBER, key=lambda t: t.rank)
     warned = ""
     bad = sum(bool(view.handled) and not view.standing.supports for view in views)
     if bad and passed:  # whatever else holds: what is known to be bad is no green
-        warned, tone = f"{WARNED}: {count(bad, 'finding')} known", Tone.AMBER
-    by_how = tuple((how, number[how]) for how in _HOW_ORDER if number[how])
+        warned, tone = f"{WARNED}: {count(bad, 'finding')} known", Tone.RED if tone is Tone.RED else Tone.AMBER
+    by_level = tuple((level, number[level]) for level in _WORST_FIRST if number[level])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
-    kinds = len(weakenings)
+    kinds = len(deficits)
     by_node: dict[str, list[ObligationView]] = {node.name: [] for node in nodes}
     for view in views:
         by_node.setdefault(view.obligation.node, []).append(view)
     ranked = [_basis(node, by_node[node.name], relied) for node in nodes]
     basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
-    owned = sum(s.owned for s in suppositions)
+    owned = sum(s.owned for s in assumptions)
     return Answers(
         headline=headline,
         verdict=verdict,
         tone=tone,
-        by_how=by_how,
-        counts=" · ".join(f"{many} {how}" for how, many in by_how) or "no requirement",
-        weakened=of_weakening(kinds) if kinds else "no weakening",
+        by_level=by_level,
+        counts=" · ".join(f"{many} {level}" for level, many in by_level) or "no requirement",
+        weakened=of_deficits(kinds) if kinds else "no deficit",
         gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + ("es" if len(asked) == 1 else ""),
         listed=_listed(requirements),
         based_on=tuple(basis[:NODES]),
@@ -140,49 +143,58 @@ def answers(
         weakest=weakest,
         next_weakest=f"{following.title}, {following.words}" if following else "",
         refuted=_refuted(requirements, views, nodes),
-        supposed=tuple(_lines(suppositions)),
-        owned=f"{owned} of {len(suppositions)}" if suppositions else "",
+        supposed=tuple(_lines(assumptions)),
+        owned=f"{owned} of {len(assumptions)}" if assumptions else "",
         changed_against=f"Against the report signed by {changes.against}:" if changes.against else "",
         changed=_changed(changes),
         signed="not signed",
-        statement=_statement(f"{verdict} ({warned})" if warned else verdict, suppositions, kinds),
+        statement=_statement(f"{verdict} ({warned})" if warned else verdict, assumptions, kinds),
         warned=warned,
-        owners=_owners(suppositions),
-        weakened_by=briefly(weakenings),
+        owners=_owners(assumptions),
+        weakened_by=briefly(deficits),
+        trusted=trusted,
+        failures=tuple(
+            Failure(gate.title, gate.reason, gate.suggestions[0].text if gate.suggestions else "")
+            for gate in gates
+            if not gate.passed
+        ),
         objects=_objects(views, relied),
     )
 
 
 def _verdict(
-    requirements: Sequence[RequirementView],
-    suppositions: Sequence[Supposition],
-    gates: Sequence[Gate],
-    *,
-    strict: bool,
-    passed: bool,
-) -> tuple[Headline, str, Tone]:
-    still_open = sum(r.how is How.OPEN for r in requirements)
-    failed = sum(not gate.passed for gate in gates)
+    requirements: Sequence[RequirementView], gates: Sequence[Gate], *, strict: bool, passed: bool
+) -> tuple[Level, str, Tone]:
+    """The headline, what stands beside it on the first line, and its colour: the least of what the requirements are."""
+
+    def said(level: Level, more: str = "") -> str:
+        return level.capitalize() + (f": {more}" if more else "")
+
     if strict and passed:
-        return Headline.EXAMINED, Headline.EXAMINED.value, Tone.GREY
-    if still_open:
-        return Headline.NOT_SHOWN, f"{Headline.NOT_SHOWN}: {still_open} open", Tone.RED
-    if failed or not passed:
-        fails = f"{count(failed, 'gate')} fail{'s' if failed == 1 else ''}"
-        return Headline.NOT_SHOWN, f"{Headline.NOT_SHOWN}: {fails}", Tone.RED
+        return Level.EXAMINED, said(Level.EXAMINED), Tone.GREY
+    if refuted := [r.id for r in requirements if r.level is Level.REFUTED]:
+        return Level.REFUTED, said(Level.REFUTED, listed(refuted, ROWS)), Tone.RED
+    missing = [r for r in requirements if not r.level.holds]
+    of_all = f"of {count(len(requirements), 'requirement')}"
+    if lost := sum(not r.awaits_validation for r in missing):
+        return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{lost} {of_all}"), Tone.RED
+    if not passed:
+        failed = sum(not gate.passed for gate in gates)
+        return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{count(failed, 'gate')} fail{'s' * (failed == 1)}"), Tone.RED
     if not requirements:
-        return Headline.EXAMINED, f"{Headline.EXAMINED}: no requirement is named", Tone.GREY
+        return Level.EXAMINED, said(Level.EXAMINED, "no requirement is named"), Tone.GREY
+    if missing:
+        return Level.NOT_SHOWN, said(Level.NOT_SHOWN, f"{len(missing)} {of_all} not validated"), Tone.AMBER
+    level = max((r.level for r in requirements), key=tuple(Level).index)
     tone = min((r.tone for r in requirements), key=lambda t: t.rank)
-    if suppositions:
-        many = len(suppositions)
-        said = f"{Headline.CONDITIONAL} {count(many, 'supposition')} hold{'s' if many == 1 else ''}"
-        return Headline.CONDITIONAL, said, tone
-    return Headline.HOLDS, Headline.HOLDS.value, tone
+    rates = [r.rate for r in requirements if r.rate is not None and level is Level.TESTS]
+    worst = max(rates, key=lambda rate: Fraction(rate.bound or 1), default=None)
+    return level, said(level) + (f" ({worst.brief})" if worst else ""), tone
 
 
 def _badness(view: RequirementView) -> tuple[int, int, int]:
     """Sorts the worst requirement first: colour, how it holds, how much it supposes."""
-    return view.tone.rank, _HOW_ORDER.index(view.how), -len(view.supposes)
+    return view.tone.rank, _WORST_FIRST.index(view.level), -len(view.supposes)
 
 
 def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
@@ -229,9 +241,9 @@ def basis_of(node: NodeView, case: Case) -> NodeBasis:
 
 def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone]:
     if view.id not in relied or not view.standing.supports:
-        return stands(view), Tone.RED
+        return view.standing.value, Tone.RED
     found = relied[view.id]
-    return word(found.status), Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
+    return found.status.value, Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
 
 
 def _refuted(
@@ -242,7 +254,7 @@ def _refuted(
     wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
     if not wrong:
         return ""
-    felled = [r.id for r in requirements if r.how is How.OPEN]
+    felled = [r.id for r in requirements if not r.level.holds]
     first = min(wrong, key=lambda v: v.obligation.kind is not Kind.GUARANTEE).obligation
     where = next((f"{node.title}: " for node in nodes if node.name == first.node), "")
     more = f", and {count(len(wrong) - 1, 'more claim')}" if len(wrong) > 1 else ""
@@ -250,26 +262,26 @@ def _refuted(
     return f"Refuted: {where}“{first.claim.rstrip('.')}”{more}.{takes}"
 
 
-def _lines(suppositions: Sequence[Supposition]) -> Iterable[SupposedLine]:
+def _lines(assumptions: Sequence[Assumption]) -> Iterable[SupposedLine]:
     for sort in Sort:
-        of_sort = [s for s in suppositions if s.sort is sort]
+        of_sort = [s for s in assumptions if s.sort is sort]
         if of_sort:
             most = max(of_sort, key=lambda s: (s.expired, bool(s.says), len(s.needed_by)))
             others = tuple(s.number for s in of_sort if s is not most)
             yield SupposedLine(sort, len(of_sort), most.words, most.number, others)
 
 
-def _owners(suppositions: Sequence[Supposition]) -> str:
-    """``A. Person (3), B. Person (1), supposed 2026-11-21; the first ends 2027-01-31``."""
-    owned = [s for s in suppositions if s.owned]
+def _owners(assumptions: Sequence[Assumption]) -> str:
+    """``A. Person (3), B. Person (1), assumed since 2026-11-21; the first ends 2027-01-31``."""
+    owned = [s for s in assumptions if s.owned]
     number = Counter(s.who for s in owned).most_common()
     if not number:
         return ""
-    ends = sorted({s.until for s in owned})
+    ends = sorted({s.until for s in owned if s.until})
     named = listed([f"{who} ({many})" if len(number) > 1 else who for who, many in number], OWNERS)
     made = sorted({s.date for s in owned})
-    since = f", supposed {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
-    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first ends {ends[0]}"
+    since = f", assumed since {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
+    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first ends {ends[0]}" if ends else ""
     return f"{named}{since}{until}"
 
 
@@ -310,12 +322,12 @@ def _signed(baseline: Baseline | None, content: str, today: str) -> str:
     return f"not signed; changed since {baseline.who} signed on {baseline.signed_on}"
 
 
-def _statement(verdict: str, suppositions: Sequence[Supposition], kinds: int) -> str:
-    if not suppositions:
-        accepted = "it rests on no suppositions"
-    elif len(suppositions) == 1:
-        accepted = "I accept supposition S1 as listed"
+def _statement(verdict: str, assumptions: Sequence[Assumption], kinds: int) -> str:
+    if not assumptions:
+        accepted = "it rests on no assumptions"
+    elif len(assumptions) == 1:
+        accepted = "I accept assumption A1 as listed"
     else:
-        accepted = f"I accept suppositions S1 to S{len(suppositions)} as listed"
-    known = f"I know of the {of_weakening(kinds)}" if kinds else "no weakening is known"
+        accepted = f"I accept assumptions A1 to A{len(assumptions)} as listed"
+    known = f"I know of the {of_deficits(kinds)}" if kinds else "no deficit is known"
     return f"By signing I say: I agree with the verdict “{verdict}”, {accepted}, and {known}."

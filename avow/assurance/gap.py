@@ -15,7 +15,6 @@ from avow.base.persons import one_person
 from avow.base.plain import count
 from avow.base.tuning.shown import TOOL_WORDS
 from avow.base.verdict import Isolation, Link, Verdict
-from avow.evidence.currency import undeclared
 from avow.evidence.obligation import Kind
 from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
@@ -41,7 +40,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     if kept == [] and dropped:
         return f"nothing counts{because}"
     if status not in demand.one_of:
-        return f"{status.word}, but {asked_of(demand)} is asked{because}"
+        return f"{status.value}, but {asked_of(demand)} is asked{because}"
     speaking = [item for item in kept if weigh(item).support is not None]
     number = independent(speaking) if demand.independent else len({item.method for item in speaking})
     if number < demand.methods:
@@ -149,6 +148,18 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
     return None
 
 
+def _against_vacuity(view: ObligationView) -> str:
+    match view.obligation.kind:
+        case Kind.REQUIREMENT:
+            return "state a formula that a faulty design would break, and name under `supported_by` what it needs"
+        case Kind.COMPOSITION:
+            return (
+                "assume less: an environment must be able to go on for ever, and each guarantee's trigger to come about"
+            )
+        case _:  # a guarantee, most of all
+            return "give the method inputs that meet the guarantee's trigger"
+
+
 def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Suggestion:
     """The cheapest step: repair what is wrong, run or install what is planned, else add a method that fits."""
     match view.status:
@@ -161,13 +172,17 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         case Status.ERROR:
             # the same question is not asked twice: it has to change, or be asked afresh
             again = f"`avow verify --fresh {facts.system}`"
-            return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
+            failed = next((r for r in view.records if r.verdict is Verdict.ERROR), None)
+            said = f" `{failed.method}`: {_clipped(failed.summary)}" if failed is not None else " the tool"
+            return Suggestion(f"repair what stopped{said}; then {again}")
+        case Status.UNWRITTEN:
+            return Suggestion("replace `to_write` by what the node promises", cost=40)
         case Status.VACUOUS if hollow := [r.method for r in view.records if r.vacuous and "mutation" in r.details]:
             return Suggestion(
                 f"find out what `{hollow[0]}` looks at: it says the same of every mutant of the claim", cost=50
             )
         case Status.VACUOUS:
-            return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
+            return Suggestion(_against_vacuity(view), cost=50)
         case Status.STALE if expired := _expired(view):
             return Suggestion(
                 f"renew the {' and the '.join(expired)}: what was given was valid until a day that is past", cost=30
@@ -192,7 +207,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if method not in tried:
             return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
     for record in view.records:
-        if record.method in used and (record.verdict is Verdict.ERROR or undeclared(record)):
+        if record.method in used and record.verdict is Verdict.NOT_RUN:
+            return Suggestion(f"let `{record.method}` run: {_clipped(record.summary)}", record.method)
+        if record.method in used and record.verdict is Verdict.ERROR:
             return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
@@ -252,6 +269,13 @@ def reason_wanted(name: str) -> str:
         return f"say what is assumed of the input, and why: `environment: {{{key}: {{assume: …, because: …}}}}`"
     key = "entered" if key.startswith(("loop.", "loop-of.")) else key.replace("-", "_")
     return f"give a reason in the plan: `compose: {{{goal}: {{{key}: {{because: …}}}}}}`"
+
+
+def missing_tools(facts: Facts) -> Mapping[tuple[str, str], str]:
+    """(node, method) → the command that installs the tool that the planned method lacks."""
+    install = {info.name: info.install for info in facts.methods if not info.available}
+    planned = [(node.name, method, backend) for node in facts.nodes for method, backend in node.methods]
+    return {(node, method): install[backend] for node, method, backend in planned if backend in install}
 
 
 def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:

@@ -6,14 +6,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 from typing import assert_never
 
-from avow.assurance.answers import EARLIER, How
+from avow.assurance.answers import EARLIER
 from avow.assurance.certification import ProofView, certifiable, claimed
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
 from avow.assurance.gap import shortfall, suggest
+from avow.assurance.hazards import HazardView
 from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.policy import CRITICALITIES
+from avow.assurance.rates import exceeds, percent
 from avow.assurance.relied import Relied, looked_at
+from avow.assurance.risk_gates import hazards_gate
 from avow.base.plain import count, listed
 from avow.base.verdict import Object
 from avow.evidence.obligation import Kind, ProgramClaim
@@ -27,6 +31,7 @@ def gates(
     obligations: Sequence[ObligationView],
     requirements: Sequence[RequirementView],
     derivations: Sequence[DerivationView],
+    hazards: Sequence[HazardView],
     findings: Sequence[Handled],
     proofs: Sequence[ProofView],
     relied: Mapping[str, Relied],
@@ -35,12 +40,15 @@ def gates(
     """Every gate, in the order in which a reader should look at them."""
     views = {view.id: view for view in obligations}
     excused = {name for f in findings if not f.expired for name in f.obligations}
-    claims = [view for view in obligations if not view.advice]
+    unwritten = [view for view in obligations if view.status is Status.UNWRITTEN]
+    behind = _behind(derivations, views, {view.id for view in unwritten} - excused)
+    claims = [view for view in obligations if not view.advice and view.id not in behind]
     return (
         *_earlier(facts),
         _integrity(facts),
         *_findings(facts, findings, obligations),
         _nothing_wrong(facts, obligations, excused),
+        *([_gate("unwritten", "Every guarantee is written", unwritten, excused, _worded, "")] if unwritten else ()),
         *(
             _held_to(kind.value, title, [v for v in claims if v.obligation.kind is kind], good, excused)
             for kind, title, good in (
@@ -51,10 +59,25 @@ def gates(
         ),
         *_guarantees(facts, obligations, excused),
         *_programs(facts, obligations, relied, excused),
-        _derivations(facts, derivations, views, excused),
+        _derivations(facts, derivations, views, excused, {view.id for view in unwritten} | behind),
         _requirements(facts, requirements, derivations, views, excused),
+        *hazards_gate(hazards),
+        *_rates(facts, requirements, views),
         *_certified(facts, proofs, fresh),
     )
+
+
+def _worded(view: ObligationView) -> str:
+    return view.status.value
+
+
+def _behind(
+    derivations: Sequence[DerivationView], views: Mapping[str, ObligationView], unwritten: set[str]
+) -> set[str]:
+    """The open conditions of derivations that rest on an unwritten guarantee: they are asked for once it is written."""
+    below = {name for d in derivations if not unwritten.isdisjoint(d.below) for name in d.below if name in views}
+    views_below = [views[name] for name in below]
+    return {v.id for v in views_below if v.obligation.kind is Kind.COMPOSITION and v.status is Status.UNKNOWN}
 
 
 def exit_code(found: Iterable[Gate]) -> int:
@@ -145,25 +168,35 @@ def _held_to(name: str, title: str, views: Sequence[ObligationView], good: Seque
         [v for v in views if good and v.status not in good],
         excused,
         lambda view: _short_of(view.status, good),
-        _holding([v.status.supports for v in views], asked=bool(good)),
+        _holding([v.status.supports for v in views], asked=bool(good)) + _not_run(views, good),
         _in_words(good),
         idle=not good,
     )
 
 
+def _not_run(views: Sequence[ObligationView], good: Sequence[Status]) -> str:
+    """A policy may accept that a claim stays open where its tool is missing: the gate says how many do."""
+    many = sum(view.status is Status.NOT_RUN for view in views)
+    return f"; {many} not run, which the policy accepts" if many and Status.NOT_RUN in good else ""
+
+
 def _in_words(good: Sequence[Status]) -> str:
-    return " or ".join(status.word for status in good)
+    return " or ".join(status.value for status in good)
 
 
 def _short_of(status: Status, good: Sequence[Status]) -> str:
     """``supposed, but proved or checked is asked``; of what supports nothing the bare word."""
-    return f"{status.word}, but {_in_words(good)} is asked" if status.supports else status.value
+    return f"{status.value}, but {_in_words(good)} is asked" if status.supports else status.value
 
 
 def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Iterable[Gate]:
     for criticality, demand in facts.policy.guarantees:
         of_kind = [
-            v for v in obligations if v.obligation.kind is Kind.GUARANTEE and _criticality(v, facts) == criticality
+            v
+            for v in obligations
+            if v.obligation.kind is Kind.GUARANTEE
+            and v.status is not Status.UNWRITTEN
+            and _criticality(v, facts) == criticality
         ]
         if not of_kind:
             continue
@@ -201,19 +234,27 @@ def _criticality(view: ObligationView, facts: Facts) -> str:
 
 
 def _derivations(
-    facts: Facts, derivations: Sequence[DerivationView], views: Mapping[str, ObligationView], excused: set[str]
+    facts: Facts,
+    derivations: Sequence[DerivationView],
+    views: Mapping[str, ObligationView],
+    excused: set[str],
+    unwritten: set[str],
 ) -> Gate:
+    """What waits only for guarantees to be written is told by their own gate."""
     wanted = bool(facts.policy.composition)
     failing = [d for d in derivations if wanted and not d.status.supports]
-    bad = [d for d in failing if not _all_excused(d.below, excused)]
+    bad = [d for d in failing if not _all_excused(d.below, excused | unwritten)]
     names = tuple(derivation_claim(d.derivation.name) for d in bad)
-    let_off = tuple(derivation_claim(d.derivation.name) for d in failing if d not in bad)
-    reason = "; ".join(f"{d.derivation.name} is {d.status.word}: {_because(d.below)}" for d in bad[:5])
+    let_off = tuple(derivation_claim(d.derivation.name) for d in failing if _all_excused(d.below, excused))
+    reason = "; ".join(f"{d.derivation.name} is {d.status.value}: {_because(d.below)}" for d in bad[:5])
+    waiting = len(failing) - len(bad) - len(let_off)
+    holding = _holding([d.status.supports for d in derivations], wanted, len(let_off))
+    holding += f"; {waiting} once what is unwritten is written" if waiting else ""
     return Gate(
         "derivations",
         "Derivations rest on what is shown",
         not bad,
-        reason or _holding([d.status.supports for d in derivations], wanted, len(let_off)),
+        reason or holding,
         names,
         (),
         let_off,
@@ -231,19 +272,19 @@ def _requirements(
     excused: set[str],
 ) -> Gate:
     good = facts.policy.requirements
-    failing = [r for r in requirements if good and (r.status not in good or r.how is How.OPEN)]
+    failing = [r for r in requirements if good and (r.status not in good or not (r.level.holds or r.awaits_validation))]
     causes = {r.id: r.below or r.failing or _weak(r, derivations, views, good) for r in failing}
     # what is wrong with the requirement itself, no finding beneath it excuses
-    own = {r.id for r in failing if r.suspect or r.unknown_names}
+    own = {r.id for r in failing if r.outdated or r.unknown_names}
     bad = [r for r in failing if r.id in own or not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
     reason = "; ".join(
         f"{r.id} is {_standing(r, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
     )
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
-    if any(r.suspect for r in bad):
-        found.append(Suggestion("read the sentence again and confirm it: `avow check` prints what to write", cost=5))
-    if any(not (r.formal or r.below or causes[r.id] or r.suspect) for r in bad):
+    if any(r.outdated for r in bad):
+        found.append(Suggestion("read the sentence against the formula, then run `avow validate`", cost=5))
+    if any(not (r.formal or r.below or causes[r.id] or r.outdated) for r in bad):
         found.append(
             Suggestion("state the requirement as a `formula` or a `temporal` one: prose is argued by a person", cost=20)
         )
@@ -252,7 +293,7 @@ def _requirements(
         "requirements",
         "Every requirement is answered",
         not bad,
-        reason or _holding([r.status.supports for r in requirements], bool(good), len(let_off)),
+        reason or _holding([r.level.holds for r in requirements], bool(good), len(let_off)),
         tuple(requirement_claim(r.id) for r in bad),
         tuple(suggestions.values())[:10],
         let_off,
@@ -262,13 +303,43 @@ def _requirements(
     )
 
 
+def _rates(
+    facts: Facts, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView]
+) -> Iterable[Gate]:
+    """That a requirement that rests on samples is shown to fail no oftener than the policy allows for the most critical
+    node beneath it."""
+    allowed = dict(facts.policy.max_failure_rate)
+    if not allowed:
+        return
+    wrong = dict[str, str]()
+    asked = 0
+    for r in requirements:
+        below = {views[name].criticality for name in r.closure if views[name].obligation.kind is Kind.GUARANTEE}
+        highest = min((CRITICALITIES.index(c) for c in below if c in CRITICALITIES), default=0)
+        most = min((allowed[c] for c in CRITICALITIES[highest:] if c in allowed), key=float, default=None)
+        if r.rate is not None and most is not None:
+            asked += 1
+            if why := exceeds(r.rate, most):
+                wrong[r.id] = why
+    yield Gate(
+        "rates",
+        "Requirements that rest on samples fail rarely enough",
+        not wrong,
+        "; ".join(f"{name}: {why}" for name, why in wrong.items()) or f"{count(asked, 'requirement')} within the limit",
+        tuple(requirement_claim(name) for name in wrong),
+        (Suggestion("make more trials, or ask each sample for more confidence", cost=30),) if wrong else (),
+        asks=", ".join(f"at most {percent(rate)} at {criticality}" for criticality, rate in allowed.items()),
+        idle=not asked,
+    )
+
+
 def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
     """Why it does not count; one that would hold by its own evidence may still rest on what has failed or expired."""
-    if requirement.suspect:
-        return "suspect: its sentence, or what supports it, was changed since it was confirmed"
+    if requirement.outdated:
+        return "not validated: its sentence, formula or support was changed since a person read them"
     if requirement.status not in good:
         return _short_of(requirement.status, good)
-    return "open" if requirement.failing else "open: a supposition has expired"
+    return "open" if requirement.failing else "open: an assumption has expired"
 
 
 def _weak(
@@ -279,7 +350,7 @@ def _weak(
 ) -> tuple[str, ...]:
     """What makes a requirement that holds weaker than is asked: all under it that is itself weaker than is asked.
     Nothing where the requirement is only prose: that no finding beneath it can excuse."""
-    if not (requirement.formula or requirement.temporal) and Status.LINKED not in good:
+    if not (requirement.formula or requirement.temporal) and Status.ARGUED not in good:
         return ()
     rests = {derivation_claim(d.derivation.name): d.rests_on for d in derivations}
     found, seen, todo = list[str](), set[str](), list(requirement.rests_on)

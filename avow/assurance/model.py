@@ -13,11 +13,14 @@ from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
 
-from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition, Tone, Weakening, WeakestEvidence
+from avow.assurance.answers import Answers, Assumption, Baseline, Changes, Deficit, Level, Tone, WeakestEvidence
 from avow.assurance.certification import KernelRun, ProofView, Trusted
+from avow.assurance.hazards import HazardView
 from avow.assurance.history import History
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
+from avow.assurance.rates import RateView
+from avow.assurance.standards import StandardView
 from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
@@ -28,7 +31,7 @@ from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
-from avow.system.plan import Confirmation, Statement
+from avow.system.plan import Statement, Validation
 
 # -- handed in by the pipeline --------------------------------------------------------------------------------------
 
@@ -87,8 +90,8 @@ class Derivation:
     """One derivation of the calculus, or one instance of a rule within it.
 
     `text` is the derivation in the paper's notation, as lines of plain Unicode text (shown in a fixed-width font);
-    `latex` the same for the appendix; `premises` are the names of nodes (their guarantees are what it rests on) or of
-    other derivations; `conclusion` one line; `conditional` what the conclusion depends on without its being shown.
+    `premises` are the names of nodes (their guarantees are what it rests on) or of other derivations; `conclusion` one
+    line; `conditional` what the conclusion depends on without its being shown.
     """
 
     name: str
@@ -97,7 +100,6 @@ class Derivation:
     conclusion: str
     premises: tuple[str, ...] = ()
     side_conditions: tuple[SideCondition, ...] = ()
-    latex: str = ""
     conditional: tuple[str, ...] = ()
 
 
@@ -229,7 +231,10 @@ class RequirementView:
     """Its own obligations (entailment, model checking), where it has a formula or a temporal property."""
     answer: str
     """One line for people."""
-    how: How = How.OPEN
+    level: Level = Level.NOT_SHOWN
+    """How far it is shown: the word of every format."""
+    bounded: bool = False
+    """Whether its formula or property was settled within the plan's finite scenario only."""
     tone: Tone = Tone.RED
     closure: tuple[str, ...] = ()
     """Every obligation under it, closed: a guarantee with what discharges its node's assumptions, and so on."""
@@ -237,18 +242,38 @@ class RequirementView:
     """Those of them that do not hold."""
     weakest_evidence: WeakestEvidence | None = None
     supposes: tuple[str, ...] = ()
-    """Keys of suppositions."""
+    """Keys of assumptions."""
+    expired: bool = False
+    """Whether one of these is past its last day."""
+    rate: RateView | None = field(default=None, metadata=codec.LATER)
+    """How often it may fail, where it rests on samples."""
     span: Span | None = None
-    confirmed: Confirmation | None = None
-    suspect: bool = False
-    """Whether its sentence, or what is linked to it, is another than was confirmed."""
+    validation: Validation | None = None
+    validated: bool = False
+    """Whether a person has read its sentence against its formula and support, as they are now."""
+    outdated: bool = False
+    """Whether a person has read another sentence, formula or support."""
     linked: str = ""
     """Digest of what the names under `supported_by` say in the contract."""
+    source: str = field(default="", metadata=codec.LATER)
+    """The document that it comes from, and the place in it."""
 
     @property
     def formal(self) -> str:
         """Its formula or temporal property; empty where it is prose."""
         return self.formula or self.temporal
+
+    @property
+    def stands(self) -> str:
+        """How far it is shown, and how often it may fail where that rests on samples."""
+        return f"{self.level} ({self.rate.brief})" if self.rate and self.level.holds else f"{self.level}"
+
+    @property
+    def awaits_validation(self) -> bool:
+        """Whether nothing is missing but a person who reads the sentence against the formula."""
+        return (
+            not self.level.holds and self.status.supports and not (self.failing or self.unknown_names or self.expired)
+        )
 
     @property
     def words(self) -> str:
@@ -282,14 +307,6 @@ class NodeView:
     """What people call it."""
     discharged_by: tuple[str, ...] = ()
     """The obligations (without the system) that settle its assumptions: its guarantees count only with these."""
-
-
-@dataclass(frozen=True, slots=True)
-class HypothesisView:
-    """Something that results rest on without its having been shown, and the claims whose evidence says so."""
-
-    text: str
-    claims: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,14 +426,13 @@ class Case:
     digests: tuple[tuple[str, str], ...]
     answers: Answers
     requirements: tuple[RequirementView, ...]
-    suppositions: tuple[Supposition, ...]
-    weakenings: tuple[Weakening, ...]
+    assumptions: tuple[Assumption, ...]
+    deficits: tuple[Deficit, ...]
     changes: Changes
     open_items: tuple[OpenItem, ...]
     nodes: tuple[NodeView, ...]
     obligations: tuple[ObligationView, ...]
     derivations: tuple[DerivationView, ...]
-    hypotheses: tuple[HypothesisView, ...]
     environment: tuple[EnvironmentView, ...]
     findings: tuple[Handled, ...]
     gates: tuple[Gate, ...]
@@ -434,6 +450,9 @@ class Case:
     orphans: tuple[Entry, ...] = ()
     """Evidence for claims that no longer exist."""
     history: History = field(default_factory=History, metadata=codec.LATER)
+    hazards: tuple[HazardView, ...] = field(default=(), metadata=codec.LATER)
+    standard: StandardView | None = field(default=None, metadata=codec.LATER)
+    """The objectives of the standard that the policy names."""
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()

@@ -1,8 +1,6 @@
 """The argument in modules, as GSN has them: one for each requirement, one for each node, nothing twice.
 
-A requirement's module points at nodes by *away goals*; a node's module holds its guarantees with their evidence. CAE
-(claims, arguments, evidence) is the same tree in other words: what a tool derived is a decomposition, what a person
-says is a substitution, and a record is incorporated as evidence.
+A requirement's module points at nodes by *away goals*; a node's module holds its guarantees with their evidence.
 """
 
 from __future__ import annotations
@@ -10,9 +8,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from avow.assurance.answers import How
+from avow.assurance.answers import MEANINGS, Level
 from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
-from avow.assurance.relied import stands
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
@@ -29,7 +26,7 @@ class RequirementModule:
     conditions: str
     """How many conditions of the composition are met here; empty where there are none."""
     supposes: tuple[str, ...]
-    """Numbers of suppositions."""
+    """Numbers of assumptions."""
     failing: tuple[str, ...]
 
 
@@ -41,7 +38,7 @@ class NodeModule:
 
 def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
     views = {view.id: view for view in case.obligations}
-    numbers = {s.key: s.number for s in case.suppositions}
+    numbers = {s.key: s.number for s in case.assumptions}
     found = []
     for r in case.requirements:
         under = [views[name] for name in r.closure if name in views]
@@ -55,9 +52,8 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
         conditions = f"{len(shown)} of {count(len(side), 'condition')} met" if side else ""
         supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
-        found.append(
-            RequirementModule(r, _because(case, r), _strategy(r, len(away)), tuple(away), conditions, supposes, failing)
-        )
+        because = _because(case, r) + (f" F{r.rate.words[1:]}." if r.rate and r.level.holds else "")
+        found.append(RequirementModule(r, because, _strategy(r, len(away)), tuple(away), conditions, supposes, failing))
     return tuple(found)
 
 
@@ -69,27 +65,28 @@ def node_modules(case: Case) -> tuple[NodeModule, ...]:
 
 
 def _standings(views: Sequence[ObligationView]) -> str:
-    return ", ".join(f"{many} {said}" for said, many in Counter(map(stands, views)).items())
+    return ", ".join(f"{many} {said}" for said, many in Counter(view.standing for view in views).items())
 
 
 def _because(case: Case, r: RequirementView) -> str:
-    match r.how:
-        case How.ARGUED:
-            said = next((s.because for s in case.statements if s.place == f"requirements.{r.id}.amounts"), "")
-            reason = f" The reason given: {said}." if said else ""
+    match r.level:
+        case Level.ARGUED if not r.formal:
+            said = next((s.because for s in case.statements if s.place == f"requirements.{r.id}.validation"), "")
+            reason = f" The reason given: {said.rstrip('.')}." if said else ""
             told = "Argued: a person says that the guarantees below amount to the sentence. No tool has looked at that."
             return told + reason
-        case How.DERIVED:
-            return "Derived: a tool concluded the formula from the guarantees below."
-        case How.BOUNDED:
-            return (
-                "Derived within bounds: every case of the plan's finite scenario was looked at, and nothing outside it."
-            )
-        case How.OPEN:
-            late = [s for s in case.suppositions if s.expired and r.id in s.needed_by]
+        case Level.NOT_SHOWN:
+            late = [s for s in case.assumptions if s.expired and r.id in s.needed_by]
             if late:
-                return f"Open: what it supposes has expired ({', '.join(s.number for s in late)})."
-            return "Open: it is not shown."
+                return f"Not shown: an assumption has expired ({', '.join(s.number for s in late)})."
+            if r.awaits_validation:
+                return "Not shown: the formula holds, but nobody has read the sentence against it (`avow validate`)."
+            return "Not shown: see what fails below."
+        case Level.REFUTED:
+            return "Refuted: the contracts allow a counterexample."
+        case _:  # every other level is derived
+            within = " within the plan's finite scenario, and nothing outside it" if r.bounded else ""
+            return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. A tool derived it{within}."
 
 
 def _strategy(r: RequirementView, nodes: int) -> str:

@@ -6,6 +6,7 @@ An obligation's claim bears its id; a requirement's is ``requirement:REQ1``, a d
 from __future__ import annotations
 
 import functools
+import shlex
 
 from avow.evidence.obligation import Kind, Obligation
 
@@ -40,15 +41,15 @@ _SANITY = {
 
 
 def short(claim: str) -> str:
-    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (a supposition has none).
+    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (an assumption has none).
 
     Where the id of a claim misleads people, words: a sanity claim is ``agent.low (can be triggered)`` and not
-    ``agent/sanity/not-vacuous-low``, what the plan says of the environment ``what is supposed of in.away``.
+    ``agent/sanity/not-vacuous-low``, what the plan says of the environment ``what is assumed of in.away``.
     """
     kind, colon, name = claim.partition(":")
     if colon and kind in ("requirement", "derivation"):
         return name
-    if colon and kind == "supposition":
+    if colon and kind == "assumption":
         return name.partition(":")[0]
     parts = claim.split("/", 3)
     if len(parts) != 4:
@@ -66,7 +67,7 @@ def short(claim: str) -> str:
         if about and not dash:
             return f"{node} ({_SANITY[about]})"
     if kind == Kind.COMPOSITION and name.startswith("environment."):
-        return f"what is supposed of {name.removeprefix('environment.')}"
+        return f"what is assumed of {name.removeprefix('environment.')}"
     return f"{node}/{kind}/{name}"
 
 
@@ -89,3 +90,18 @@ def is_advice(obligation: Obligation) -> bool:
 
 def is_foundation(obligation: Obligation) -> bool:
     return obligation.kind is Kind.SANITY and sanity_property(obligation) in FOUNDATION
+
+
+def rerun(obligation: Obligation, method: str) -> str:
+    """The command that asks a method about a claim again, from the workspace's folder."""
+    o = obligation
+    match o.kind:
+        case Kind.SANITY:
+            task = f"sanity:{o.system}:{o.node}"
+        case Kind.COMPOSITION | Kind.REQUIREMENT:
+            task = f"compose:{o.system}"
+        case Kind.WELL_FORMED:
+            task = f"check:{o.system}"
+        case Kind.GUARANTEE | Kind.PROGRAM:
+            task = f"discharge:{o.system}:{o.node}:{method}"
+    return f"AVOW_FRESH=1 doit {shlex.quote(task)}"

@@ -8,6 +8,7 @@
       reviewers: [A. Person]  who may review; without it, anybody
       certified: true         every answer must be of this run, every digest verified
       proved: certified       a proof of the calculus or of a requirement needs a certificate that the kernel checked
+      max_failure_rate: {high: 0.01}     how often a requirement that rests on samples may fail
 
 Profiles are data (`profiles.yaml`, beside this module). Errors are located diagnostics with codes POLICY001 to 005.
 """
@@ -15,17 +16,19 @@ Profiles are data (`profiles.yaml`, beside this module). Errors are located diag
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
+from decimal import Decimal
 from functools import cache
 from importlib import resources
 from typing import Any
 
 import yaml
 
+from avow.base import codec
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
-from avow.base.verdict import Isolation, Link, Object, said, unsaid
+from avow.base.verdict import Isolation, Link, Object, unsaid
 from avow.evidence.status import Status
 from avow.system.plan import Located, Numbers
 
@@ -77,7 +80,7 @@ class Demand:
             parts.append(f"isolation {self.isolation} or better")
         if self.reviewers > 1:
             parts.append(f"reviews by {self.reviewers} persons")
-        parts += [f"{said(word)} not older than {days} days" for word, days in self.max_age_days]
+        parts += [f"{word} not older than {days} days" for word, days in self.max_age_days]
         return ", ".join(parts)
 
 
@@ -98,6 +101,12 @@ class Policy:
     certified: bool = False
     proved: bool = False
     """Whether a proof of the calculus or of a requirement needs a certificate (``proved: certified``)."""
+    max_failure_rate: tuple[tuple[str, str], ...] = field(default=(), metadata=codec.LATER)
+    """(criticality, decimal): how often a requirement that rests on samples may fail."""
+    standard: str = field(default="", metadata=codec.LATER)
+    """The standard whose objectives are asked (a key of `standards.yaml`); empty: none."""
+    level: str = field(default="", metadata=codec.LATER)
+    """Its level, as the standard calls it."""
 
     def demand(self, criticality: str) -> Demand:
         """The demand for a criticality; an unknown one is treated as the highest."""
@@ -159,7 +168,7 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
 
 _KEYS = (
     *("profile", "guarantees", "sanity", "composition", "requirements", "programs"),
-    *("reviewers", "certified", "proved"),
+    *("reviewers", "certified", "proved", "max_failure_rate"),
 )
 _DEMAND_KEYS = (
     *("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation"),
@@ -216,6 +225,10 @@ class _PolicyReader:
                 if data != "certified":
                     self.fault(f"'{data}' is not what may be asked: certified", (key,))
                 return True
+            case "max_failure_rate":
+                return self.rates(data, (key,))
+            case "programs":  # `not-run` accepts that a program's claims stay open where its tool is missing
+                return self.statuses(data, (key,), (*_GIVEN, Status.NOT_RUN.value))
             case _:  # the others name statuses
                 return self.statuses(data, (key,))
 
@@ -247,9 +260,11 @@ class _PolicyReader:
             self.fault(f"isolation is one of {', '.join(Isolation)}", path)
         return Isolation.NONE
 
-    def statuses(self, data: object, path: tuple[str | int, ...]) -> tuple[Status, ...]:
+    def statuses(
+        self, data: object, path: tuple[str | int, ...], allowed: tuple[str, ...] = _GIVEN
+    ) -> tuple[Status, ...]:
         given = [unsaid(w) if isinstance(w, str) else w for w in data] if isinstance(data, list) else data
-        return tuple(Status(word) for word in self.words(given, _GIVEN, path))
+        return tuple(Status(word) for word in self.words(given, allowed, path))
 
     def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
         good = []
@@ -279,16 +294,28 @@ class _PolicyReader:
             return False
         return data
 
+    def rates(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, str], ...]:
+        if not isinstance(data, Mapping):
+            self.fault("a mapping of criticalities to greatest rates of failure is wanted, such as {high: 0.01}", path)
+            return ()
+        self.faults += _unknown(data, CRITICALITIES, self.located, path)
+        for criticality, rate in data.items():
+            if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < 1:
+                self.fault("a number between 0 and 1 is wanted", (*path, criticality))
+                return ()
+        return tuple((c, str(Decimal(str(data[c])))) for c in CRITICALITIES if c in data)
+
     def ages(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, int], ...]:
         if not isinstance(data, Mapping):
             return (("all", self.count(data, path)),)
-        self.faults += _unknown(data, (*_GIVEN, *map(said, _GIVEN), "all"), self.located, path)
-        return tuple((unsaid(str(word)), self.count(days, (*path, word))) for word, days in data.items())
+        named = {unsaid(str(word)): self.count(days, (*path, word)) for word, days in data.items()}
+        self.faults += _unknown(named, (*_GIVEN, "all"), self.located, path)
+        return tuple(named.items())
 
 
 def asked_of(demand: Demand) -> str:
     """The statuses that are good enough, in words."""
-    return " or ".join(status.word for status in demand.one_of)
+    return " or ".join(status.value for status in demand.one_of)
 
 
 def _unknown(
@@ -325,6 +352,8 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
             requirements=reader.statuses(raw["requirements"], ("requirements",)),
             programs=reader.statuses(raw["programs"], ("programs",)),
             certified=raw.get("certified", False),
+            standard=raw.get("standard", ""),
+            level=str(raw.get("level", "")),
         )
     if faults:
         raise Rejected(*faults)

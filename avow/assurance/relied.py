@@ -1,8 +1,8 @@
 """The record of each guarantee that is relied upon, and what was seen, in words with its bound.
 
-Of several records that support a claim one is chosen: one whose suppositions have not expired before any other, then
+Of several records that support a claim one is chosen: one whose assumptions have not expired before any other, then
 one that is a proof or an exhaustive check, then one of the program itself before one no stronger of a model, then one
-whose suppositions all have an owner. A proof of the node's source supposes in the open what one of a model leaves out.
+whose assumptions all have an owner. A proof of the node's source supposes in the open what one of a model leaves out.
 """
 
 from __future__ import annotations
@@ -19,17 +19,7 @@ from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import ISOLATION, Evidence
 from avow.evidence.status import Status, weigh
 
-WORDS = {
-    Status.PROVED: "proved",
-    Status.CHECKED: "checked",
-    Status.TESTED: "tested",
-    Status.MONITORED: "observed",
-    Status.REVIEWED: "reviewed",
-    Status.JUSTIFIED: "supposed",
-    Status.LINKED: "argued",
-}
-"""A status in the words of a page; any other is `open` there."""
-LETTERS = {"proved": "P", "checked": "C", "tested": "T", "observed": "O", "reviewed": "R", "supposed": "S"}
+LETTERS = {"proved": "P", "checked": "C", "tested": "T", "monitored": "M", "reviewed": "R", "justified": "J"}
 EXHAUSTIVE = frozenset({Status.PROVED, Status.CHECKED})
 EVIDENCE = frozenset({*EXHAUSTIVE, Status.TESTED, Status.MONITORED, Status.REVIEWED})
 """What tools and readers found; a plan's reason is none."""
@@ -45,11 +35,11 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Relied:
-    """The record relied upon, what it counts as, and its suppositions (hypotheses that are no claims of the case)."""
+    """The record relied upon, what it counts as, and its assumptions (hypotheses that are no claims of the case)."""
 
     record: Evidence
     status: Status
-    suppositions: tuple[str, ...]
+    assumptions: tuple[str, ...]
     scenario: frozenset[str] = frozenset()
     """Those of them that are limits of the plan's scenario."""
 
@@ -85,17 +75,6 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
     return min(ways, key=lambda way: way[0], default=(None, None))[1]
 
 
-def word(status: Status) -> str:
-    return WORDS.get(status, "open")
-
-
-def stands(view: ObligationView) -> str:
-    """How a claim stands, in the words of a page."""
-    if view.standing.supports:
-        return word(view.standing)
-    return "refuted" if view.status in (Status.REFUTED, Status.CONTRADICTORY) else "open"
-
-
 def shade(view: ObligationView) -> Tone:
     """A claim's colour: green is for proofs and exhaustive checks."""
     good = Tone.GREEN if view.standing in EXHAUSTIVE else Tone.AMBER
@@ -127,7 +106,7 @@ def linked(views: Iterable[ObligationView]) -> str:
     for view in views:
         o = view.obligation
         if o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED:
-            return f"program agrees: {view.standing.word}"
+            return f"program agrees: {view.standing.value}"
     return ""
 
 
@@ -184,13 +163,20 @@ def seen(relied: Relied) -> str:
     """What was seen, with its bound: ``47 runs, 0 failed (95 % confidence: at most 6.2 % fail)``."""
     bound = relied.record.bound
     match relied.status:
+        case Status.PROVED if relied.record.hypotheses:
+            return "proved under added hypotheses"
+        case Status.PROVED if relied.record.method == "compose":
+            return "proved from the nodes' contracts and what is assumed"
         case Status.PROVED:
-            return "proved for all inputs"
+            return "proved for all inputs that the contract allows"
         case Status.CHECKED:
             return "every case of a bounded model was looked at"
         case Status.TESTED if isinstance(bound.get("runs"), int):
             failures = bound.get("failures", 0)
-            return f"{count(bound['runs'], 'run')}, {failures} failed{_at_most(relied.record)}"
+            runs, triggered = count(bound["runs"], "run"), bound.get("triggered", bound["runs"])
+            of = runs if triggered == bound["runs"] else f"{count(triggered, 'triggered run')} of {bound['runs']}"
+            worst = f"; the worst stratum: {bound['worst stratum']}" if "worst stratum" in bound else ""
+            return f"{of}, {failures} failed{worst}{_at_most(relied.record)}"
         case Status.TESTED if isinstance(bound.get("cases"), int):
             cases, triggered = bound["cases"], bound.get("triggered")
             if isinstance(triggered, int):
@@ -206,7 +192,7 @@ def seen(relied: Relied) -> str:
         case Status.REVIEWED:
             return "read by a person who accepts it" + (" on conditions" if relied.record.hypotheses else "")
         case _:  # no status of the others bounds how often it fails
-            return f"{word(relied.status)}, without a bound on failures"
+            return f"{relied.status}, without a bound on failures"
 
 
 def _at_most(record: Evidence) -> str:

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from avow.assurance.answers import How, Supposition, WeakestEvidence
+from avow.assurance.answers import Assumption, Level, Tone, WeakestEvidence
 from avow.assurance.closure import Closed
 from avow.assurance.first_screen import tone_of, weakest_of
 from avow.assurance.model import ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
-from avow.assurance.relied import EVIDENCE, Relied
+from avow.assurance.rates import RateView, rate_of
+from avow.assurance.relied import Relied, looked_at
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
 from avow.base.plain import count, listed
+from avow.base.verdict import Object
 from avow.evidence.claims import Standing
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -43,9 +45,11 @@ def requirement_view(
         obligations=tuple(names.own.get(requirement.id, ())),
         answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
         span=requirement.span,
-        confirmed=requirement.confirmed,
-        suspect=requirement.suspect,
+        validation=requirement.validation,
+        validated=requirement.validated,
+        outdated=requirement.outdated,
         linked=requirement.linked,
+        source=requirement.source,
     )
 
 
@@ -54,29 +58,57 @@ def held(
     closed: Closed,
     views: Mapping[str, ObligationView],
     relied: Mapping[str, Relied],
-    supposed: Sequence[Supposition],
+    supposed: Sequence[Assumption],
     titles: Mapping[str, str],
 ) -> RequirementView:
     """A requirement with how it holds, its colour, weakest evidence and what it supposes; `titles` are the nodes'."""
     mine = [s for s in supposed if view.id in s.needed_by]
-    how = How.DERIVED
-    if not view.status.supports or closed.failing or view.unknown_names or any(s.expired for s in mine):
-        how = How.OPEN
-    elif not view.formal:
-        how = How.ARGUED
-    elif any(views[name].status is not Status.PROVED for name in view.obligations):
-        how = How.BOUNDED
-    under = [relied[name] for name in closed.claims if name in relied and relied[name].status in EVIDENCE]
+    expired = any(s.expired for s in mine)
+    fails = not view.status.supports or closed.failing or view.unknown_names or expired
+    level = Level.NOT_SHOWN if fails or not view.validated else _level(view, closed, views, relied)
+    if view.status in (Status.REFUTED, Status.CONTRADICTORY):
+        level = Level.REFUTED
+    bounded = any(views[name].status is not Status.PROVED for name in view.obligations)
+    rate = rate_of(closed.claims, views)
+    awaits = level is Level.NOT_SHOWN and not fails
     return replace(
         view,
-        how=how,
-        tone=tone_of(how, under, mine),
+        level=level,
+        bounded=bounded,
+        expired=expired,
+        tone=Tone.AMBER if awaits else tone_of(level, mine, bounded=bounded),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=(_failing_of(closed, views, titles) if how is How.OPEN else None)
+        weakest_evidence=(_failing_of(closed, views, titles) if fails else None)
         or weakest_of(closed.claims, views, relied, titles),
         supposes=tuple(s.key for s in mine),
+        rate=rate,
+        answer=_with_level(view, level, rate, awaits=awaits),
     )
+
+
+def _with_level(view: RequirementView, level: Level, rate: RateView | None, *, awaits: bool) -> str:
+    if not view.status.supports:
+        return view.answer
+    parts = [f"{level.capitalize()}.", "Nobody has validated its sentence." if awaits else "", view.answer]
+    parts.append(f"F{rate.words[1:]}." if rate else "")
+    return " ".join(part for part in parts if part)
+
+
+def _level(
+    view: RequirementView, closed: Closed, views: Mapping[str, ObligationView], relied: Mapping[str, Relied]
+) -> Level:
+    """The least that lies below a requirement that holds. What a person answers for in the composition is among the
+    assumptions; agreement of a program with its model is said of the model."""
+    below = [(views[name].obligation.kind, relied[name]) for name in closed.claims if name in relied]
+    leaves = [found for kind, found in below if kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
+    statuses = {found.status for found in leaves}
+    if not view.formal or statuses & {Status.REVIEWED, Status.JUSTIFIED}:
+        return Level.ARGUED
+    if statuses & {Status.TESTED, Status.MONITORED}:
+        return Level.TESTS
+    guarantees = [found for kind, found in below if kind is Kind.GUARANTEE]
+    return Level.MODELS if any(looked_at(found) is Object.MODEL for found in guarantees) else Level.SHOWN
 
 
 def _failing_of(
@@ -93,7 +125,7 @@ def _failing_of(
 
 
 def _word(status: Status | None) -> str:
-    return status.word if status else "not shown"
+    return status.value if status else "not shown"
 
 
 def _answer(
@@ -105,17 +137,16 @@ def _answer(
 ) -> str:
     if unknown:
         return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
-    if requirement.suspect and requirement.confirmed:
-        said = f"{requirement.confirmed.who} confirmed it on {requirement.confirmed.on}"
-        return f"Suspect: the sentence, or what supports it, was changed since {said}; nobody has confirmed it anew."
+    if requirement.outdated and requirement.validation:
+        said = f"{requirement.validation.who} validated it on {requirement.validation.date}"
+        return f"Not validated: the sentence, the formula or what supports it was changed since {said}."
     if standing.circle:
         return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
     if standing.status.supports:
         name, status = standing.weakest
-        how = standing.status.word.capitalize()
         hypotheses = len(standing.hypotheses)
-        rest = f", on {count(hypotheses, 'hypothesis', 'hypotheses')}" if hypotheses else ""
-        return f"{how}{rest}; the weakest claim under it is {short(name)}, {status.word}."
+        rest = f"; it rests on {count(hypotheses, 'hypothesis', 'hypotheses')}" if hypotheses else ""
+        return f"The weakest claim under it is {short(name)}, {status.value}{rest}."
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"

@@ -15,7 +15,7 @@ from avow.base.codec import Unreadable, from_json, to_json
 from avow.base.files import digest_file, read_regular, write
 from avow.evidence.envelope import Opened, seal, unseal
 
-PREDICATE = "https://avow.invalid/signed-case/v1"
+PREDICATE = "https://avow.invalid/signed-case/v2"
 KEYS = "keys"
 """In ``signed/``: public keys (``*.pub``). Where there are any, only what one of them signed is a baseline."""
 
@@ -35,6 +35,7 @@ def sign_case(
         "until": until.isoformat(),
         "system": case.system,
         "says": case.answers.statement,
+        "assumes": [f"{s.number} ({s.sort}): {s.words}" for s in case.assumptions],
         "baseline": to_json(told),
     }
     statement: dict[str, Any] = {

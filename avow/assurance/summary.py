@@ -23,6 +23,7 @@ _WORST_FIRST = (
     Status.NOT_RUN,
     Status.STALE,
     Status.MISSING,
+    Status.UNWRITTEN,
 )
 
 
@@ -50,7 +51,7 @@ def open_items(
     items += [item for view in views if view.status.supports for item in _given_up(view)]
     for d in derivations:
         if not d.status.supports and not d.below:
-            text = f"the derivation is {d.status.word}: a premise or a side condition stands for nothing"
+            text = f"the derivation is {d.status.value}: a premise or a side condition stands for nothing"
             items.append(OpenItem(d.status.value, derivation_claim(d.derivation.name), text))
     for r in requirements:
         if not r.status.supports and not r.below:
@@ -106,7 +107,7 @@ def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
                     told.setdefault((record.method, record.summary), []).append(view)
     for (method, summary), failed in told.items():
         first, *others = failed
-        stands = f"{short(first.id)} is {first.status.word} by other evidence alone"
+        stands = f"{short(first.id)} is {first.status.value} by other evidence alone"
         same = f"; the same for {listed([short(view.id) for view in others], 12)}" if others else ""
         title = f"{method} gives no answer: {first.obligation.claim}"
         yield OpenItem(Status.ERROR.value, first.id, f"{method}: {summary} ({stands}{same})", title=title)
@@ -151,6 +152,8 @@ def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
 
 def _summary(view: ObligationView) -> str:
     """The most telling evidence in a line: a refutation's counterexample, else the last attempt's summary."""
+    if view.obligation.unwritten:
+        return "nothing: it is a draft's placeholder"
     refuting = [r for r in view.records if weigh(r).refuted]
     if refuting:
         record = refuting[-1]

@@ -68,8 +68,8 @@ class Names:
     def discharging(self, hypothesis: Hypothesis) -> str | None:
         """The claim that says what a hypothesis says; None where none does. A claim of the same name that says
         something else is not it; of several that say it, the one of that name is meant."""
-        if hypothesis.kind is HypothesisKind.SUPPOSITION:
-            return supposition_claim(hypothesis)
+        if hypothesis.kind is HypothesisKind.ASSUMPTION:
+            return assumption_claim(hypothesis)
         saying = self.saying.get((hypothesis.digest, *hypothesis.name.split("/")[:2]), [])
         named = [o for o in saying if o.local_id == hypothesis.name]
         return next((o.id for o in (*named, *saying)), None)
@@ -98,20 +98,20 @@ def _belongs(obligation: str, requirement: str) -> bool:
     return obligation == requirement or (rest != obligation and not (rest[0].isalnum() or rest[0] == "_"))
 
 
-def supposition_claim(hypothesis: Hypothesis) -> str:
+def assumption_claim(hypothesis: Hypothesis) -> str:
     """One for each thing supposed, whatever rests on it."""
-    return f"supposition:{hypothesis.name}:{hypothesis.digest[:12]}"
+    return f"assumption:{hypothesis.name}:{hypothesis.digest[:12]}"
 
 
-def supposition_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
-    """What a person has to accept: justified where somebody has (``accepted: {obligation: agent/supposition/…, verdict:
+def assumption_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
+    """What a person has to accept: justified where somebody has (``accepted: {obligation: agent/assumption/…, verdict:
     missing, …}``) and still does, else missing."""
     taken = [f for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
-    found = {h: None for h in hypotheses if h.kind is HypothesisKind.SUPPOSITION}
+    found = {h: None for h in hypotheses if h.kind is HypothesisKind.ASSUMPTION}
     for hypothesis in found:
         given = any(takes(f.pattern, f.matched, hypothesis.name) for f in taken)
         status = Status.JUSTIFIED if given else Status.MISSING
-        yield Claim(supposition_claim(hypothesis), status, link=Link.GUIDED if given else None)
+        yield Claim(assumption_claim(hypothesis), status, link=Link.GUIDED if given else None)
 
 
 def obligation_claim(
@@ -171,7 +171,7 @@ def requirement_claim_of(requirement: Requirement, names: Names, statuses: Mappi
     rests, unknown = requirement_support(requirement, names)
     formal = bool(requirement.formula or requirement.temporal)
     own = weakest(statuses[name] for name in names.own.get(requirement.id, ()))
-    if (formal and own is None) or unknown or not rests or requirement.suspect:
+    if (formal and own is None) or unknown or not rests or requirement.outdated:
         own = weakest((Status.MISSING, *([own] if own else ())))
     return Claim(requirement_claim(requirement.id), own, rests, prose=not formal)
 

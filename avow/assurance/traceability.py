@@ -1,4 +1,7 @@
-"""Traceability: requirement ↔ derived property ↔ guarantee ↔ obligation ↔ evidence, with orphans both ways."""
+"""Traceability: source ↔ hazard ↔ requirement ↔ derived property ↔ guarantee ↔ obligation ↔ evidence ↔ tool output.
+
+Orphans are listed in both directions.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,16 @@ from collections.abc import Iterable
 from dataclasses import astuple, replace
 
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.naming import derivation_claim, requirement_claim, rerun, short
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
 from avow.evidence.status import weigh
 
 COLUMNS = (
+    "source",
+    "hazards",
     "requirement",
+    "requirement status",
     "derived property",
     "guarantee",
     "obligation",
@@ -24,6 +30,9 @@ COLUMNS = (
     "link",
     "tool",
     "evidence",
+    "tool output",
+    "SHA-256",
+    "re-run",
     "remark",
 )
 
@@ -32,7 +41,10 @@ COLUMNS = (
 class Row:
     """One path from a requirement to a piece of evidence; an orphan has gaps, and a remark that says so."""
 
+    source: str = ""
+    hazards: str = ""
     requirement: str = ""
+    level: str = ""
     derivation: str = ""
     guarantee: str = ""
     obligation: str = ""
@@ -42,6 +54,9 @@ class Row:
     link: str = ""
     tool: str = ""
     evidence: str = ""
+    output: str = ""
+    digest: str = ""
+    rerun: str = ""
     remark: str = ""
 
 
@@ -70,19 +85,20 @@ def trace(case: Case) -> tuple[Row, ...]:
             elif claim in requirements:
                 stack += [(below, through) for below in reversed(requirements[claim].rests_on)]
             elif claim in views:
-                rows += _rows(views[claim], requirement.id, through)
+                rows += _rows(views[claim], through)
                 # a guarantee is worth what its node's contract is worth: what shows that is part of the trace
                 stack += [(below, through) for below in reversed(views[claim].rests_on)]
             else:
-                rows.append(Row(requirement.id, through, obligation=claim, remark="orphan: no such claim"))
+                rows.append(Row(derivation=through, obligation=claim, remark="orphan: no such claim"))
         if len(rows) == before:
-            rows.append(Row(requirement.id, remark="orphan: nothing supports this requirement"))
-        rows += [
-            Row(requirement.id, remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names
-        ]
+            rows.append(Row(remark="orphan: nothing supports this requirement"))
+        rows += [Row(remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names]
+        hazards = ", ".join(v.hazard.id for v in case.hazards if requirement.id in v.hazard.mitigated_by)
+        named = {"source": requirement.source, "hazards": hazards, "requirement": requirement.id}
+        rows[before:] = [replace(row, level=requirement.level, **named) for row in rows[before:]]
     for view in case.guarantees:
         if view.id not in reached:
-            rows += _rows(view, "", "", "orphan: serves no requirement")
+            rows += _rows(view, "", "orphan: serves no requirement")
     rows += [
         Row(derivation=d.derivation.name, status=d.status.value, remark="orphan: serves no requirement")
         for claim, d in derivations.items()
@@ -101,10 +117,10 @@ def trace(case: Case) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _rows(view: ObligationView, requirement: str, derivation: str, remark: str = "") -> Iterable[Row]:
+def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[Row]:
     o = view.obligation
     guarantee = short(o.id) if o.kind is Kind.GUARANTEE else ""
-    start = Row(requirement, derivation, guarantee, o.id, view.standing.value, remark=remark)
+    start = Row(derivation=derivation, guarantee=guarantee, obligation=o.id, status=view.standing.value, remark=remark)
     if not view.counting:
         missing = "orphan: no evidence"
         yield replace(start, remark=f"{remark}; {missing}" if remark else missing)
@@ -117,6 +133,9 @@ def _rows(view: ObligationView, requirement: str, derivation: str, remark: str =
             link=record.link.value,
             tool=record.tool_told,
             evidence=item.entry.hash[:12],
+            output="; ".join(sorted(record.outputs)),
+            digest="; ".join(digest for _, digest in sorted(record.outputs.items())),
+            rerun=rerun(o, record.method),
         )
 
 

@@ -13,7 +13,7 @@ import inspect
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
@@ -26,7 +26,7 @@ from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import RETRY
 from avow.formulas.values import Value
 from avow.isolation.level import Unavailable
-from avow.isolation.observed import Observed, Seen, as_here
+from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Driving, Method, Source, System
 
@@ -38,6 +38,7 @@ __all__ = [
     "JudgedRun",
     "Limits",
     "NoModel",
+    "OutsideCheck",
     "Report",
     "Tool",
     "Translated",
@@ -129,8 +130,8 @@ class Report:
     logs: Mapping[str, str] = field(default_factory=dict)
     """Name → text of logs and results to be kept beside the artifacts."""
     observed: tuple[Observed, ...] = ()
-    """What the subject was seen to look at; the core keys the answer by it. With something `Seen.OUTSIDE` in it no good
-    verdict counts."""
+    """What the program under test was seen to look at; the core keys the answer by it. With something `Seen.OUTSIDE` in
+    it the answer is re-run in every run."""
     isolation: Isolation = Isolation.NONE
     """How far the subject was kept from whoever judged it."""
 
@@ -147,8 +148,23 @@ class Report:
 
     @classmethod
     def unsealed(cls, job: Job, why: Unavailable, tool: str, tool_version: str) -> Report:
-        """Where a sandbox is required, and there is none: asked again as soon as there is, or as none is required."""
-        return replace(cls.alike(job, Verdict.NOT_RUN, str(why), tool, tool_version), observed=(as_here(Seen.SANDBOX),))
+        """Where a sandbox is required, and there is none: the next run asks again."""
+        return cls.unanswered(job, Verdict.NOT_RUN, str(why), tool, tool_version)
+
+
+@dataclass(frozen=True, slots=True)
+class OutsideCheck:
+    """How a person checks a file without Avow."""
+
+    file: Path
+    """The file that holds the claim; absolute."""
+    command: tuple[str | Path, ...]
+    """Words for the shell, run in the workspace's folder; a path is shown relative to it. The same for all guarantees
+    that one run decides."""
+    guarantees: tuple[str, ...]
+    """The guarantees that hold only if this check passes."""
+    prints: str = ""
+    """A line that the command prints exactly if the check passes. Empty: then it exits with code 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +218,7 @@ _MADE_WHOLE: Mapping[str, tuple[Callable[[Any], Any], type]] = {
     "tools": (tuple, Tool),
     "check": (tuple, Diagnostic),
     "files": (tuple, Path),
+    "outside_checks": (tuple, OutsideCheck),
     "export": (dict, str),
 }
 """Methods whose answer is gone through at once, so that what a generator raises is theirs, too; and what it has."""
@@ -242,7 +259,7 @@ def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
 class Backend(ABC):
     """A verification method. What has no value here, a backend must say; the rest may stay as it is.
 
-    See `docs/adding-a-backend.md`; `avow.conformance` holds a backend to all of this.
+    See `docs/developers/adding-a-backend.md`; `avow.conformance` holds a backend to all of this.
     """
 
     def __init_subclass__(cls, **more: Any) -> None:
@@ -340,6 +357,11 @@ class Backend(ABC):
         """Relative path → text of every generated file. Pure: same job, same bytes; no clock, no tool. Raises Rejected
         with what `check` says, or leaves out what cannot be said."""
         return {}
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        """How a person checks the exported files without Avow; the node's `index.md` lists them. `folder` holds the
+        files that `export` gave these names. None for a guarantee that Avow itself judges."""
+        return ()
 
     @abstractmethod
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:

@@ -120,6 +120,6 @@ def _plugin(module: str) -> Backend:
 def _promise(found: object, where: str) -> Backend:
     why = lacks(found)
     if why or not isinstance(found, Backend):
-        hint = "docs/adding-a-backend.md has an example"
+        hint = "docs/developers/adding-a-backend.md has an example"
         raise Rejected(Diagnostic("BACKEND003", f"{where} does not keep a backend's promise: {why}", hint=hint))
     return found

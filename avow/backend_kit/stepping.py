@@ -20,28 +20,12 @@ from avow.formulas.formula import equation, free_variables, substitute
 from avow.formulas.temporal.cell import Cell, Unsaid
 from avow.formulas.temporal.cells import Records, written
 from avow.formulas.traversal import transform
+from avow.language import terms as t
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definedness import with_value
 from avow.language.load import NOTHING, parse_formula
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, Sort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    Apply,
-    Arithmetic,
-    Builtin,
-    Compare,
-    EnumValue,
-    Iff,
-    Implies,
-    Literal,
-    Not,
-    Operation,
-    Role,
-    Term,
-    Variable,
-)
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 
@@ -52,15 +36,15 @@ class Held:
 
     name: str
     sort: Sort
-    initial: Term
+    initial: t.Term
 
     @property
-    def before(self) -> Variable:
-        return Variable(Role.INPUT, self.name, self.sort)
+    def before(self) -> t.Variable:
+        return t.Variable(t.Role.INPUT, self.name, self.sort)
 
     @property
-    def after(self) -> Variable:
-        return Variable(Role.OUTPUT, self.name, self.sort)
+    def after(self) -> t.Variable:
+        return t.Variable(t.Role.OUTPUT, self.name, self.sort)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +52,7 @@ class Invariant:
     """What holds before every step, over cells and what the program holds."""
 
     text: str
-    formula: Term
+    formula: t.Term
     span: Span | None = None
     guessed: bool = False
 
@@ -85,16 +69,16 @@ class Stepping:
     held: tuple[Held, ...]
     invariants: tuple[Invariant, ...]
 
-    def first(self, formula: Term) -> Term:
+    def first(self, formula: t.Term) -> t.Term:
         """A formula over cells and what is held, before the first step."""
         values = {h.before: h.initial for h in self.held}
         return self._at(formula, values, {c: c.initial for c in self.cells if c.initial is not None})
 
-    def after(self, formula: Term) -> Term:
+    def after(self, formula: t.Term) -> t.Term:
         """The same after this step, over the node's ports."""
         return self._at(formula, {h.before: h.after for h in self.held}, {c: c.now for c in self.cells})
 
-    def _at(self, formula: Term, held: Mapping[Variable, Term], cells: Mapping[Cell, Term]) -> Term:
+    def _at(self, formula: t.Term, held: Mapping[t.Variable, t.Term], cells: Mapping[Cell, t.Term]) -> t.Term:
         """The formula with other terms for what is held and what the cells have, all at once."""
         functions = {c: replace(c.before, name=f"{c.name}'") for c in cells if c.parameters}
         plain = {c.before: term for c, term in cells.items() if not c.parameters}
@@ -135,11 +119,11 @@ def stepping(
             raise Rejected(Diagnostic("BACKEND007", message, node.span))
     invariants = tuple(_stated(text, span, contract, node, held, records) for text, span in stated)
     ports = [Port(v.role, v.name, v.sort, "", None) for h in held for v in (h.before, h.after)]
-    cells = [Port(Role.INPUT, c.name, c.sort, "", None) for c in records.cells]
+    cells = [Port(t.Role.INPUT, c.name, c.sort, "", None) for c in records.cells]
     larger = replace(
         node,
-        inputs=(*node.inputs, *(p for p in ports if p.role is Role.INPUT), *cells),
-        outputs=(*node.outputs, *(p for p in ports if p.role is Role.OUTPUT)),
+        inputs=(*node.inputs, *(p for p in ports if p.role is t.Role.INPUT), *cells),
+        outputs=(*node.outputs, *(p for p in ports if p.role is t.Role.OUTPUT)),
         assumptions=assumptions,
         guarantees=guarantees,
     )
@@ -153,7 +137,7 @@ def _stated(text: str, span: Span, contract: Contract, node: Node, held: Sequenc
         formula = records.term(formula)
     except Unsaid as unsaid:
         raise Rejected(Diagnostic("BACKEND007", f"the invariant speaks of {unsaid.reason}", span)) from unsaid
-    formula = substitute(formula, {Variable(Role.BOUND, h.name, h.sort): h.before for h in held})
+    formula = substitute(formula, {t.Variable(t.Role.BOUND, h.name, h.sort): h.before for h in held})
     known = {*(h.before for h in held), *(c.before for c in records.cells)}
     foreign = sorted(free_variables(formula) - known, key=lambda v: v.qualified)
     if foreign:
@@ -163,11 +147,11 @@ def _stated(text: str, span: Span, contract: Contract, node: Node, held: Sequenc
     return Invariant(text, formula, span)
 
 
-def _applied(term: Term, functions: Mapping[Variable, tuple[tuple[Variable, ...], Term]]) -> Term:
+def _applied(term: t.Term, functions: Mapping[t.Variable, tuple[tuple[t.Variable, ...], t.Term]]) -> t.Term:
     """The term with functions that are given by terms applied."""
 
-    def applied(part: Term) -> Term:
-        if isinstance(part, Apply) and isinstance(part.function, Variable) and part.function in functions:
+    def applied(part: t.Term) -> t.Term:
+        if isinstance(part, t.Apply) and isinstance(part.function, t.Variable) and part.function in functions:
             parameters, body = functions[part.function]
             return substitute(body, dict(zip(parameters, part.arguments, strict=True)))
         return part
@@ -185,18 +169,18 @@ def guesses(steps: Stepping) -> Iterator[tuple[Invariant, ...]]:
         yield tuple(Invariant("", formula, None, True) for formula in forms)
 
 
-def _families(steps: Stepping) -> Iterator[tuple[Term, ...]]:
-    first = next((c for c in steps.cells if c.initial == TRUE and c.now == FALSE), None)
+def _families(steps: Stepping) -> Iterator[tuple[t.Term, ...]]:
+    first = next((c for c in steps.cells if c.initial == t.TRUE and c.now == t.FALSE), None)
     if first is not None:
-        yield from ((Implies(first.before, c.begins()),) for c in steps.cells if c.initial is not None and c != first)
-        yield from ((Implies(first.before, equation(h.before, h.initial)),) for h in steps.held)
+        yield from ((t.Implies(first.before, c.begins()),) for c in steps.cells if c.initial is not None and c != first)
+        yield from ((t.Implies(first.before, equation(h.before, h.initial)),) for h in steps.held)
     cells = [c for c in steps.cells if not c.parameters]
     numbers = [c for c in cells if c.sort in _NUMBERS]
     for cell in (c for c in numbers if c.sort == INTEGER):
-        yield (Compare("<=", _number(-1), cell.before),)
-        yield tuple(Compare("<=", cell.before, _number(n)) for n in sorted(_limits(cell)))
+        yield (t.Compare("<=", _number(-1), cell.before),)
+        yield tuple(t.Compare("<=", cell.before, _number(n)) for n in sorted(_limits(cell)))
     for each in (h for h in steps.held if h.sort in _NUMBERS):
-        yield from ((Compare(sign, each.before, each.initial),) for sign in (">=", "<="))
+        yield from ((t.Compare(sign, each.before, each.initial),) for sign in (">=", "<="))
         yield from (tuple(_counters(each.before, cell)) for cell in numbers)
     for k, a in enumerate(cells):
         yield from ((equation(a.before, b.before),) for b in cells[:k] if a.sort == b.sort)
@@ -211,25 +195,25 @@ def _families(steps: Stepping) -> Iterator[tuple[Term, ...]]:
             yield from _agreeing(condition, (other for _, other in plain[:k] if other is not None))
 
 
-def _agreeing(one: Term, others: Iterable[Term]) -> Iterator[tuple[Term, ...]]:
+def _agreeing(one: t.Term, others: Iterable[t.Term]) -> Iterator[tuple[t.Term, ...]]:
     """That two conditions are one, or that one follows from the other, or its opposite does."""
     for other in others:
-        yield Iff(one, other), Implies(other, one), Implies(other, Not(one))
-        yield Iff(one, Not(other)), Implies(one, other), Implies(Not(one), other)
+        yield t.Iff(one, other), t.Implies(other, one), t.Implies(other, t.Not(one))
+        yield t.Iff(one, t.Not(other)), t.Implies(one, other), t.Implies(t.Not(one), other)
 
 
-def _counters(counter: Variable, cell: Cell) -> Iterator[Term]:
+def _counters(counter: t.Variable, cell: Cell) -> Iterator[t.Term]:
     """A counter of the program and a number that the contract remembers, which starts at 0 or (an age) at -1."""
     ages = cell.sort == INTEGER
-    value: Term = Arithmetic("+", cell.before, _number(1), INTEGER) if ages else cell.before
+    value: t.Term = t.Arithmetic("+", cell.before, _number(1), INTEGER) if ages else cell.before
     if (counter.sort == REAL) != (cell.sort == REAL):
         return
-    yield Compare("==", counter, value)
-    yield Compare("==", counter, cell.before)
+    yield t.Compare("==", counter, value)
+    yield t.Compare("==", counter, cell.before)
     if counter.sort != REAL:
         bounds = sorted({n + d for n in _limits(cell) for d in (0, 1, 2)} | set(range(1, COUNTS_GUESSED)), reverse=True)
-        yield from (Compare("==", counter, _least(value, most)) for most in bounds)
-        yield from (Compare("==", _least(counter, most), _least(value, most)) for most in bounds)
+        yield from (t.Compare("==", counter, _least(value, most)) for most in bounds)
+        yield from (t.Compare("==", _least(counter, most), _least(value, most)) for most in bounds)
 
 
 def _limits(cell: Cell) -> tuple[int, ...]:
@@ -238,21 +222,21 @@ def _limits(cell: Cell) -> tuple[int, ...]:
     return tuple(dict.fromkeys(number for number in numbers if number is not None and number > 0))
 
 
-def _conditions(variable: Variable) -> Iterator[Term]:
+def _conditions(variable: t.Variable) -> Iterator[t.Term]:
     match variable.sort:
         case EnumSort(members=members):
-            yield from (Compare("==", variable, EnumValue(m, variable.sort)) for m in members)
+            yield from (t.Compare("==", variable, t.EnumValue(m, variable.sort)) for m in members)
         case sort if sort == BOOL:
             yield variable
         case sort if sort in (NATURAL, INTEGER):
-            yield from (Compare(">=", variable, _number(n)) for n in range(0 if sort == INTEGER else 1, 3))
+            yield from (t.Compare(">=", variable, _number(n)) for n in range(0 if sort == INTEGER else 1, 3))
         case _:  # no condition is read off its values
             pass
 
 
-def _least(term: Term, most: int) -> Term:
-    return Operation(Builtin.MIN, (term, _number(most)), term.sort)
+def _least(term: t.Term, most: int) -> t.Term:
+    return t.Operation(t.Builtin.MIN, (term, _number(most)), term.sort)
 
 
-def _number(value: int) -> Term:
-    return Literal(value, INTEGER if value < 0 else NATURAL)
+def _number(value: int) -> t.Term:
+    return t.Literal(value, INTEGER if value < 0 else NATURAL)

@@ -78,15 +78,19 @@ def _node(inputs: str = "", outputs: str = "b : BOOL", topics: str = "", clauses
 _FILE = (
     Code("RCL001", "no contract", "The file holds neither a context nor a node.", "// nothing yet"),
     Code("RCL002", "unreadable file", "The file does not exist, is a folder, or may not be read."),
-    Code("RCL003", "file too large", "A file of more than 4 MB, or a million words and signs, is no contract."),
+    Code("RCL003", "file too large", "Contracts have at most 4 MB and a million words and signs."),
     Code("RCL004", "not UTF-8", "Contracts are UTF-8; the place is the first byte that cannot be read."),
     Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
-    Code("RCL006", "too many errors", "Of one file, 200 diagnostics are shown, and then reading ends.", "`1`a" * 210),
+    Code(
+        "RCL006",
+        "too many errors",
+        "Avow shows at most 200 diagnostics of a file.",
+        "".join(f"`{n}`" for n in range(210)),
+    ),
     Code(
         "RCL007",
         "layout would change the contract",
-        "`avow fmt` reads once more what it is about to write; this part would not be the same, so the file stays as "
-        "it is. That is a defect of Avow: tell its authors; a comment inside a part keeps its own layout.",
+        "`avow fmt` would change the meaning of this part and leaves the file as it is. Please report this defect.",
     ),
 )
 
@@ -94,7 +98,7 @@ _SYNTAX = (
     Code(
         "RCL101",
         "a sign of another notation",
-        "The sign is not RCL; the hint says what is. Reading goes on as if that stood there.",
+        "The sign is not RCL; the hint says what to write.",
         "guarantee(in.level > 0 && out.status == low)",
     ),
     Code(
@@ -113,8 +117,7 @@ _SYNTAX = (
     Code(
         "RCL105",
         "no number",
-        "Numbers are whole (`12`) or decimal (`0.25`), without exponent, and of 500 digits at most; names begin with a "
-        "letter.",
+        "Numbers are whole (`12`) or decimal (`0.25`), without exponent; names begin with a letter.",
         "guarantee(in.level < 1e6)",
     ),
     Code(
@@ -123,23 +126,22 @@ _SYNTAX = (
         'In a string, a backslash is followed by `\\`, `"`, `n` or `t`.',
         'guarantee low "C:\\data" (out.status == low)',
     ),
-    Code("RCL107", "stray characters", "These characters have no place in RCL.", "guarantee(out.status == low §)"),
+    Code("RCL107", "stray characters", "RCL has no such characters.", "guarantee(out.status == low §)"),
     Code(
         "RCL110",
         "nested too deeply",
-        "Formulas and types are nested 150 levels deep at most, and no constant or type has more than 20,000 parts "
-        "when all that it names is written out. Chains (`a and b and …`, `1 + 2 + …`) are not nested, however long.",
+        "Formulas and types nest at most 150 levels deep; a constant or type has at most 20,000 parts, a "
+        "clause 200,000. Chains (`a and b and …`) are not nested.",
         "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
     ),
     Code(
         "RCL111",
         "not a clause",
-        "A file is one `context { … }` and any number of `node NAME { … }`. (`types { … }` and `constants { … }` of "
-        "older files are both `context`.)",
+        "A file is one `context { … }` and any number of `node NAME { … }`.",
         "types { A : {a}; }",
     ),
     Code("RCL112", "second context", "A file has one context at most.", "context { A : {a}; } context { B : {b}; }"),
-    Code("RCL113", "something else expected", "Something else has to stand here.", "node { }"),
+    Code("RCL113", "something else expected", "The message says what belongs here.", "node { }"),
     Code("RCL114", "empty context", "A context declares at least one type or constant.", "context { }"),
     Code("RCL115", "bracket not closed", "A `(` or `{` has no partner.", "guarantee( (out.status == low )"),
     Code(
@@ -182,7 +184,7 @@ _NAMES = (
     Code(
         "RCL202",
         "input or output?",
-        "A bare name is allowed where exactly one thing has it: an input or an output, an element or a constant.",
+        "A bare name must have one meaning.",
         _node("b : BOOL", clauses="guarantee(b)"),
     ),
     Code(
@@ -227,20 +229,19 @@ _NAMES = (
     Code(
         "RCL215",
         "clause name used twice",
-        "Within a node, every assumption and guarantee has its own name. A clause without one is called A1, "
-        "A2, …, or G1, G2, … by its position.",
+        "Each clause of a node has its own name; unnamed ones are called A1, A2, … and G1, G2, … by position.",
         _node(clauses="guarantee g (out.b) guarantee g (not out.b)"),
     ),
     Code(
         "RCL216",
         "topic listed twice",
-        "A node lists a topic once, or once for each variable that its messages carry; always with the same type.",
+        "A node lists a topic once, or once for each variable that it carries, always with the same type.",
         _node(topics="bool t, bool t"),
     ),
     Code(
         "RCL217",
         "no ROS type or name",
-        "A topic has a ROS built-in type, or one of a package, and a name as ROS takes it.",
+        "A topic has a built-in or package type of ROS, and a valid ROS name.",
         _node(topics="Bool t"),
     ),
     Code(
@@ -263,7 +264,7 @@ _SORTS = (
     Code(
         "RCL302",
         "different types",
-        "Only values of one type are compared, or collected in a set. INTEGER and NATURAL widen to REAL.",
+        "Only values of one type are compared or collected. INTEGER and NATURAL widen to REAL.",
         "guarantee(out.status == in.level)",
     ),
     Code("RCL303", "wrong type", "The place asks for another type.", "guarantee(in.marked(in.level))"),
@@ -279,7 +280,7 @@ _SORTS = (
         "The function or constructor takes another number.",
         "guarantee(out.command == go(1))",
     ),
-    Code("RCL306", "type cannot be told", "Nothing says of what type this is.", "guarantee(<> == <>)"),
+    Code("RCL306", "type cannot be told", "Nothing determines the type.", "guarantee(<> == <>)"),
     Code("RCL307", "no set", "`in` asks about a set or a sequence.", "guarantee(in.level in REAL)"),
     Code("RCL308", "no number", "Arithmetic and order are of numbers.", "guarantee(out.status < high)"),
     Code("RCL309", "division by zero", "The divisor is zero.", "guarantee(in.level / 0 > 1)"),
@@ -292,48 +293,47 @@ _SORTS = (
     Code(
         "RCL311",
         "divisor not written down",
-        "`mod` and `div` divide by a positive whole number that is written down, so that they always have a value.",
+        "`mod` and `div` divide by a positive whole number literal, so that they always have a value.",
         "guarantee(mod(in.count, in.count) == 0)",
     ),
     Code(
         "RCL312",
         "no such field",
-        "Only records have fields, `[x : REAL, y : REAL]`, and those that their type names.",
+        "Only records (`[x : REAL, y : REAL]`) have fields.",
         "guarantee(in.level.x > 1)",
     ),
     Code(
         "RCL320",
         "length of time without a unit",
-        "A limit says whether it counts steps or seconds: `[5 steps]`, `[200 ms]`; a REAL that is not written down is "
-        "in seconds. Units of time are ns, us, ms, s, min and h.",
+        "A limit counts steps or time: `[5 steps]`, `[200 ms]`; a REAL expression is in seconds. Units are "
+        "ns, us, ms, s, min and h.",
         "guarantee(held[5](in.level > 3) -> out.status == high)",
     ),
     Code(
         "RCL321",
         "response in another place",
-        "`next`, `within`, `for`, `until` and `eventually` speak of later steps. They stand as the whole right side of "
-        "a clause's outermost `->` (also under an outer `forall`), or are the clause.",
+        "`next`, `within`, `for`, `until` and `eventually` are the whole right side of a clause's outermost "
+        "`->`, or the whole clause.",
         "guarantee(next(out.status == high) and in.level > 3)",
     ),
     Code(
         "RCL322",
         "one step only",
-        "Here a formula is about one step: an operator that speaks of others has no meaning.",
+        "This formula is about one step; operators on other steps have no meaning in it.",
         "context { C = (once(1 > 0)); }",
     ),
     Code(
         "RCL323",
         "wrong limit",
-        "`held`, `within` and `for` have a limit; `once`, `historically` and `since` may have one, that of `since` "
-        "with `<=`, `<`, `>=` or `>`; the others have none.",
+        "`held`, `within` and `for` need a limit; `once`, `historically` and `since` may have one (`since` "
+        "with `<=`, `<`, `>=` or `>`).",
         "guarantee(held(in.level > 3) -> out.status == high)",
     ),
     Code(
         "RCL324",
         "events and the time between steps",
-        "`arrived(in.scan)` is of an input of the node; `rose`, `fell` and `changed` are of steps, and what has a "
-        "limit in seconds may change between them; `steps(every 20 ms)` and `steps(at most 100 ms)` are guarantees of "
-        "their own.",
+        "`arrived` takes an input; `rose`, `fell` and `changed` take no formula with a limit in seconds; "
+        "`steps( … )` is a clause of its own.",
         "guarantee(rose(once[2 s](in.level > 3)) -> out.status == high)",
     ),
 )
@@ -347,15 +347,14 @@ _LINTS = (
     _lint(
         "RCL401",
         "precedence without parentheses",
-        "`and` or `or` stands beside `->` or `<=>` without parentheses, and another bracketing would mean something "
-        "else. The note shows how it is read. Put the parentheses that you mean.",
+        "Another bracketing would mean something else. The hint shows how the formula is read; add parentheses.",
         "guarantee(in.level > 0 and in.count > 0 -> out.status == low)",
     ),
     _lint("RCL402", "unused input", "No assumption or guarantee speaks of the input.", "guarantee(out.status == low)"),
     _lint(
         "RCL403",
         "unconstrained output",
-        "No guarantee speaks of the output: the node may emit anything there.",
+        "The node may emit anything there.",
         "guarantee(out.status == low)",
     ),
     _lint(
@@ -405,9 +404,8 @@ _LINTS = (
     _lint(
         "RCL412",
         "total function looked up by value",
-        "Functions are total: every place has a number. A formula that asks which arguments have a value uses the "
-        "function as a numbering of some of them; that an argument has none, or that one value is had only once, it "
-        "cannot say. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
+        "Every argument of a function has a value, so the function cannot say that some have none or that a "
+        "value is unique. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
         _node(
             "number : REAL x REAL --> NATURAL, i : NATURAL",
             clauses="guarantee(out.b <=> exists(x, y in REAL | in.number(x, y) == in.i))",
@@ -416,9 +414,8 @@ _LINTS = (
     _lint(
         "RCL413",
         "sentence and formula compare otherwise",
-        "The sentence says `less than`, `at most`, `between` … and a number; the formula compares with that number the "
-        "other way, or has other numbers. Units are reckoned with (25 cm is 0.25), and so are conditions, which may be "
-        "turned round.",
+        "The formula compares with the sentence's number the other way, or has other numbers. Units (25 cm "
+        "is 0.25) and conditions are considered.",
         'assume reading "The level is less than or equal to 0" (0 <= in.level) guarantee(out.status == low)',
     ),
     _lint(
@@ -430,29 +427,27 @@ _LINTS = (
     _lint(
         "RCL415",
         "sentence names what the formula does not",
-        "The sentence has the name of an element, and the formula does not speak of it.",
+        "The formula does not mention an element that the sentence names.",
         'guarantee halt "At a high level it stops" (in.level > 3 -> out.status == high)',
     ),
     _lint(
         "RCL416",
         "assumption about an output",
-        "What a node assumes is about its inputs: of its own outputs it can only give guarantees. Whoever feeds the "
-        "node cannot see to it.",
+        "Assumptions are about inputs: no provider of inputs can establish what a node outputs.",
         "assume(out.status == low) guarantee(out.status != high)",
     ),
     _lint(
         "RCL417",
         "calculated position",
-        "A quantified position of a sequence is calculated with (`s(i + 1)`). What compares elements `s(i)`, `s(j)` of "
-        "quantified positions is decided; of elements at calculated positions solvers mostly say `unknown`. Where the "
-        "order matters and not the neighbour, take two positions.",
+        "Solvers rarely decide claims about elements such as `s(i + 1)`. Use two positions, `s(i)` and "
+        "`s(j)`, if only the order matters.",
         "node n { inputs(s : <REAL>) outputs(b : BOOL) topics() guarantee(b <=> forall(i in <1 upto length(s) - 1> | "
         "s(i - 1) <= s(i))) }",
     ),
     _lint(
         "RCL418",
         "unused definition",
-        "No clause and no other definition speaks of what is defined, or a definition does not speak of its parameter.",
+        "Nothing uses the definition, or the definition does not use its parameter.",
         "node n { inputs(b : BOOL) outputs(c : BOOL) topics() define d = not in.b; guarantee(out.c <=> in.b) }",
     ),
 )

@@ -14,8 +14,8 @@ PLAN_CODES = register(
     declare(
         "PLAN101",
         "not YAML",
-        "The file is not one plain YAML document, or too large, too deep, or empty.",
-        "Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
+        "The file is empty, too large, or no plain YAML document.",
+        "Write one YAML document without anchors, tags or merge keys.",
     ),
     declare(
         "PLAN102",
@@ -74,7 +74,7 @@ PLAN_CODES = register(
     declare(
         "PLAN112",
         "initial value",
-        "An initial value is no value of its output and no formula about it.",
+        "The initial value does not fit its output.",
         "Give a value of the output's type, or a formula about that output only.",
     ),
     declare(
@@ -87,28 +87,35 @@ PLAN_CODES = register(
     declare(
         "PLAN115",
         "plain words",
-        "What `says` says is for a reader who has never seen the contract: at most 14 words, no names from it.",
-        "Say it shorter, without names such as `agent.at`; `because` may hold all of the reason.",
+        "`says` is for readers who have never seen the contract: at most 14 words, no names from it.",
+        "Shorten it; `because` may hold the whole reason.",
     ),
     declare(
         "PLAN128",
         "no plain words yet",
-        "Something is supposed, and the plan has no words for a reader who has never seen the contract.",
-        "Add `says: …` (at most 14 words), and `who` and `until`.",
+        "An assumption has no words for a reader who has never seen the contract.",
+        "Add `says: …` (at most 14 words), `who` and `until`.",
         warning=True,
     ),
     declare(
         "PLAN129",
-        "suspect",
-        "A requirement's sentence, or what supports it, is another than the named person confirmed.",
-        "Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
+        "not validated",
+        "Nobody has compared the requirement's sentence with its current formula and support.",
+        "Compare them; if they agree, record it with `avow validate`.",
+        warning=True,
+    ),
+    declare(
+        "PLAN139",
+        "old name",
+        "A key of the plan has a new name. The old one is read for one more release.",
+        "Write the new name.",
         warning=True,
     ),
     declare(
         "PLAN130",
         "parameters",
         "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
-        "Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
+        "Write one YAML mapping; quote texts such as `off` and `1:30`.",
     ),
     declare(
         "PLAN121",
@@ -119,8 +126,8 @@ PLAN_CODES = register(
     declare(
         "PLAN122",
         "several providers",
-        "More than one output could feed an input, by name or by topic: none is left out without a word.",
-        "Say under `connections` which output it is, or give both ends their topics.",
+        "More than one output could feed an input, by name or by topic.",
+        "Choose one under `connections`, or give both ends their topics.",
     ),
     declare(
         "PLAN123",
@@ -132,8 +139,8 @@ PLAN_CODES = register(
     declare(
         "PLAN124",
         "memory",
-        "A node has an input and an output of one name; it feeds itself only by a connection.",
-        "Connect them if memory is meant; otherwise rename one.",
+        "An input and an output of a node share a name but are not connected.",
+        "Connect them if the node remembers the value; otherwise rename one.",
         warning=True,
     ),
     declare(

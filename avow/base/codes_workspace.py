@@ -6,47 +6,48 @@ A backend declares the codes of its own in its folder (`codes.py`) and shows the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from avow.base.codes import CODES, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
 from avow.base.codes_ros import ROS_CODES
+from avow.base.diagnostics import Severity
 
 WORKSPACE_CODES = register(
     declare(
         "FRET001",
         "no FRETish file",
-        "The file cannot be read, or is neither text with a sentence on a line nor JSON as FRET exports it.",
+        "The file is neither text with one sentence per line nor FRET's JSON.",
         "Export the requirements from FRET as JSON, or write the sentences into a text file.",
     ),
     declare(
         "FRET002",
         "no FRETish sentence",
-        "A sentence is: scope, condition, component, `shall`, timing, `satisfy`, response, in FRET's grammar.",
-        "Correct it at the place that is shown; FRET's own editor colours its fields.",
+        "A sentence consists of scope, condition, component, `shall`, timing, `satisfy` and response.",
+        "Correct it at the place shown.",
     ),
     declare(
         "FRET003",
         "no clause says the sentence",
-        "RCL has no counterpart for something that the sentence says; the message names it. It is left out.",
-        "Say it another way, in FRETish or in RCL.",
+        "RCL cannot express a part of the sentence, which is left out; the message names it.",
+        "Reword it in FRETish or write RCL.",
     ),
     declare(
         "FRET004",
         "FRET means something else than many expect",
-        "The clause means what FRET makes of the sentence, which is often not what was meant.",
-        "Read what the message says of it, and change the sentence if that was not meant.",
+        "FRET's meaning of the sentence often differs from what was intended.",
+        "Read the message, and change the sentence if necessary.",
     ),
     declare(
         "FRET005",
         "no FRETish sentence says the clause",
-        "FRETish has no counterpart for something that the clause says; the message names it. It is left out.",
-        "Say it another way, or keep it in RCL.",
+        "FRETish cannot express a part of the clause, which is left out; the message names it.",
+        "Reword it, or keep it in RCL.",
     ),
     declare(
         "PLAN090",
         "name taken",
-        "A method of the plan has the name of one of Avow's own engines, whose evidence it would be mistaken for.",
+        "A method has the name of one of Avow's own engines.",
         "Give the method another `id`.",
     ),
     declare(
@@ -58,46 +59,44 @@ WORKSPACE_CODES = register(
     declare(
         "BACKEND002",
         "no such backend",
-        "The plan names a backend that is neither installed nor one of its plugins.",
-        "Correct the name (the hint has those there are), or name its module under `plugins`.",
+        "The plan names a backend that is not installed.",
+        "Correct the name, or name its module under `plugins`.",
     ),
     declare(
         "BACKEND003",
         "backend does not load",
-        "Importing the backend failed, or the object lacks a part of the backend protocol.",
-        "Repair it; the message has the reason, and `docs/adding-a-backend.md` the protocol.",
+        "The backend cannot be imported, or lacks a part of the protocol.",
+        "Repair it as the message says; see `docs/developers/adding-a-backend.md`.",
     ),
     declare(
         "BACKEND004",
         "export leaves its folder",
-        "A backend wants to write a generated file outside the folder that it was given.",
-        "This is a defect of the backend: tell its authors.",
+        "A backend writes a generated file outside its folder.",
+        "Please report this defect of the backend.",
     ),
     declare(
         "BACKEND005",
         "plug-ins are not loaded here",
-        "The plan names plug-in modules. They are code, and commands that only read execute nothing of a workspace.",
+        "Plug-ins are code, and commands that only read run no code of a workspace.",
         "`avow verify` loads them; see `docs/trust-model.md`.",
     ),
     declare(
         "BACKEND006",
         "single steps only",
-        "The method judges single steps, or not all that can be said of others, and the clause, or an assumption of "
-        "its node, speaks of others.",
-        "Give the guarantee a method that judges runs, or say it with a port that carries what is remembered.",
+        "The clause or an assumption refers to other steps, which the method cannot judge.",
+        "Choose a method for runs, or remember the value in a port.",
     ),
     declare(
         "BACKEND007",
         "memory and invariant",
-        "What a program keeps from step to step has the name of a port, or an invariant that links it to the steps "
-        "before speaks of the step that is to come.",
-        "Use another name; an invariant speaks of what the program keeps, and of the past (`previous(in.r, 0)`).",
+        "A program's state variable has a port's name, or an invariant refers to the next step.",
+        "Rename the variable; write the invariant about state and past.",
     ),
     declare(
         "BACKEND008",
         "backend failed",
-        "Something of the backend that Avow asks in its own process (all but the run itself) raised an exception.",
-        "This is a defect of the backend: tell its authors. The message has its place.",
+        "The backend raised an exception outside of a run.",
+        "Please report this defect of the backend.",
     ),
     declare(
         "POLICY001",
@@ -108,8 +107,8 @@ WORKSPACE_CODES = register(
     declare(
         "POLICY002",
         "wrong policy",
-        "A part of the policy has the wrong form, or demands what no method can give.",
-        "Correct the place that the message names; `docs/policy.md` has the form.",
+        "A part of the policy has the wrong form or an impossible demand.",
+        "Correct the place that the message names; see `docs/policy.md`.",
     ),
     declare(
         "POLICY003", "unknown key", "The policy has no such key at this place.", "Use one of the keys in the message."
@@ -123,32 +122,33 @@ WORKSPACE_CODES = register(
     declare(
         "REQS002",
         "no requirements",
-        "The file has no rows, no column with the text of the requirements, or no specification objects.",
-        "Name the column as the message says, or export the requirements again.",
+        "The file has no rows, no column of requirement texts, or no specification objects.",
+        "Name the column, or export the requirements again.",
     ),
     declare(
         "REQS003",
         "not acceptable XML",
-        "The ReqIF file is not well formed, or declares a document type or entities, which are never expanded.",
+        "The ReqIF file is malformed, or declares a document type or entities.",
         "Export it again, without a document type.",
     ),
     declare(
         "REQS004",
         "wrong requirement",
-        "A requirement has no text, a name that cannot be one, or the name of another.",
-        "Correct the row in the file that it came from.",
+        "A requirement has no text, an invalid name, or the name of another.",
+        "Correct its row in the file.",
     ),
     declare(
         "REQS005",
         "section does not read back",
-        "Written as a section of a plan and read again, a requirement would not be the same; nothing is written.",
-        "Remove unusual characters from its text in the file that it came from, and tell Avow's authors.",
+        "The plan's section would not read back as the same requirement; nothing is written.",
+        "Remove unusual characters from the text, and report the defect.",
     ),
     declare(
         "SMT001",
         "no SMT-LIB form",
-        "A formula of the node is outside what can be written in SMT-LIB.",
-        "Rewrite the formula that the message names; the other commands do not need this form.",
+        "SMT-LIB cannot express a clause, which the translation leaves out.",
+        "Rewrite the clause if you need this form.",
+        warning=True,
     ),
     declare(
         "LEDGER001",
@@ -171,8 +171,8 @@ WORKSPACE_CODES = register(
     declare(
         "SIGN002",
         "nothing to sign",
-        "The ledger has no records, or its chain is damaged; such a ledger is not signed.",
-        "Run `avow verify`; look at the damage with `avow audit`.",
+        "The ledger is empty, or its chain is damaged.",
+        "Run `avow verify`, or look at the damage with `avow audit`.",
     ),
     declare(
         "SIGN003",
@@ -195,8 +195,8 @@ WORKSPACE_CODES = register(
     declare(
         "SIGN006",
         "not what the ledger says",
-        "The report does not say what the ledger says, or contract and plan have changed since: nobody should sign it.",
-        "Run `avow verify`, read the report, and sign then.",
+        "The report differs from the ledger, or contract and plan have changed since.",
+        "Run `avow verify`, read the report, then sign.",
     ),
     declare(
         "REPORT001",
@@ -213,14 +213,14 @@ WORKSPACE_CODES = register(
     declare(
         "DIFF001",
         "nothing to compare",
-        "What was given is neither a report, nor a ledger, nor a revision that git knows.",
+        "The argument is no report, ledger or git revision.",
         "Give a `report.json`, a ledger, or a commit.",
     ),
     declare(
         "DIFF002",
         "no place for the page",
-        "The page with the changes cannot be written where `--html` says.",
-        "Name a file in a folder that is there and may be written to.",
+        "Avow cannot write the page to the place of `--html`.",
+        "Name a file in a writable folder.",
     ),
     declare(
         "CLI001",
@@ -232,91 +232,100 @@ WORKSPACE_CODES = register(
     declare(
         "CLI020",
         "systems of one name",
-        "Two folders under contracts/ hold systems of one name; their evidence and reports would be mixed up.",
-        "Give each its own `system:` in plan.yaml; a link to another system's folder is to be removed.",
+        "Two folders under `contracts/` hold systems of one name.",
+        "Give each its own `system:` in plan.yaml; remove links to other systems' folders.",
     ),
     declare(
         "CLI021",
         "plan that is not verified",
-        "A plan lies elsewhere than in `contracts/NAME/`, and `avow verify` leaves it out: the system around it does "
-        "not take it in (a warning), or there is none around it, and none takes it in (an error). So does a file that "
-        "is nearly called plan.yaml (plan.yml).",
-        "Move its folder into `contracts/`, or take it in under `subsystems`; where a warning's plan is to be left "
-        "out, `lints_off: [CLI021]` in the plan of the system around it says so.",
+        "`avow verify` skips a plan outside `contracts/NAME/` that no system includes, or a misnamed one (plan.yml).",
+        "Move its folder into `contracts/`, include it under `subsystems`, or switch the warning off by "
+        "`lints_off: [CLI021]`.",
+    ),
+    declare(
+        "CLI022",
+        "requirement that cannot be validated",
+        "The plan has no such requirement, or Avow cannot edit its entry.",
+        "Use a name from the hint, and write the requirement in block style.",
+    ),
+    declare(
+        "CLI023",
+        "no PDF",
+        "Typst, which sets `report.pdf`, is not installed, or it fails.",
+        "`pip install typst`; every other format says the same.",
     ),
     declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
     declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
     declare(
         "CLUSTER001",
         "no cluster's address",
-        "A cluster is reached by TLS, or without it on this machine only: who reaches a scheduler runs code there.",
+        "A scheduler runs code of everyone who reaches it: only TLS, or this machine, is accepted.",
         "Write `dask+tls://HOST:PORT`, or `dask+tcp://127.0.0.1:PORT`.",
     ),
     declare(
         "CLUSTER002",
         "no certificate",
-        "A connection by TLS needs the files of the authority's certificate, and of this side's certificate and key.",
+        "TLS needs the authority's certificate, and a certificate and key of this machine.",
         "Set AVOW_TLS_CA, AVOW_TLS_CERT and AVOW_TLS_KEY.",
     ),
     declare(
         "CLUSTER003",
         "no cluster",
-        "Dask is not installed here, no scheduler answers at the address, or it does not accept the certificate.",
-        "Install `avow[cluster]`; start a scheduler (`docs/scale.md`).",
+        "Dask is not installed, no scheduler answers, or it rejects the certificate.",
+        "Install `avow[cluster]`; start a scheduler (`docs/developers/scale.md`).",
     ),
     declare(
         "CLUSTER004",
         "no workers",
-        "The cluster has no workers, or none with this Avow and this Z3: nothing would ever be done.",
-        "Start one with `avow worker --on …`, of the same version.",
+        "No worker of the cluster has this version of Avow and Z3.",
+        "Start one with `avow worker --on …`.",
     ),
     declare(
         "CLUSTER005",
         "certificate not accepted",
-        "A certificate has expired, is not of the authority that AVOW_TLS_CA names, or cannot be read: whose, it says.",
+        "A certificate has expired, is unreadable, or is of another authority than AVOW_TLS_CA.",
         "Have the authority issue a new one.",
     ),
     declare(
         "CLUSTER006",
         "worker left the cluster",
-        "A worker that can do no works any more (its disk is full, or its Avow was upgraded) leaves: others do them.",
-        "Mend what it names, and start it again.",
+        "A worker cannot run jobs any more (full disk, upgraded Avow); others take over.",
+        "Repair it, and start it again.",
     ),
     declare(
         "DRIVE100",
         "nothing to drive",
-        "The plan declares no callback class as the node, or there is no such node, or no such file.",
-        "Write `source: {python: src/node.py, class: Node, kind: rospy}` for the node (or `kind: rclpy`).",
+        "The plan declares no callback class for the node, or its file does not exist.",
+        "Write `source: {python: src/node.py, class: Node, kind: rospy}` (or `kind: rclpy`).",
     ),
     declare(
         "DRIVE101",
         "no message class",
-        "A message type that the class needs is not defined, or has a field called `topic` or `time`.",
-        "Name the folder of its definition under `messages`, or the distribution under `ros`.",
+        "A message type is not defined, or has a field called `topic` or `time`.",
+        "Name its folder under `messages`, or the distribution under `ros`.",
     ),
     declare(
         "DRIVE102",
         "topics do not fit",
-        "The class does not subscribe to a topic of the contract's inputs, does not publish one of its outputs, or "
-        "does so with another type.",
+        "The class does not subscribe to or publish the contract's topics with their types.",
         "Correct the contract's `topics`, the plan's `ros: {nodes: …}`, or the class.",
     ),
     declare(
         "DRIVE103",
         "cannot be driven",
-        "The class asks for something of ROS that is not driven, hangs on a clock or on chance, or cannot be run.",
-        "The message names it. Time is ROS' own (`rospy.Time.now()`, `get_clock().now()`); chance needs a fixed seed.",
+        "The class uses a ROS interface that Avow does not drive, a clock, or chance.",
+        "Use ROS time (`rospy.Time.now()`, `get_clock().now()`) and a fixed seed.",
     ),
     declare(
         "DRIVE104",
         "no such messages",
-        "The trace has nothing for this class, its times run backwards, or a message is not of its topic's type.",
+        "The trace has no messages for the class, runs backwards, or has messages of another type.",
         "Correct the trace, or name another.",
     ),
     declare(
         "CLI006",
         "cannot be run",
-        "The system cannot be simulated: the message says what is missing, such as an interpretation or a domain.",
+        "The scenario lacks something, such as an interpretation or a domain; the message names it.",
         "Complete the plan's `scenario`.",
     ),
     declare(
@@ -329,8 +338,8 @@ WORKSPACE_CODES = register(
     declare(
         "CLI011",
         "nothing to draft from",
-        "What `avow init` is to draft a system from cannot be read, or has no node with a topic.",
-        "Give a bag, the output of `rosnode info` or `ros2 node info`, or the address of a running master.",
+        "Avow cannot read the given description, or it has no node with a topic.",
+        "Give a bag, the output of `rosnode info` or `ros2 node info`, or a running master.",
     ),
 )
 
@@ -340,16 +349,10 @@ CORE_CODES: Mapping[str, Code] = register(
 """Every code of the core: a backend's own are in its attribute `codes`."""
 
 
-def page_rows(codes: Iterable[Code]) -> list[str]:
-    """The rows of the table in `docs/diagnostics.md`. What the language wants, its examples show."""
-    return [
-        f"| {c.code} | {c.severity} | **{c.title}.** {_cell(c.explanation)} | {_cell(c.remedy) or _EXAMPLE} |"
-        for c in codes
-    ]
-
-
-_EXAMPLE = "[see the example](language.md#every-code)"
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+def page_entry(code: Code) -> str:
+    """A code in `docs/diagnostics.md`, with its example if that is short."""
+    mark = "" if code.severity is Severity.ERROR else f" ({code.severity})"
+    lines = [f"**{code.code}{mark}, {code.title}.** {f'{code.explanation} {code.remedy}'.strip()}"]
+    if code.example and len(code.example) < 110 and "\0" not in code.example:
+        lines += ["", "```text", code.example, "```"]
+    return "\n".join(lines)

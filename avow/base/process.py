@@ -28,6 +28,10 @@ _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -sig
 them."""
 
 
+HOME_PREFIX = "avow-home-"
+"""How the empty folders are called that tools get as their homes, among the temporary folders."""
+
+
 @dataclass(slots=True)
 class _Process:
     """What this process started, was told and may do: of it, and not of a run, as its imports are."""
@@ -87,7 +91,7 @@ def run(
         tempfile.TemporaryFile() as out,
         tempfile.TemporaryFile() as err,
         _stdin(stdin) as source,
-        tempfile.TemporaryDirectory(prefix="avow-home-", ignore_cleanup_errors=True) as home,
+        tempfile.TemporaryDirectory(prefix=HOME_PREFIX, ignore_cleanup_errors=True) as home,
     ):
         try:
             process = subprocess.Popen(

@@ -34,3 +34,19 @@ def suggest(name: str, known: Iterable[str]) -> str | None:
 
 def _hint(near: list[str]) -> str | None:
     return f"did you mean {' or '.join(f'`{each}`' for each in near)}?" if near else None
+
+
+def distance(one: str, other: str, limit: int) -> int:
+    """How many letters to insert, delete, change or swap with the next; more than `limit` is not counted exactly."""
+    if abs(len(one) - len(other)) > limit:
+        return limit + 1
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for i, a in enumerate(one, 1):
+        older, before, row = before, row, [i]
+        for j, b in enumerate(other, 1):
+            cost = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
+            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
+                cost = min(cost, older[j - 2] + 1)
+            row.append(cost)
+    return row[-1]

@@ -11,14 +11,16 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 
 from avow.base import process
 from avow.base.files import digest_or_missing, identity, sha256
 from avow.base.notes import cache_folder, read_note, write_note
 from avow.base.records import dataclass
-from avow.base.tuning.running import VERSION_SECONDS
+from avow.base.tuning.running import TRIAL_SECONDS, VERSION_SECONDS
 from avow.base.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
 
 
@@ -36,6 +38,8 @@ class Tool:
     """The Python package that it is, where it is no program of its own."""
     parts: tuple[str, ...] = ()
     """Further programs that it runs, and folders that it is made of."""
+    trial: Callable[[], str] | None = field(default=None, compare=False)
+    """Does a one-line job with the tool, for `avow doctor`; returns what went wrong, empty if nothing did."""
 
     @property
     def present(self) -> bool:
@@ -49,7 +53,34 @@ class Tool:
 
 def z3_tool() -> Tool:
     """The solver that Avow brings along."""
-    return Tool("z3", package_version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3")
+    install = "pip install z3-solver"
+    return Tool("z3", package_version("z3-solver"), None, install, False, package="z3", trial=_try_z3)
+
+
+def _try_z3() -> str:
+    import z3
+
+    solver = z3.Solver()
+    solver.add(z3.Int("x") > 0, z3.Int("x") < 1)
+    return "" if solver.check() == z3.unsat else "it does not refute 0 < x < 1 over the integers"
+
+
+def tried(commands: Sequence[Sequence[str]], file: str, text: str, expected: str) -> str:
+    """Run these commands in a temporary folder that holds one file. Returns the first error of a command that fails, or
+    of the last one if its output lacks `expected`; empty if all is well."""
+    with tempfile.TemporaryDirectory(prefix="avow-trial-", ignore_cleanup_errors=True) as folder:
+        (Path(folder) / file).write_text(text, encoding="utf-8")
+        for k, command in enumerate(commands):
+            try:
+                done = process.run(command, cwd=Path(folder), seconds=TRIAL_SECONDS)
+            except process.ToolMissing as missing:
+                return str(missing)
+            said = f"{done.stdout}\n{done.stderr}"
+            if done.code != 0 or (k + 1 == len(commands) and expected not in said):
+                lines = [line.strip() for line in said.splitlines() if line.strip()]
+                wrong = [line for line in lines if "error" in line.lower() or "cannot" in line]
+                return (wrong or lines or [f"`{command[0]}` ended with code {done.code}"])[0][:200]
+    return ""
 
 
 @functools.cache

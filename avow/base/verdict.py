@@ -58,17 +58,12 @@ _SUPPORTING = frozenset(
 )
 
 
-_SAID = {"monitored": "observed", "justified": "supposed", "linked": "argued"}
-
-
-def said(value: str) -> str:
-    """What people read for a verdict or status of that value: their word where they have another, else itself."""
-    return _SAID.get(value, value)
+_FORMER = {"observed": "monitored", "supposed": "justified", "linked": "argued"}
 
 
 def unsaid(word: str) -> str:
-    """The value that people call so, as a plan may have it; any other word as it stands."""
-    return next((value for value, other in _SAID.items() if other == word), word)
+    """The word of a verdict or status, also where a plan has the one of the last release; any other as it stands."""
+    return _FORMER.get(word, word)
 
 
 class Link(StrEnum):
@@ -135,8 +130,8 @@ class HypothesisKind(StrEnum):
 
     CLAIM = "claim"
     """Another obligation of the case: `name` is its id without the system, `digest` that of what it says."""
-    SUPPOSITION = "supposition"
-    """What no tool shows and a person has to accept, by name: ``agent/supposition/termination``."""
+    ASSUMPTION = "supposition"  # the spelling of the ledger's first format
+    """What no tool shows and a person has to accept, by name: ``agent/assumption/termination``."""
     BOUND = "bound"
     """What limits a bounded answer, by name: ``scenario.steps``, ``scenario.domains.in.r``, ``type.Place``. What rests
     on one is at most `checked`, whatever it says of itself."""

@@ -139,7 +139,7 @@ class Certificates:
                 for assumed in ((), given) if given else ((),):
                     uses = tuple(Use(k) for k in range(len(assumed)))
                     yield (*assumed, Entry(How.POSSIBLE, "", claim.digest, base=(Question(uses),)))
-            case _:  # a supposition
+            case _:  # an assumption
                 yield (Entry(How.POSSIBLE, "", claim.digest),)
 
     def parts(self, name: str) -> list[list[Statement]]:
@@ -188,9 +188,6 @@ class Certificates:
         selected = frozenset(nodes)
         edges = [e for e in graph.edges if {e.source.node, e.target.node} <= selected]
         arcs = [(e.source.node, e.target.node) for e in edges if not e.delayed]
-        into: dict[str, list[str]] = {}
-        for source, target in arcs:
-            into.setdefault(target, []).append(source)
         order = tuple(name for group in components(nodes, arcs) for name in group)
         everything = selected == frozenset(graph.nodes)
         hints: dict[str, Hint] = {}
@@ -208,7 +205,6 @@ class Certificates:
             self.known_with(tuple(lemmas)),
             goal.name,
             order,
-            lambda node: frozenset(reached(into.get(node, ()), lambda name: into.get(name, ()))),
             any(e.delayed for e in edges) or composition.frame.remembering(nodes),
             frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
             hints,

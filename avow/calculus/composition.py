@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from avow.base.files import sha256
 from avow.base.graphs import components
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
+from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, Claim, Told, settle
-from avow.calculus.kept_answers import ask_once
+from avow.calculus.entailment import ask_once
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
 from avow.calculus.subsystem_contracts import Level, Said, composed_node, innermost, level, with_persistence
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
-from avow.formulas.formula import digest, sort_digest
+from avow.formulas.finite import interpretation
+from avow.formulas.formula import digest, sort_digest, substitute
 from avow.kernel.solvers import Solvers
-from avow.language.contract import Node
-from avow.language.subterms import ports_of
-from avow.language.terms import Role
+from avow.language.contract import Clause, ClauseKind, Node, Port
+from avow.language.sorts import BOOL, FunctionSort
+from avow.language.subterms import histories, ports_of
+from avow.language.terms import History, Not, Past, Role, Term, Variable
+from avow.sanity import results
+from avow.sanity.analysis import analyse
+from avow.sanity.claims import Property
+from avow.sanity.over_runs import OverRuns
+from avow.sanity.results import SanityResult
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
+from avow.system.formulas import environment_assumptions
 from avow.system.plan import ComposeGoal, Endpoint, Subsystem, System
 
 
@@ -112,13 +121,16 @@ class Composition:
     around: Mapping[str, str] = field(default_factory=dict)
     """Node or subsystem → the subsystem that it is directly in."""
     told: Told | None = field(default=None, compare=False)
-    """Hears of each side condition of a goal as soon as it is settled."""
+    """Called with each side condition of a goal as soon as it is settled."""
     claims: Mapping[str, Mapping[SideCondition, Claim]] = field(default_factory=dict, compare=False)
     """Goal → what is claimed of its side conditions, where only some of it is asked for."""
     _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
     _certificates: Certificates | None = None
+    _surroundings: Node | None = None
+    _lasting: SanityResult | None = None
+    _excluded: tuple[str, ...] | None = None
     _whole: tuple[Goal, frozenset[ClauseName]] | None = None
     """The derivation over every node, and the assumptions that it shows."""
 
@@ -132,8 +144,8 @@ class Composition:
         return self._answers[goal.name]
 
     def stands(self, goal: Goal, bounds: Bounds) -> Verdict:
-        """Whether a derivation stands, up to its hypotheses: it, and those of the subsystems that it is made of. Proved
-        is what the kernel establishes."""
+        """The verdict of a derivation and those of its subsystems, up to their hypotheses: `proved` only if the kernel
+        establishes it."""
         verdicts = {self.settled(part, bounds).verdict for part in goal.inner_first()}
         if Verdict.REFUTED in verdicts:
             return Verdict.REFUTED
@@ -186,7 +198,7 @@ class Composition:
         return answers.settled if answers is not None else {}
 
     def fallen(self, goal: Goal, behind: str = "") -> tuple[str, ...]:
-        """The side conditions of a goal that have been settled and do not stand: of a node and of those from which
+        """The side conditions of a goal that have been settled and do not hold: of a node and of those from which
         values flow to it, or of all."""
         graph, nodes = self.frame_of(goal).graph, {behind: None} if behind else dict.fromkeys(goal.nodes)
         for node in (waiting := list(nodes)):
@@ -205,6 +217,94 @@ class Composition:
         if self._machine is None:
             self._machine = Machine(world(self.frame), seed)
         return self._machine
+
+    def assumed(self, of: str = "") -> dict[str, Term]:
+        """What is assumed of the system's environment: by the plan, or by a node of inputs that no node provides; with
+        what is remembered for a requirement (`of`)."""
+        frame, found = self.frame, dict[str, Term]()
+        for node in frame.system.contract.nodes:
+            for clause in node.assumptions:
+                ports = (Endpoint(node.name, v.name) for v, _ in frame.behind(node.name, clause.formula))
+                if frame.graph.by_target.keys().isdisjoint(ports):
+                    found[f"{node.name}.{clause.name}"] = frame.clause(node.name, clause.name)
+        return found | frame.environment() | frame.memory(of=of)
+
+    def left_to_environment(self) -> Iterator[tuple[ClauseName, tuple[str, ...]]]:
+        """The assumptions of nodes that speak of environment inputs alone and stay assumed, with these inputs."""
+        flat = self.frame
+        for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in self.whole.root.assumed):
+            formula = flat.node(name.node).clause(name.clause).formula
+            ports = tuple(v.name for v, _ in flat.behind(name.node, formula))
+            if ports and not any(Endpoint(name.node, port) in flat.graph.by_target for port in ports):
+                yield name, ports
+
+    @property
+    def surroundings(self) -> Node:
+        """The environment's inputs as a node of which all is assumed that is assumed of them together."""
+        if self._surroundings is None:
+            flat, contract = self.frame, self.frame.system.contract
+            said = [
+                (a.node, f"environment {a.port}", a.formula) for a in environment_assumptions(flat.system, flat.graph)
+            ]
+            for name, _ in self.left_to_environment():
+                said.append((name.node, str(name), contract.node(name.node).clause(name.clause).formula))
+            ports: dict[Variable, None] = {}
+            clauses: dict[str, Term] = {}
+            for node, label, formula in sorted(said, key=lambda each: each[1]):  # the order of nodes means nothing
+                entries = {
+                    v: replace(v, name=flat.entry(node, v.name).removeprefix("in."), span=None)
+                    for v in ports_of(formula)
+                }
+                ports |= dict.fromkeys(entries.values())
+                clauses[label] = substitute(formula, entries)
+            for v in ports if any(map(histories, clauses.values())) else ():  # else each step may be as the first
+                if {f"in.{v.name}", v.name} & flat.constants and not isinstance(v.sort, FunctionSort):
+                    clauses[f"constant {v.name}"] = Not(History(Past.CHANGED, (v,), BOOL))
+            inputs = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in ports)
+            assumed = (Clause(ClauseKind.ASSUMPTION, label, 0, f) for label, f in clauses.items())
+            self._surroundings = Node("environment", inputs, (), (), tuple(assumed), ())
+        return self._surroundings
+
+    def lasting(self, bounds: Bounds) -> SanityResult:
+        """Whether an environment can meet for ever all that is assumed of it."""
+        if self._lasting is None:
+            node = self.surroundings
+            given = interpretation(node, self.frame.system.plan.scenario)
+            asked = results.Bounds(bounds.effort, bounds.seed)
+            (self._lasting,) = analyse(node, scenario=given, bounds=asked, wanted={Property.ASSUMPTIONS_SATISFIABLE})
+        return self._lasting
+
+    def excluded_over_runs(self, bounds: Bounds) -> tuple[str, ...]:
+        """The guarantees (``node.name``) whose condition comes about in no run of the environment that is assumed,
+        though in some run of their node alone. Only where other steps matter: `EnvironmentQuestion` asks about one."""
+        if self._excluded is None:
+            nodes = self.frame.system.contract.nodes
+            self._excluded = tuple(f"{n.name}.{g}" for n in nodes if not n.relay for g in self._never_met(n, bounds))
+        return self._excluded
+
+    def _never_met(self, node: Node, bounds: Bounds) -> tuple[str, ...]:
+        own = {
+            self.frame.entry(node.name, port.name).removeprefix("in."): port.variable
+            for port in node.inputs
+            if Endpoint(node.name, port.name) in self.frame.graph.environment
+        }
+        assumed = []
+        for clause in self.surroundings.assumptions:
+            ports = {v: own[v.name] for v in ports_of(clause.formula) if v.name in own}
+            if ports and len(ports) == len(set(ports_of(clause.formula))):
+                assumed.append(replace(clause, formula=substitute(clause.formula, ports)))
+        for entry, variable in own.items():
+            if {f"in.{entry}", entry} & self.frame.constants and not isinstance(variable.sort, FunctionSort):
+                same = Not(History(Past.CHANGED, (variable,), BOOL))
+                assumed.append(Clause(ClauseKind.ASSUMPTION, f"constant {entry}", 0, same))
+        over_runs = [clause.name for clause in (*assumed, *node.guarantees) if histories(clause.formula)]
+        if not assumed or not over_runs:
+            return ()
+        asked = results.Bounds(min(bounds.effort, DEFEAT_EFFORT), bounds.seed)
+        within = OverRuns(replace(node, assumptions=(*node.assumptions, *assumed)), asked)
+        alone = OverRuns(node, asked)
+        names = (clause.name for clause in node.guarantees)
+        return tuple(name for name in names if within.never_met(name) and not alone.never_met(name))
 
     @property
     def whole(self) -> Goal:

@@ -125,7 +125,7 @@ class Goal:
     root: Derivation
     findings: tuple[Diagnostic, ...] = ()
     within: tuple[Goal, ...] = ()
-    """The derivations of those of the nodes that are subsystems: theirs has to stand too."""
+    """The derivations of those nodes that are subsystems: these have to hold as well."""
     contract: tuple[str, ...] = ()
     """The derived contract of a subsystem in lines of text."""
     together: bool = False
@@ -176,7 +176,7 @@ class Case:
     depth: int = 1
     """Of how many steps an induction is."""
     invariant: tuple[str, ...] = ()
-    """One that nobody wrote down, by which it is kept (`avow.calculus.induction`)."""
+    """An invariant that was found, by which it is preserved (`avow.calculus.induction`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ prove itself. Where proofs would do that, others are looked for; where there are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from avow.base.files import sha256
@@ -18,15 +18,16 @@ from avow.base.records import dataclass
 from avow.base.tuning.effort import NARROW_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
-from avow.calculus.entailment import implied
+from avow.calculus.entailment import NotProved, implied, kept_answers
 from avow.calculus.induction import INVARIANT, Deeper, further, steps
-from avow.calculus.kept_answers import keep_not_proved, not_proved_before
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
-from avow.calculus.variables import Facts, Frame, bearing, closest, indexed
+from avow.calculus.variables import Frame, bearing, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
 
 Hypotheses = dict[str, Term]
+Premises = tuple[tuple[str, ...], tuple[str, ...]]
+"""The nodes whose contracts may be used: at the same step, and one step earlier."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Answers:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the whole derivation stands (up to its hypotheses)."""
+        """The verdict of the whole derivation, up to its hypotheses."""
         verdicts = {answer.verdict for answer in self.settled.values()}
         if Verdict.REFUTED in verdicts or any(loop.form is LoopForm.CIRCULAR for loop in self.loops):
             return Verdict.REFUTED
@@ -65,7 +66,7 @@ class Answers:
 
 
 Told = Callable[[str, Settled], None]
-"""What hears of a goal's side condition, by the goal's name: the answer may change yet where proofs go in a circle."""
+"""Called with the goal's name and a side condition's answer, which may still change if proofs are circular."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +85,21 @@ def settle(
     claims: Mapping[SideCondition, Claim] | None = None,
 ) -> Answers:
     """Discharge every side condition of a derivation, and judge its loops. Of `claims` that are not asked for it is
-    enough to know that they were not proved before (`avow.calculus.kept_answers`)."""
+    enough to know that they were not proved before (`avow.calculus.entailment`)."""
     bounds = bounds or Bounds()
     solver = _Solver(frame, frozenset(goal.nodes), bounds, frozenset(goal.root.assumed))
     settled: dict[SideCondition, Settled] = {}
+    kept = kept_answers()
     for condition in goal.conditions:
         claim = claims.get(condition) if claims is not None else None
         mark = sha256(f"{goal.name} {claim.digest} {bounds.effort} {bounds.seed}") if claim is not None else ""
-        before = not_proved_before(mark) if claim is not None and not claim.wanted else None
-        if before is not None:
+        before = kept.find(mark) if kept is not None and claim is not None and not claim.wanted else None
+        if isinstance(before, NotProved):
             settled[condition] = Settled(condition, before.verdict, (), before.used, before.used_before)
             continue
         answer = settled[condition] = solver.condition(condition)
-        if answer.verdict is not Verdict.PROVED and not answer.circle:
-            keep_not_proved(mark, answer.verdict, answer.used, answer.used_before)
+        if kept is not None and mark and answer.verdict is not Verdict.PROVED and not answer.circle:
+            kept.now[mark] = NotProved(answer.verdict, answer.used, answer.used_before)
         if told is not None:
             told(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
@@ -119,15 +121,14 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
     condition = settled.condition
     solver = _Solver(frame, frozenset(goal.nodes), Bounds(), frozenset(goal.root.assumed))
     consumer = condition.consumer
-    attempts = tuple(solver.attempts(condition, [*condition.providers], solver.selected))
-    same, before = attempts[-1]
+    same, before = premises = solver.wider(condition, solver.nearest(condition, solver.selected))[-1]
     if settled.circle or any(consumer in frame.graph.ancestors(name, solver.selected) for name in same):
         return ()
     found: list[tuple[Phase, tuple[Offer, ...]]] = []
     for case in settled.cases:
         if case.verdict is not Verdict.REFUTED and case.counterexample is None:
             continue
-        hypotheses, claim = solver.question(condition, case.phase, same, before, True)
+        hypotheses, claim = solver.question(condition, case.phase, premises)
         near = [name for name in condition.providers if name in same]
         places = [*providers(frame, dict.fromkeys((*near, *same)))]
         if case.phase is Phase.INITIAL:
@@ -154,88 +155,112 @@ class _Solver:
     def condition(self, condition: SideCondition, allowed: frozenset[str] | None = None) -> Settled:
         """Settle one side condition; `allowed`: the nodes whose contracts may be used at the same step.
 
-        The nearest hypotheses are tried first: they make the proof that a reader expects, and the question small.
+        What is closest to the goal is tried first: it makes the proof that a reader expects, and the question small. A
+        provider of a thousand consumers guarantees a thousand things, of which each consumer needs a few; and all nodes
+        of a chain are ancestors of its last one. Only the widest question refutes.
         """
         allowed = self.selected if allowed is None else allowed
-        direct = [p for p in condition.providers if p in allowed]
-        attempts = self.attempts(condition, direct, allowed)
-        widest = next(attempts)
-        if (close := self.close(condition, *widest)) is not None:
-            return close
-        asked: list[tuple[tuple[Phase, ...], list[tuple[Hypotheses, Term]]]] = []
-        patient = False
-        # Of a node far down a chain all of it are ancestors: wider questions are written down only where one is asked.
-        left = [(widest, False)]
-        for number, (attempt, wide) in enumerate(left):
-            widest = attempt
-            phases = self.phases(condition, attempt[1])
-            found = (phases, [self.question(condition, phase, *attempt, wide) for phase in phases])
-            if found not in asked:
-                asked.append(found)
-                patient = 0 < number == len(left) - 1
-                answer = self.asked(condition, *found, patient=patient)
-                if answer.verdict is Verdict.PROVED:
-                    return answer
-            if number == 0:
-                left += [(each, True) for each in attempts] or [(widest, True)]
-        if not patient:  # the last one that was another question
-            answer = self.asked(condition, *asked[-1], patient=True)
+        nearest = self.nearest(condition, allowed)
+        answer = self.asked(condition, nearest, NARROW_EFFORT, closest_only=True, whether=True)
+        if answer.verdict is Verdict.PROVED:
+            return answer
+        wider = self.wider(condition, nearest, allowed)
+        for premises in wider:
+            last = premises is wider[-1]
+            answer = self.asked(condition, premises, self.bounds.effort if last else NARROW_EFFORT, whether=not last)
             if answer.verdict is Verdict.PROVED:
                 return answer
-        # Only the widest hypotheses refute: narrower ones may just have left something out.
-        return self.by_itself(condition, *widest) or self.deeper(condition, answer, *widest)
+        return self.by_itself(condition, wider[-1]) or self.deeper(condition, answer, wider[-1])
+
+    def nearest(self, condition: SideCondition, allowed: frozenset[str]) -> Premises:
+        """The providers alone."""
+        consumer = condition.consumer
+        same = (p for p in condition.providers if p in allowed and p != consumer)
+        near = tuple(p for p in same if self.feeds(p, consumer, delayed=False))
+        before = (p for p in condition.providers if self.feeds(p, consumer, delayed=True))
+        return near, tuple(before) if condition.delayed else ()
+
+    def wider(
+        self, condition: SideCondition, nearest: Premises, allowed: frozenset[str] | None = None
+    ) -> list[Premises]:
+        """Ever more nodes, up to all from which values flow to the consumer. What holds one step earlier holds of every
+        selected node: each step's assumptions come before the next's."""
+        graph, (_, first) = self.frame.graph, nearest
+        ancestors = graph.ancestors(condition.consumer, self.selected if allowed is None else allowed)
+        behind = (*ancestors, condition.consumer)
+        edges = (edge for node in behind for edge in graph.feeding(node) if edge.delayed)
+        earlier = tuple(dict.fromkeys(edge.source.node for edge in edges if edge.source.node in self.selected))
+        stepwise = earlier or self.frame.remembering(self.selected)
+        everything = tuple(dict.fromkeys((*earlier, *behind))) if stepwise else ()
+        return list(dict.fromkeys([nearest, *((ancestors, before) for before in (first, earlier, everything))]))
+
+    def feeds(self, provider: str, consumer: str, *, delayed: bool) -> bool:
+        return any(e.source.node == provider and e.delayed is delayed for e in self.frame.graph.feeding(consumer))
 
     def asked(
         self,
         condition: SideCondition,
-        phases: tuple[Phase, ...],
-        questions: Sequence[tuple[Hypotheses, Term]],
+        premises: Premises,
+        effort: int,
         *,
-        patient: bool,
+        closest_only: bool = False,
+        whether: bool = False,
+        further: Mapping[str, Term] | None = None,
     ) -> Settled:
-        """Only the widest question is worth the whole time: what a narrower one cannot settle, that may."""
-        effort = self.bounds.effort if patient else min(self.bounds.effort, NARROW_EFFORT)
-        pairs = zip(phases, questions, strict=True)
-        return _settled(condition, tuple(self.ask(p, *q, effort, whether=not patient) for p, q in pairs))
-
-    def phases(self, condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
-        """One question, or one about the first step and one about every later."""
-        remembering = self.frame.remembering(self.selected)
-        return (Phase.INITIAL, Phase.LATER) if before or condition.delayed or remembering else (Phase.SAME_STEP,)
-
-    def close(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
-        """A proof from what speaks of the goal's variables alone, if there is one. A provider of a thousand consumers
-        guarantees a thousand things, of which each consumer needs a few."""
+        """`whether`: only a proof matters, so that the first case without one ends it."""
         cases: list[Case] = []
-        for phase in self.phases(condition, before):
-            goal, parts = (
-                self.frame.clause(condition.consumer, condition.clause),
-                self.parts(condition, phase, same, before),
+        effort = min(effort, self.bounds.effort)
+        for phase in self.phases(condition, premises):
+            hypotheses, goal = self.question(condition, phase, premises, closest_only=closest_only)
+            answer = implied(
+                hypotheses | dict(further or {}), goal, effort=effort, seed=self.bounds.seed, whether=whether
             )
-            hypotheses = closest(parts, goal)
-            if len(hypotheses) == sum(len(part.terms) for part in parts):
-                return None  # these are all: the first attempt asks just that
-            case = self.ask(phase, hypotheses, goal, min(self.bounds.effort, NARROW_EFFORT), whether=True)
-            if case.verdict is not Verdict.PROVED:
-                return None
-            cases.append(case)
+            cases.append(
+                Case(
+                    phase,
+                    answer.verdict,
+                    answer.needed,
+                    answer.counterexample,
+                    answer.vacuous,
+                    answer.reason,
+                    answer.engine,
+                )
+            )
+            if whether and answer.verdict is not Verdict.PROVED:
+                break
         return _settled(condition, tuple(cases))
 
-    def parts(
-        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...]
-    ) -> list[Facts]:
-        """All that may be used in a phase."""
-        found = [self.frame.promised(node) for node in same]
-        if phase is Phase.LATER:
-            found += [self.frame.promised(node, 1) for node in before]
-        found += [self.frame.surroundings(), indexed(self.own(condition.consumer))]
-        if phase is Phase.LATER:
-            found.append(self.frame.surroundings(1))
-        elif phase is Phase.INITIAL:
-            found.append(self.frame.beginnings(self.selected))
-        return found
+    def phases(self, condition: SideCondition, premises: Premises) -> tuple[Phase, ...]:
+        """One question, or one about the first step and one about every later."""
+        remembering = self.frame.remembering(self.selected)
+        stepwise = premises[1] or condition.delayed or remembering
+        return (Phase.INITIAL, Phase.LATER) if stepwise else (Phase.SAME_STEP,)
 
-    def by_itself(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
+    def question(
+        self, condition: SideCondition, phase: Phase, premises: Premises, *, closest_only: bool = False
+    ) -> tuple[Hypotheses, Term]:
+        """What may be used in a phase, and the assumption that has to follow."""
+        frame, (same, before) = self.frame, premises
+        goal = frame.clause(condition.consumer, condition.clause)
+        contracts = [frame.promised(node) for node in same]
+        around = [frame.surroundings(), indexed(self.own(condition.consumer))]
+        if phase is Phase.LATER:
+            contracts += [frame.promised(node, 1) for node in before]
+            around.append(frame.surroundings(1))
+        elif phase is Phase.INITIAL:
+            around.append(frame.beginnings(self.selected))
+        if closest_only:
+            return closest((*contracts, *around), goal), goal
+        spoken = free_variables(goal).union(*(part.speaking for part in contracts))
+        hypotheses = {label: fact for part in contracts for label, fact in part.terms.items()}
+        return hypotheses | bearing({k: v for part in around for k, v in part.terms.items()}, spoken), goal
+
+    def own(self, consumer: str) -> Hypotheses:
+        """What a consumer assumes that stays assumed."""
+        names = (ClauseName(consumer, clause.name) for clause in self.frame.node(consumer).assumptions)
+        return {str(name): self.frame.clause(name.node, name.clause) for name in names if name in self.kept}
+
+    def by_itself(self, condition: SideCondition, premises: Premises) -> Settled | None:
         """Where a node feeds itself at the same step, and what it guarantees would show what it assumes: circular."""
         consumer = condition.consumer
         if not self.feeds(consumer, consumer, delayed=False):
@@ -243,18 +268,12 @@ class _Solver:
         guaranteed = {
             f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
         }
-        cases: list[Case] = []
-        for phase in self.phases(condition, before):
-            hypotheses, goal = self.question(condition, phase, same, before, True)
-            cases.append(self.ask(phase, hypotheses | guaranteed, goal, NARROW_EFFORT))
-        answer = _settled(condition, tuple(cases))
+        answer = self.asked(condition, premises, NARROW_EFFORT, further=guaranteed)
         if answer.verdict is not Verdict.PROVED:
             return None
         return replace(answer, verdict=Verdict.REFUTED, circle=(consumer,))
 
-    def deeper(
-        self, condition: SideCondition, settled: Settled, same: tuple[str, ...], before: tuple[str, ...]
-    ) -> Settled:
+    def deeper(self, condition: SideCondition, settled: Settled, premises: Premises) -> Settled:
         """A later step at which the assumption may be false refutes nothing before that step is shown to be reached:
         from the initial values, by as many steps as it takes; else it is only induction that fails."""
         first = next((case for case in settled.cases if case.phase is Phase.INITIAL), None)
@@ -263,13 +282,13 @@ class _Solver:
             return settled
         found = Deeper()
         if first.verdict is Verdict.PROVED:
-            frame = self.frame
+            frame, (same, before) = self.frame, premises
+            selected = (node for node in frame.graph.nodes if node in self.selected)
+            always = frame.environment() | frame.memory()
             asked = steps(
                 frame,
-                self.frame.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0)
-                | frame.environment()
-                | frame.memory(),
-                self.frame.contracts(same) | frame.environment() | frame.memory() | self.own(condition.consumer),
+                frame.contracts(dict.fromkeys((*before, *selected))) | always,
+                frame.contracts(same) | always | self.own(condition.consumer),
                 frame.initials(self.selected) | frame.blank(),
                 frame.clause(condition.consumer, condition.clause),
             )
@@ -288,73 +307,6 @@ class _Solver:
         else:
             case = replace(later, verdict=Verdict.UNKNOWN, reason="induction over steps fails")
         return _settled(condition, tuple(case if one is later else one for one in settled.cases))
-
-    @property
-    def selected_in_order(self) -> tuple[str, ...]:
-        return tuple(node for node in self.frame.graph.nodes if node in self.selected)
-
-    def attempts(
-        self, condition: SideCondition, direct: list[str], allowed: frozenset[str]
-    ) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
-        """Ever wider sets of nodes whose contracts serve as hypotheses: at the same step, and one step earlier."""
-        consumer = condition.consumer
-        near = tuple(p for p in direct if p != consumer and self.feeds(p, consumer, delayed=False))
-        before = tuple(p for p in condition.providers if self.feeds(p, consumer, delayed=True))
-        first = before if condition.delayed else ()
-        yield near, first
-        tried = {(near, first)}
-        ancestors = self.frame.graph.ancestors(consumer, allowed)
-        # What holds one step earlier holds of every selected node: each step's assumptions come before the next's.
-        earlier = tuple(
-            dict.fromkeys(
-                edge.source.node
-                for node in (*ancestors, consumer)
-                for edge in self.frame.graph.feeding(node)
-                if edge.delayed and edge.source.node in self.selected
-            )
-        )
-        remembering = self.frame.remembering(self.selected)
-        everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier or remembering else ()
-        for attempt in ((ancestors, first), (ancestors, earlier), (ancestors, everything)):
-            if attempt not in tried:
-                tried.add(attempt)
-                yield attempt
-
-    def feeds(self, provider: str, consumer: str, *, delayed: bool) -> bool:
-        return any(e.source.node == provider and e.delayed is delayed for e in self.frame.graph.feeding(consumer))
-
-    def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int, *, whether: bool = False) -> Case:
-        """`whether`: what does not prove it is looked at no further."""
-        answer = implied(hypotheses, goal, effort=patience, seed=self.bounds.seed, whether=whether)
-        return Case(
-            phase,
-            answer.verdict,
-            answer.needed,
-            answer.counterexample,
-            answer.vacuous,
-            answer.reason,
-            answer.engine,
-        )
-
-    def question(
-        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...], wide: bool
-    ) -> tuple[Hypotheses, Term]:
-        goal = self.frame.clause(condition.consumer, condition.clause)
-        hypotheses = self.frame.contracts(same)
-        around = self.frame.environment(0) | self.frame.memory(0) | self.own(condition.consumer)
-        if phase is Phase.LATER:
-            hypotheses |= self.frame.contracts(before, 1)
-            around |= self.frame.environment(1) | self.frame.memory(1)
-        elif phase is Phase.INITIAL:
-            around |= self.frame.initials(self.selected) | self.frame.blank()
-        spoken = free_variables(goal).union(*map(free_variables, hypotheses.values()))
-        hypotheses |= bearing(around, spoken, direct=not wide)
-        return hypotheses, goal
-
-    def own(self, consumer: str) -> Hypotheses:
-        """What a consumer assumes that stays assumed."""
-        names = (ClauseName(consumer, clause.name) for clause in self.frame.node(consumer).assumptions)
-        return {str(name): self.frame.clause(name.node, name.clause) for name in names if name in self.kept}
 
 
 def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:

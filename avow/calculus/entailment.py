@@ -1,37 +1,139 @@
-"""Entailment between clauses of contracts, helped where the solver's instantiation of quantifiers gives up.
+"""Entailment between clauses of contracts: asked once, and helped where the solver gives up on quantifiers.
 
 "There is a place around which all reports lie" follows from "there is exactly one place that is reported": the witness
 of the one serves for the other. Solvers with linear arithmetic do not find that by themselves, so it is put to them:
 an existential hypothesis holds of some values (its witnesses), and an existential goal is proved once it is proved of
-these. That is a stronger claim: when it fails, nothing is said, and the question is asked as it stands.
+these. That claim is stronger: if it fails, the original question is asked.
+
+Within `keeping`, answers of earlier runs serve again, so that after an edit only changed questions are put to the
+solver. An answer depends on the question alone: the hypotheses with their labels, the goal, effort and seed; or a
+script of the kernel. Proofs are kept, what the kernel was answered, and that hypotheses are too few. A side condition
+that does not hold is kept under its obligation's digest, and asked again only if it is requested. All of this only
+guides the search: the kernel decides whether a claim is proved, and asks everything itself in every run
+(`avow.pipeline.recheck`).
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import field
 
+from avow.base.codec import Unreadable, from_text, to_json
+from avow.base.files import sha256
+from avow.base.records import dataclass
 from avow.base.tuning.bounds import WITNESSES_TRIED
 from avow.base.tuning.effort import QUICK_EFFORT
+from avow.base.tuning.sizes import ANSWERS_KEPT
 from avow.base.verdict import Verdict
-from avow.calculus.kept_answers import entailed_before, keep_entailed
-from avow.formulas.formula import substitute
+from avow.formulas.formula import digest, substitute
+from avow.kernel.solvers import Said, ask_z3
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
+from avow.solving.translation import new_session
+
+
+@dataclass(frozen=True, slots=True)
+class NotProved:
+    """What is kept of a side condition that does not hold, or of a question."""
+
+    verdict: Verdict
+    used: tuple[str, ...] = ()
+    used_before: tuple[str, ...] = ()
+
+
+_Kept = tuple[tuple[str, ...], bool] | Said | NotProved
+
+
+@dataclass(slots=True)
+class KeptAnswers:
+    """`before`: what earlier runs left; `now`: what was used or found in this one. What a proof needs and whether its
+    premises contradict, what a solver said of a script, or that something was not proved."""
+
+    before: dict[str, _Kept] = field(default_factory=dict)
+    now: dict[str, _Kept] = field(default_factory=dict)
+    asked: int = 0
+    """Questions that were put to the solver."""
+
+    @classmethod
+    def read(cls, text: str) -> KeptAnswers:
+        """What cannot be read is nothing."""
+        try:
+            return cls(from_text(dict[str, _Kept], text))
+        except Unreadable:
+            return cls()
+
+    def written(self) -> str:
+        """For the next run: those of this one, and as many of the earlier ones as there is room for."""
+        return json.dumps(to_json(dict(list({**self.before, **self.now}.items())[-ANSWERS_KEPT:])))
+
+    def find(self, mark: str) -> _Kept | None:
+        found = self.now.get(mark) or self.before.pop(mark, None)
+        if found is not None:
+            self.now[mark] = found
+        return found
+
+
+_kept: ContextVar[KeptAnswers | None] = ContextVar("kept answers", default=None)
+
+
+@contextmanager
+def keeping(answers: KeptAnswers) -> Iterator[None]:
+    """What is asked within the block is looked up there first."""
+    token = _kept.set(answers)
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def kept_answers() -> KeptAnswers | None:
+    """The answers that are kept; None outside `keeping`."""
+    return _kept.get()
+
+
+def ask_once(script: str, budget: int) -> Said:
+    """As `avow.kernel.solvers.ask_z3`, where the question only is what the kernel will be answered."""
+    kept = _kept.get()
+    if kept is None:
+        return ask_z3(script, budget)
+    mark = sha256(f"{budget}\n{script}")
+    found = kept.find(mark)
+    if not isinstance(found, Said):
+        kept.asked += 1
+        found = ask_z3(script, budget)
+        if found in (Said.SAT, Said.UNSAT):
+            kept.now[mark] = found
+    return found
 
 
 def implied(
     hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0, whether: bool = False
 ) -> Entailment:
-    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length. What was
-    proved before is not asked again, within `avow.calculus.kept_answers.keeping`; nor what was refuted, where only
-    `whether` it is proved matters."""
-    mark, answer = entailed_before(hypotheses, goal, effort, seed, whether)
-    if answer is None:
-        answer = _implied(hypotheses, goal, effort, seed)
-        keep_entailed(mark, answer)
+    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length. A kept
+    refutation has no counterexample, and serves only where it matters `whether` the goal is proved."""
+    kept = _kept.get()
+    if kept is None:
+        return _implied(hypotheses, goal, effort, seed)
+    asked = [[label, digest(term)] for label, term in hypotheses.items()]
+    mark = sha256(json.dumps([asked, digest(goal), effort, seed]))
+    match kept.find(mark):
+        case (needed, vacuous):
+            return Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous)
+        case NotProved(verdict=verdict) if whether:
+            return Entailment(verdict)
+    kept.asked += 1
+    answer = _implied(hypotheses, goal, effort, seed)
+    if answer.verdict is Verdict.PROVED:
+        kept.now[mark] = answer.needed, answer.vacuous
+    elif answer.verdict is Verdict.REFUTED:
+        kept.now[mark] = NotProved(answer.verdict)
     return answer
 
 
+@new_session()
 def _implied(hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int) -> Entailment:
     quick = min(QUICK_EFFORT, effort)
     answer = entails(hypotheses, goal, effort=quick, seed=seed)

@@ -1,4 +1,4 @@
-"""Finds certificates for what the engine has settled. Nothing here is trusted: `avow.kernel.check` decides.
+"""Finds certificates for what the calculus has proved. Nothing here is trusted: `avow.kernel.check` decides.
 
 A certificate of a scope (the nodes of a derivation, or all) shows each assumption of a node by an instance of the
 theorem in `proofs/instances.dfy`:
@@ -9,13 +9,13 @@ theorem in `proofs/instances.dfy`:
 - an assumption that stays assumed, and subsystems: `Derived` (an open entry). A subsystem is flattened: its nodes'
   clauses are the entries.
 
-The premises that the engine's proof names are tried first, then ever wider ones, from which an unsatisfiable core is
+The premises that the proof names are tried first, then all that is established, from which an unsatisfiable core is
 taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from avow.base.optional import complete
@@ -85,8 +85,6 @@ class Finder:
     scope: str
     nodes: Sequence[str]
     """Providers before consumers, as far as there is such an order."""
-    ancestors: Callable[[str], frozenset[str]]
-    """The nodes from which values flow to a node within one step."""
     delayed: bool
     open: frozenset[str]
     hints: Mapping[str, Hint]
@@ -95,7 +93,7 @@ class Finder:
     goals: tuple[Statement, ...] = ()
     """Requirements, to be shown after everything else."""
     lemmas: tuple[tuple[str, ...], ...] = ()
-    """Invariants that nobody wrote down, of which there are claims as well: to be shown before the goals."""
+    """Invariants that were found, with claims of their own: to be shown before the goals."""
     solvers: Solvers = field(default_factory=Solvers)
     _proofs: dict[Item, _Proof] = field(default_factory=dict)
     _now: dict[str, Item] = field(default_factory=dict)
@@ -210,20 +208,10 @@ class Finder:
     def proofs(self, item: Item, done: Mapping[Item, None]) -> Iterator[_Proof | None]:
         hint = self.hints.get(item.label)
         yield self.hinted(item, hint, done) if hint is not None else None
-        near = self.near(item, done)
-        for now in (near, list(done)) if len(near) < len(done) else (near,):
-            yield self.same_step(item, now)
+        yield self.same_step(item, list(done))
         if self.delayed:
             for depth in range(1, DEEPEST_INDUCTION + 1):
                 yield self.inductive(item, list(done), depth)
-
-    def near(self, item: Item, done: Mapping[Item, None]) -> list[Item]:
-        behind = self.ancestors(item.claim.node) if item.claim.node else frozenset(self.nodes)
-        return [
-            i
-            for i in done
-            if i.how in (How.ENVIRONMENT, How.DEFINED) or i.claim.node in behind or i.claim.node == item.claim.node
-        ]
 
     def hinted(self, item: Item, hint: Hint, done: Mapping[Item, None]) -> _Proof | None:
         """The premises that the engine's proof names."""

@@ -1,14 +1,14 @@
 """Where one step of induction fails: more steps, from the initial values and backwards, or an invariant.
 
-That a claim need not be kept by a step from *some* state says nothing yet: the state may never be reached. So the steps
-are unrolled from the initial values: a run that gets to a state in which the claim is false refutes it. And the claim
-may be kept by every step that comes after several at which it held (k-induction; Sheeran, Singh and Stålmarck 2000).
-It is the theorem itself (`Sound` in proofs/kernel.dfy), with as many base questions as steps.
-Where neither is found, the claim is unknown, and the state that induction stumbled on is shown as just that.
+If a step from *some* state breaks a claim, the claim is not yet refuted: the state may be unreachable. So the steps are
+unrolled from the initial values, and a run to a state in which the claim is false refutes it. Or every step after
+several steps with the claim preserves it (k-induction; Sheeran, Singh and Stålmarck 2000): this is the theorem itself
+(`Sound` in proofs/kernel.dfy), with as many base questions as steps. Otherwise the claim is unknown, and the state at
+which induction fails is shown.
 
-Invariants that nobody wrote down Z3's Spacer only finds (`avow.solving.invariants`). One counts where it is true at the
-first step, is kept by every step, and implies the claim at the next; it is then an entry of the certificate like any
-other, which the kernel establishes by its own questions.
+Z3's Spacer suggests invariants (`avow.solving.invariants`). One is used if it is true at the first step, every step
+preserves it, and it implies the claim at the next; it is then an entry of the certificate like any other, which the
+kernel establishes by its own questions.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Deeper:
     """Of the proof, how many steps before; of the run, its length."""
     engine: str = ""
     by: tuple[str, ...] = ()
-    """An invariant that nobody wrote down, by which it is proved."""
+    """An invariant that was found, by which it is proved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ def label(written: Written) -> str:
 
 
 def in_words(frame: Frame, written: Written) -> str:
-    """An invariant for people: what is remembered is told by the record that it is kept for."""
+    """An invariant for people: a state variable is written as the record that it is kept for."""
     cells = {called: (node, cell) for of in ("", *frame.observed) for node, called, cell in frame.own_cells(of)}
     names = [name.partition(".")[2] for name in written[1:]]
     return _named(written, [_remembered(frame, *cells[name]) if name in cells else name for name in names])
@@ -284,11 +284,11 @@ def read(written: Written, contract: Contract, wiring: Wiring) -> Term | None:
     return substitute(term, {Variable(Role.BOUND, name, v.sort): v for name, v in meant.items()})
 
 
-def with_lemmas(told: Wiring, contract: Contract, lemmas: Iterable[Written]) -> Wiring:
+def with_lemmas(system: Wiring, contract: Contract, lemmas: Iterable[Written]) -> Wiring:
     """A system with the claims of some lemmas: of those that say something of it as it is now."""
-    found = ((label(each), read(each, contract, told)) for each in lemmas)
+    found = ((label(each), read(each, contract, system)) for each in lemmas)
     more = tuple((Claimed.REQUIREMENT, "", name, term) for name, term in found if term is not None)
-    return replace(told, formulas=(*told.formulas, *more))
+    return replace(system, formulas=(*system.formulas, *more))
 
 
 def _inputs(frame: Frame) -> Mapping[Variable, str]:

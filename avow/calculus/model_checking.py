@@ -21,15 +21,14 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.base.verdict import bound as named
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, TooLong, demands_progress, refuted_at, refuted_prefix, violation
-from avow.calculus.node_outputs import Doubts, Stuck, judge
-from avow.calculus.open_values import Holds
+from avow.calculus.narrowing import Holds
+from avow.calculus.node_outputs import Stuck
 from avow.calculus.questions import Answer
 from avow.calculus.replaying import completions, holds, truths, unsupported
 from avow.calculus.scenario import CannotRun, key, restrictions
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
-from avow.language.terms import Term
 from avow.solving.limits import spent, tried, until
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
 
@@ -42,6 +41,8 @@ class Explored:
 
     machine: Machine
     judges: dict[State, Holds]
+    deepest: int | None
+    """Steps after which a run is no longer followed; None: no such limit."""
     steps: list[Step] = field(default_factory=list)
     index: dict[object, int] = field(default_factory=dict)
     following: dict[_Memory, tuple[int, ...]] = field(default_factory=dict)
@@ -96,90 +97,51 @@ class Explored:
 def judge_property(machine: Machine, name: str, formula: Property, bounds: Bounds) -> Answer:
     """Whether every run of the composed contracts has the property, within the scenario. Raises CannotRun: see
     `cannot_run`."""
-    found = _tried(machine, name, formula, bounds)
-    if found is not None:
-        return found
-    explored = _begin(machine, formula)
-    stopped = explored.cannot_start is not None and demands_progress(formula)
-    done = stopped or _explore(explored, formula, bounds)
+    return _tried(machine, name, formula, bounds) or explored(
+        machine, name, formula, bounds, machine.world.scenario.steps
+    )
+
+
+def explored(machine: Machine, name: str, formula: Property, bounds: Bounds, deepest: int | None) -> Answer:
+    """As `judge_property`, from the steps that are reached, nearest first; no run is followed for more than `deepest`
+    steps."""
+    found = _begin(machine, formula, deepest)
+    stopped = found.cannot_start is not None and demands_progress(formula)
+    done = stopped or _explore(found, formula, bounds)
     if isinstance(done, Lasso):
-        answer = _broken(explored, name, formula, done)
-        bad = _prefix(explored, formula, bounds) if answer.verdict is not Verdict.REFUTED else None
-        return answer if bad is None else _broken_prefix(explored, name, formula, bad)
+        answer = _broken(found, name, formula, done)
+        bad = _prefix(found, formula, bounds) if answer.verdict is not Verdict.REFUTED else None
+        return answer if bad is None else _broken_prefix(found, name, formula, bad)
     if isinstance(done, tuple):
-        return _broken_prefix(explored, name, formula, done)
-    if explored.cannot_start is not None and stopped:
-        told = f"the system cannot take a first step: {explored.cannot_start.text()}"
-        verdict = Verdict.REFUTED if explored.cannot_start.genuine else Verdict.UNKNOWN
-        return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
-    within = restrictions(explored.machine.world)
+        return _broken_prefix(found, name, formula, done)
+    if found.cannot_start is not None and stopped:
+        text = f"the system cannot take a first step: {found.cannot_start.text()}"
+        verdict = Verdict.REFUTED if found.cannot_start.genuine else Verdict.UNKNOWN
+        return Answer(verdict, text, Counterexample(explanation=text), bound=_bound(found))
+    within = restrictions(found.machine.world)
     if done and not machine.short:
         machine.look_for_cuts(until(bounds.effort))
     if done and not machine.short:
         return Answer(
             Verdict.CHECKED,
-            f"every run within the scenario has it: {len(explored.steps)} kinds of steps, all looked at",
+            f"every run within the scenario has it: {len(found.steps)} kinds of steps, all looked at",
             within=within,
-            bound=_bound(explored),
+            bound=_bound(found),
             details={"exhaustive": True},
         )
-    why = "; ".join(machine.short) or _ended_by(explored, bounds)
+    why = "; ".join(machine.short) or _ended_by(found, bounds)
     if demands_progress(formula):
         why += "; that what it demands never comes can only be shown by a run that repeats or stops, and none was found"
     return Answer(
         Verdict.TESTED,
-        f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
+        f"no run of the first {found.depth} steps was found to break it; not exhaustive: {why}",
         within=(
             *within,
-            named("scenario.steps", f"scenario.steps: no run breaks it after its first {explored.depth} steps"),
+            named("scenario.steps", f"scenario.steps: no run breaks it after its first {found.depth} steps"),
         ),
-        bound=_bound(explored) | {"n": len(explored.steps)},
+        bound=_bound(found) | {"n": len(found.steps)},
         details={"exhaustive": False},
     )
-
-
-def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tuple[Answer | None, str]:
-    """The shortest run over the scenario at whose last step a claim is false, and nothing about it is in doubt: every
-    clause was evaluated exactly at every step. Else, in words, how far it was looked for."""
-    doubts = Doubts()
-    holds = judge(machine.world, claim, doubts=doubts, about=name)
-    end = until(bounds.effort)
-    before: dict[_Memory, tuple[_Memory, Step] | None] = {}
-    try:
-        before |= dict.fromkeys(machine.initial())
-        waiting = deque(before)
-        while waiting:
-            if spent() > end or len(before) > STATES_CHECKED:
-                return None, f"no run of the {len(before)} kinds of steps looked at over the scenario makes it false"
-            memory = waiting.popleft()
-            for step in machine.judged(memory, (holds,)):
-                if not holds(step.values):
-                    steps = [step]
-                    while (last := before[memory]) is not None:
-                        memory, earlier = last
-                        steps.insert(0, earlier)
-                    return _false_at_the_end(machine, name, claim, steps, doubts), ""
-                if step.memory not in before:
-                    before[step.memory] = (memory, step)
-                    waiting.append(step.memory)
-    except CannotRun:
-        return None, ""
-    allowed = "that the scenario allows" if not (machine.short or doubts.inexact) else "looked at over the scenario"
-    return None, f"no run of the {len(before)} kinds of steps {allowed} makes it false"
-
-
-def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step], doubts: Doubts) -> Answer | None:
-    if doubts.inexact or any(True for _ in unsupported(machine, steps, None)):
-        return None
-    spoken = [v.qualified for v in sorted(free_variables(claim), key=lambda v: v.qualified)]
-    outputs = [f"{node}.{port.name}" for node in machine.order for port in machine.frame.node(node).outputs]
-    names = list(dict.fromkeys([*spoken, *outputs]))[:STEP_VARIABLES]
-    trace = tuple(step.shown([n for n in names if n not in machine.constants]) for step in steps)
-    told = f"{name} is false at step {len(steps)} of a run of the composed contracts"
-    told += _on_the_way(steps)
-    bound: dict[str, object] = {"steps": len(steps), "scenario": machine.world.scenario.content}
-    shown = Counterexample(trace[-1], told, trace)
-    return Answer(Verdict.REFUTED, told, shown, bound=bound, details={"genuine": True, "run": len(steps)})
 
 
 def _on_the_way(steps: Sequence[Step]) -> str:
@@ -229,8 +191,8 @@ def _judges(machine: Machine, formula: Property) -> dict[State, Holds]:
     return {state: machine.judge(system_term(machine.frame, state.term)) for state in states_of(formula)}
 
 
-def _begin(machine: Machine, formula: Property) -> Explored:
-    explored = Explored(machine, _judges(machine, formula))
+def _begin(machine: Machine, formula: Property, deepest: int | None) -> Explored:
+    explored = Explored(machine, _judges(machine, formula), deepest)
 
     found: dict[int, None] = {}
     for memory in machine.initial():
@@ -248,8 +210,7 @@ def _begin(machine: Machine, formula: Property) -> Explored:
 def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | tuple[int, ...] | bool:
     """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
     deadline = until(bounds.effort)
-    scenario = explored.machine.world.scenario
-    deepest = scenario.steps
+    deepest = explored.deepest
     next_look, stuck_seen, cut = 64, 0, False
     while explored.waiting:
         memory, depth = explored.waiting.popleft()
@@ -283,7 +244,7 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | t
 
 def _ended_by(explored: Explored, bounds: Bounds) -> str:
     """Which limit ended the search."""
-    deepest = explored.machine.world.scenario.steps
+    deepest = explored.deepest
     if deepest is not None and explored.depth >= deepest:
         return f"the scenario's `steps` end a run after {deepest}"
     if len(explored.steps) > STATES_CHECKED:
@@ -337,28 +298,27 @@ def _shown_run(
     false = _false_at(machine, formula, steps)
     bad = _refuted_at(steps, formula, _judges(machine, formula)) if false is None and back is None else None
     if stuck is not None:
-        told = f"stuck after step {len(steps)}: {stuck.text()}"
+        text = f"stuck after step {len(steps)}: {stuck.text()}"
     elif false is not None:
-        told = f"at step {false + 1} it is false"
+        text = f"at step {false + 1} it is false"
         steps, trace, back = steps[: false + 1], trace[: false + 1], None
     else:
         if bad is not None:
             steps, trace = steps[: bad + 1], trace[: bad + 1]
-        told = (
+        text = (
             f"from step {back + 1} on, the run repeats"
             if back is not None
             else f"after step {len(steps)} nothing can mend it"
         )
-    told += _on_the_way(steps)
-    shown = Counterexample(trace[-1] if trace else (), told, trace, back)
+    text += _on_the_way(steps)
+    shown = Counterexample(trace[-1] if trace else (), text, trace, back)
     if stuck is not None and not stuck.genuine:
         doubt = "perhaps only because the scenario lacks the value"
     else:
         doubt = _doubt(machine, formula, steps, back, stays=stuck is not None, cut=false is not None or back is None)
     if doubt:
-        summary = f"{told}: {doubt}"
-        return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
-    return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {told}", shown, bound=bound)
+        return Answer(Verdict.UNKNOWN, f"{text}: {doubt}", shown, bound=bound, details={"exhaustive": False})
+    return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {text}", shown, bound=bound)
 
 
 def _doubt(
@@ -407,11 +367,11 @@ def _interesting(machine: Machine, formula: Property) -> list[str]:
 
 def cannot_run(frame: Frame, name: str, formula: Property, reason: CannotRun) -> Answer:
     """The answer where the contracts cannot be run: a system that never takes a step does nothing that is demanded."""
-    told = str(reason)
-    if frame.graph.deadlocks and demands_progress(formula) and told.startswith("start-up deadlock"):
-        summary = f"no run ever takes a step, so {name} is not met: {told}"
-        return Answer(Verdict.REFUTED, summary, Counterexample(explanation=told))
-    return Answer(Verdict.UNKNOWN, f"the contracts cannot be run over the scenario: {told}")
+    text = str(reason)
+    if frame.graph.deadlocks and demands_progress(formula) and text.startswith("start-up deadlock"):
+        summary = f"no run ever takes a step, so {name} is not met: {text}"
+        return Answer(Verdict.REFUTED, summary, Counterexample(explanation=text))
+    return Answer(Verdict.UNKNOWN, f"the contracts cannot be run over the scenario: {text}")
 
 
 def _bound(explored: Explored) -> dict[str, object]:

@@ -8,13 +8,24 @@ runs off: which outputs that its contract allows were not looked at (`first_cut`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 from avow.base.tuning.effort import CUT_EFFORT
-from avow.calculus.choices import Values, by_variable, definition, search
-from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
-from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
+from avow.calculus.narrowing import (
+    ANY,
+    Choices,
+    Holds,
+    Narrowing,
+    Undecided,
+    Unknown,
+    Values,
+    forcings,
+    is_open,
+    lazy_names,
+    opened,
+)
 from avow.calculus.scenario import CannotRun, Point, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.formulas.formula import free_variables, substitute
@@ -22,12 +33,91 @@ from avow.formulas.values import FunctionValue, SequenceValue, Value, show
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import BOOL, FunctionSort, NaturalSort, OpaqueSort, SequenceSort, Sort
 from avow.language.subterms import ports_of
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.checking import put
 from avow.solving.limits import spent
 from avow.solving.models import Model
-from avow.solving.translation import Meaning, Translator, Unsupported
+from avow.solving.translation import Meaning, Translator, Unsupported, new_session
 from avow.solving.z3_module import z3
+
+
+def by_variable(node: Node, values: Values) -> dict[Variable, Value]:
+    ports = {p.variable.qualified: p.variable for p in (*node.inputs, *node.outputs)}
+    return {ports[name]: value for name, value in values.items() if name in ports}
+
+
+def definition(guarantees: Sequence[Clause], port: Port) -> tuple[tuple[Variable, ...], Term] | None:
+    """``forall(x | out.p(x) <=> body)`` gives x and body, if body does not speak of outputs."""
+    for clause in guarantees:
+        formula = clause.formula
+        if not (isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL):
+            continue
+        if not isinstance(formula.body, Iff):
+            continue
+        for head, body in ((formula.body.left, formula.body.right), (formula.body.right, formula.body.left)):
+            applied = isinstance(head, Apply) and head.function == port.variable and head.arguments == formula.variables
+            if applied and all(v.role is not Role.OUTPUT for v in free_variables(body)):
+                return formula.variables, body
+    return None
+
+
+def search(
+    relations: Sequence[tuple[Port, tuple[Point, ...]]],
+    plain: Sequence[tuple[Port, tuple[Value, ...]]],
+    constraints: Sequence[Term],
+    known: Mapping[Variable, Value],
+    seed: int,
+    effort: int,
+) -> tuple[list[Values], bool]:
+    """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
+
+    Says too whether these are all. Raises CannotRun where Z3 cannot decide.
+    """
+    translator = Translator()
+    solver = z3.Solver(ctx=translator.context)
+    try:
+        meanings: dict[Variable, Any] = {v: translator.value(value, v.sort) for v, value in known.items()}
+        bits: list[tuple[Port, Point, Any]] = []
+        for port, points in relations:
+            assert isinstance(port.sort, FunctionSort)
+            rows = []
+            for k, point in enumerate(points):
+                bit = z3.Bool(f"{port.name}#{k}", translator.context)
+                bits.append((port, point, bit))
+                rows.append(([translator.value(x, s) for x, s in zip(point, port.sort.parameters, strict=True)], bit))
+            meanings[port.variable] = translator.table(rows, z3.BoolVal(False, translator.context))
+        chosen = []
+        for port, values in plain:
+            constant = translator.variable(port.variable)
+            solver.add(z3.Or([constant == translator.value(value, port.sort) for value in values]))
+            chosen.append((port, constant))
+        solver.add(*(translator.term(constraint, meanings) for constraint in constraints))
+        found: list[Values] = []
+        while True:
+            said = put(translator, solver, effort, seed)
+            if said.status == "unsat":
+                return found, True
+            if said.status != "sat":
+                raise CannotRun(f"the solver cannot decide which outputs are allowed: {said.reason}")
+            if len(found) >= CHOICES_FOUND:
+                return found, False
+            model = solver.model()
+            reader = Model(translator, model)
+            answer: Values = {port.name: reader.read(constant, port.sort) for port, constant in chosen}
+            literals = [constant != model.eval(constant, model_completion=True) for _, constant in chosen]
+            tables: dict[str, dict[tuple[Value, ...], Value]] = {port.name: {} for port, _ in relations}
+            for port, point, bit in bits:
+                truth = z3.is_true(model.eval(bit, model_completion=True))
+                literals.append(z3.Not(bit) if truth else bit)
+                if truth:
+                    tables[port.name][point] = True
+            answer.update({name: FunctionValue(table, False) for name, table in tables.items()})
+            found.append(answer)
+            solver.add(z3.Or(literals) if literals else z3.BoolVal(False, translator.context))
+    except Unsupported as what:
+        raise CannotRun(f"Avow cannot express {what.what} for the solver") from None
+    except z3.Z3Exception as error:
+        raise CannotRun(f"Z3: {error}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,7 +396,7 @@ class Answerer:
 
 
 def _given(translator: Translator, solver: z3.Solver, node: Node, inputs: Values) -> dict[Variable, Meaning]:
-    """What the inputs are; what is decided of open ones is told to the solver."""
+    """The values of the inputs; what is decided of open ones goes to the solver."""
     meanings: dict[Variable, Meaning] = {}
     for variable, value in by_variable(node, inputs).items():
         if is_open(value):
@@ -336,23 +426,22 @@ def _known_of(translator: Translator, variable: Variable, value: Value) -> list[
 # -- what the scenario leaves out --------------------------------------------------------------------------------------
 
 
+@new_session()
 def first_cut(node: Answerer, deadline: float) -> str:
     """In words, the first inputs at which an allowed output of a node was not looked at; nothing where all were.
 
-    An answer that the scenario leaves out may lead on to steps that nobody has looked at. The solver knows the contract
-    without the scenario: if it finds an output beside the ones that were found, or cannot exclude one, the search is
-    not exhaustive. Functions and sequences are asked about at the points at which they were decided; relations, whose
-    points the scenario gives, are not.
+    An answer that the scenario leaves out may lead to unexplored steps. The solver knows the contract without the
+    scenario: if it finds another output, or cannot exclude one, the search is not exhaustive. The question covers
+    functions and sequences at the points at which they were decided, and no relations: the scenario gives their points.
     """
     ports = [port for port in node.others.values() if is_restricted(node, port)]
     if not ports:
         return ""
-    shared = Translator()
     for index, inputs in node.asked.items():
         if spent() > deadline:
             return f"too many inputs to see whether {node.node.name} may answer otherwise than the scenario has it"
         free = bool(node.broken(inputs))
-        found = _other(Translator(shared), node, ports, inputs, node.found(index), free)
+        found = _other(node, ports, inputs, node.found(index), free)
         if found is not None:
             given = ", ".join(f"{name} = {show(value)}" for name, value in inputs.items() if name in node.read)
             where = f" at the step with {given}" if given else ""
@@ -360,10 +449,9 @@ def first_cut(node: Answerer, deadline: float) -> str:
     return ""
 
 
-def _other(
-    translator: Translator, node: Answerer, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool
-) -> str | None:
+def _other(node: Answerer, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
     """An output beside the ones found, as far as it is known; None if there is none."""
+    translator = Translator()
     solver = z3.Solver(ctx=translator.context)
     try:
         meanings = _given(translator, solver, node.node, inputs)

@@ -1,7 +1,7 @@
-"""Composition and requirement obligations: what has to be shown for the system's derivations to stand.
+"""Composition and requirement obligations: what has to be shown for the system's derivations to hold.
 
 Each obligation is made from a `Task`, which says how it is settled (`avow.calculus.discharge` asks the solver). What an
-answer rests on is told as other obligations, which the case then asks for.
+answer rests on is given as other obligations, which the assurance case then requires.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from avow.base.verdict import Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, composed
-from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
+from avow.calculus.derivation import Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds, Claim
 from avow.calculus.questions import Answer
 from avow.calculus.requirements import requirement_question, supports
@@ -34,9 +34,9 @@ from avow.kernel.check import Established, Needed
 from avow.kernel.statements import Claimed
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
-from avow.sanity.claims import triggers
+from avow.sanity.claims import node_key, triggers
 from avow.solving.limits import effort_told
-from avow.system.plan import Endpoint, System
+from avow.system.plan import System
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,10 @@ class Task:
 
     @property
     def because(self) -> str:
-        """The plan's reason, which is all that settles it: no part of what it says. Empty where a question does."""
-        return self.ask.because if isinstance(self.ask, questions.ArgumentQuestion) else ""
+        """The plan's reason, which answers it: no part of the claim. Empty where a question alone does."""
+        return (
+            self.ask.because if isinstance(self.ask, questions.ArgumentQuestion | questions.EnvironmentQuestion) else ""
+        )
 
 
 def composition_obligations(system: System) -> tuple[Obligation, ...]:
@@ -180,31 +182,31 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
 
 def _environment_tasks(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
+    together = node_key(composition.surroundings)
+    read = sorted({endpoint.node for endpoint in frame.graph.environment})
+    readers = sha256("\n".join(map(composition.meanings.node, read)))
     for assumed in frame.assumed:
         yield _task(
             frame,
             f"environment.{assumed.port}",
             f"the environment gives {assumed.port} as assumed",
-            ("environment", composition.meanings.environment([assumed.port])),
-            questions.ArgumentQuestion("environment", assumed.because, "environment"),
+            ("environment", composition.meanings.environment([assumed.port]), together, readers),
+            questions.EnvironmentQuestion(assumed.because, f"environment {assumed.port}"),
             formula=show_term(assumed.formula),
             span=next(e for e in frame.system.plan.environment if e.port == assumed.port).span,
         )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
-    for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in composition.whole.root.assumed):
+    for name, ports in composition.left_to_environment():
         node = frame.node(name.node)
         clause = node.clause(name.clause)
-        ports = [v.name for v, _ in frame.behind(name.node, clause.formula)]
-        if not ports or any(Endpoint(name.node, port) in frame.graph.by_target for port in ports):
-            continue
         given = [reasons.get(frame.entry(name.node, port)) or "" for port in ports]
         because = "; ".join(dict.fromkeys(given)) if all(given) else ""
         yield _task(
             frame,
             f"environment.{name}",
             f"the environment meets what {name.node} assumes in {name.clause}",
-            ("environment", digest(frame.clause(name.node, name.clause))),
-            questions.ArgumentQuestion("environment", because, "environment"),
+            ("environment", digest(frame.clause(name.node, name.clause)), together),
+            questions.EnvironmentQuestion(because),
             formula=show_clause(clause, node),
             clauses=(str(name),),
             span=clause.span,
@@ -401,7 +403,7 @@ class _Resting:
         if obligation is not None:
             return Hypothesis(HypothesisKind.CLAIM, obligation.local_id, obligation.digest)
         return Hypothesis(
-            HypothesisKind.SUPPOSITION, f"{SYSTEM_LEVEL}/supposition/{name}", sha256(name), f"nothing settles {name}"
+            HypothesisKind.ASSUMPTION, f"{SYSTEM_LEVEL}/assumption/{name}", sha256(name), f"nothing settles {name}"
         )
 
     def together(self, nodes: Iterable[str], goal: str | None, *, optional: bool = False) -> tuple[Hypothesis, ...]:

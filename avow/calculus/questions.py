@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from typing import Protocol, assert_never
 
@@ -10,6 +10,7 @@ from avow.base.files import sha256
 from avow.base.optional import complete
 from avow.base.plain import listed
 from avow.base.records import dataclass
+from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
@@ -22,6 +23,7 @@ from avow.calculus.wiring import start_name
 from avow.formulas.formula import negation
 from avow.kernel.check import Established
 from avow.language.printer import show_term
+from avow.language.subterms import ports_of
 from avow.sanity.claims import triggers
 from avow.solving.questions import solve
 from avow.solving.sizes import in_every_size
@@ -89,16 +91,16 @@ class SideQuestion:
 
 
 def certified(answer: Answer, found: Established | None, *, late: bool, fallen: Sequence[str] = ()) -> Answer:
-    """A proof of the engine, as far as the kernel establishes it. Where it does not, and the clock ended a question to
-    Z3 (`late`), no answer is given: it would be another on a quicker machine. `fallen`: side conditions that do not
-    stand, which may be why."""
+    """A proof that was found, if the kernel establishes it. If it does not, and a question to Z3 ran out of time
+    (`late`), the verdict is `error`: a faster machine might answer. `fallen`: side conditions that do not hold, which
+    may be why."""
     if found is None:
-        told = f"the engine finds that it {answer.summary}; the kernel could not establish it"
+        text = f"a proof was found ({answer.summary}), but the kernel could not establish it"
         if fallen:
-            told += f": what rests on these may not be used, they do not stand: {listed(fallen, 3)}"
+            text += f": these side conditions do not hold, and nothing may rest on them: {listed(fallen, 3)}"
         if late:
-            told += ": the clock ended a question to Z3 before its own steps did, ask again"
-        return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=told, vacuous=False)
+            text += ": a question to Z3 ran out of time before it ran out of steps; run again"
+        return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=text, vacuous=False)
     details = answer.details | {"certificate": {"key": found.key, "solvers": found.solvers}}
     return replace(answer, established=found, details=details)
 
@@ -340,15 +342,54 @@ class ArgumentQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         if self.because:
             return Answer(Verdict.JUSTIFIED, self.because, link=Link.GUIDED)
-        if self.key == "environment":
-            where = "environment: {in.<port>: {assume: …, because: …}}"
-        else:
-            where = f"compose: {{{self.goal}: {{{self.key}: {{because: …}}}}}}"
-        return Answer(
-            Verdict.UNKNOWN,
-            f"the plan gives no reason for it, so that what follows is conditional (to say why: {where})",
-            link=Link.GUIDED,
-        )
+        return _without_reason(f"compose: {{{self.goal}: {{{self.key}: {{because: …}}}}}}")
+
+
+def _without_reason(where: str) -> Answer:
+    text = f"the plan gives no reason for it, so that what follows is conditional (to say why: {where})"
+    return Answer(Verdict.UNKNOWN, text, link=Link.GUIDED)
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentQuestion:
+    """Has the plan a reason for what it assumes of the environment? Can all that is assumed of it together go on for
+    ever, and can what each guarantee is about still come about? Else what follows from it says nothing."""
+
+    because: str
+    label: str = ""
+    """Of what the plan assumes (`Frame.environment`); none where it is a node's own assumption."""
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        if not self.because:
+            return _without_reason("environment: {in.<port>: {assume: …, because: …}}")
+        found = composition.lasting(bounds)
+        if found.verdict is Verdict.REFUTED:
+            text = f"vacuous: no environment meets for ever all that is assumed of it: {found.explanation}"
+            return Answer(Verdict.JUSTIFIED, text, link=Link.GUIDED, vacuous=True)
+        if not found.verdict.supports:
+            text = f"whether an environment can meet for ever all that is assumed of it is open: {found.explanation}"
+            return Answer(found.verdict, text, link=Link.GUIDED)
+        excluded = next(self._excluded(composition.frame), None) if self.label else None
+        if excluded is None:
+            excluded = next(iter(composition.excluded_over_runs(bounds)), None)
+        if excluded is not None:
+            text = f"vacuous: what {excluded} is about can never come about where this is so"
+            return Answer(Verdict.JUSTIFIED, text, link=Link.GUIDED, vacuous=True)
+        return Answer(Verdict.JUSTIFIED, self.because, link=Link.GUIDED)
+
+    def _excluded(self, frame: Frame) -> Iterator[str]:
+        """The guarantees whose condition this keeps from coming about, which their nodes' contracts do not."""
+        environment = frame.environment()
+        about = ports_of(environment[self.label])
+        for node in frame.graph.nodes:
+            for guarantee in frame.node(node).guarantees:
+                for situation in triggers(frame.clause(node, guarantee.name)):
+                    if not set(about) & set(ports_of(situation)):
+                        continue
+                    known = frame.contracts((node,)) | environment | frame.memory()
+                    answer = implied(known, negation(situation), effort=DEFEAT_EFFORT)
+                    if answer.verdict is Verdict.PROVED and self.label in answer.needed:
+                        yield f"{node}.{guarantee.name}"
 
 
 # -- joint models ------------------------------------------------------------------------------------------------------
@@ -365,7 +406,7 @@ class JointQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         frame = composition.frame
         if frame.left_out:
-            return Answer(Verdict.UNKNOWN, f"whether there is room cannot be told: {_not_kept_to(frame)}")
+            return Answer(Verdict.UNKNOWN, f"it is unknown whether there is room: {_not_kept_to(frame)}")
         hypotheses = frame.contracts(self.members) | frame.environment() | frame.memory()
         about = f"{self.node}.{self.clause}"
         shown: list[str] = []

@@ -17,8 +17,6 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import requirement_scope
 from avow.calculus.composition import Composition, composed_over
 from avow.calculus.discharge import Bounds
-from avow.calculus.entailment import implied
-from avow.calculus.finder import Finder, Hint
 from avow.calculus.questions import Answer
 from avow.calculus.requirements import formula_question
 from avow.calculus.variables import framed
@@ -29,8 +27,7 @@ from avow.formulas.temporal.clock import one_step
 from avow.formulas.traversal import transform
 from avow.formulas.written import show_values
 from avow.kernel.certificate import Certificate, How
-from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.statements import Claimed, Place, Statement, Wiring, statements
+from avow.kernel.statements import Claimed
 from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.printer import show_type
 from avow.language.sorts import DataSort, Sort, parts, rebuilt
@@ -115,43 +112,54 @@ def refines(
     if faults:
         return Refinement(concrete.name, abstract.name, faults, ())
     concrete, abstract = _of_same_ports(concrete, abstract)
+    answers, certificates = _answered(concrete, abstract, bounds)
+    clauses = [(concrete.name, c) for c in concrete.assumptions] + [(abstract.name, c) for c in abstract.guarantees]
+    demands = tuple(_demand(concrete, *asked, answer) for asked, answer in zip(clauses, answers, strict=True))
+    found = Refinement(concrete.name, abstract.name, (), demands, certificates=certificates)
+    return _realized(found, concrete, abstract, bounds) if found.verdict is Verdict.PROVED else found
+
+
+def _demand(concrete: Node, node: str, clause: Clause, answer: Answer) -> Demand:
+    needed = tuple(map(str, answer.details.get("needed", ())))  # type: ignore[call-overload]
+    vacuous = answer.vacuous or (answer.established is not None and answer.established.vacuous)
+    shown = answer.counterexample
+    if shown is not None:  # state variables follow from the ports
+        own = f"{concrete.name}."
+        values = tuple(
+            (f"out.{name.removeprefix(own)}" if name.startswith(own) else name, value)
+            for name, value in shown.values
+            if CELL not in name
+        )
+        shown = replace(shown, values=values)
+    return Demand(node, clause, answer.verdict, needed, shown, answer.summary, vacuous)
+
+
+def _realized(found: Refinement, concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
+    """A refinement, and whether `concrete` has an output for every input that `abstract` allows, for ever."""
     if remembers(concrete) or remembers(abstract):
-        return _over_runs(concrete, abstract, bounds)
-    given = {f"{abstract.name}.{a.name} (assumed)": a.formula for a in abstract.assumptions}
-    demands: list[Demand] = []
-
-    def ask(node: str, clause: Clause, goal: Term, hypotheses: dict[str, Term]) -> None:
-        answer = implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)
-        shown = answer.counterexample
-        if shown is not None:
-            shown = Counterexample(shown.values, f"{node}.{clause.name} is false")
-        demands.append(Demand(node, clause, answer.verdict, answer.needed, shown, answer.reason, answer.vacuous))
-
-    for clause in concrete.assumptions:
-        ask(concrete.name, clause, clause.formula, given)
-    offered = given | {f"{concrete.name}.{a.name} (assumed)": a.formula for a in concrete.assumptions}
-    offered |= {f"{concrete.name}.{g.name}": g.formula for g in concrete.guarantees}
-    for clause in abstract.guarantees:
-        ask(abstract.name, clause, clause.formula, offered)
-    found = _certified(Refinement(concrete.name, abstract.name, (), tuple(demands)), concrete, abstract)
-    return _kept_by_something(found, concrete, abstract, bounds) if found.verdict is Verdict.PROVED else found
-
-
-def _certified(found: Refinement, concrete: Node, abstract: Node) -> Refinement:
-    """A refinement as far as the kernel establishes it."""
-    if found.verdict is not Verdict.PROVED:
-        return found
-
-    certificate, shown = _established(concrete, abstract)
-    demands = []
-    for at, demand in enumerate(found.demands):
-        kind = Claimed.ASSUMPTION if at < len(concrete.assumptions) else Claimed.REQUIREMENT
-        one = shown.get((kind, demand.clause.name))
-        if one is None:
-            why = "the engine finds that it follows; the kernel could not establish it"
-            demand = replace(demand, verdict=Verdict.UNKNOWN, reason=why)
-        demands.append(demand)
-    return replace(found, demands=tuple(demands), certificates=(certificate,))
+        asked = replace(concrete, inputs=abstract.inputs, assumptions=abstract.assumptions)
+        lasting = viable(one_step(asked), effort=2 * bounds.effort, seed=bounds.seed)
+        what = f"a run after which no output of {concrete.name} meets what it guarantees"
+        verdict, reason, run = lasting.verdict, lasting.reason, lasting.run or Counterexample((), what)
+    else:
+        answer = realizable(
+            tuple(port.variable for port in abstract.inputs),
+            tuple(port.variable for port in concrete.outputs),
+            {a.name: a.formula for a in abstract.assumptions},
+            {g.name: g.formula for g in concrete.guarantees},
+            effort=bounds.effort,
+            seed=bounds.seed,
+            doubtful=True,
+        )
+        what = f"no output of {concrete.name} meets {', '.join(answer.group)}"
+        verdict, reason, run = answer.verdict, answer.reason, Counterexample(show_values(answer.inputs), what)
+    match verdict:
+        case Verdict.REFUTED:
+            return replace(found, unrealizable=run)
+        case Verdict.PROVED:
+            return found
+        case _:  # no answer: a doubt, never a proof
+            return replace(found, doubt=reason or NO_ANSWER)
 
 
 def _of_same_ports(concrete: Node, abstract: Node) -> tuple[Node, Node]:
@@ -175,56 +183,6 @@ def _of_same_ports(concrete: Node, abstract: Node) -> tuple[Node, Node]:
         return replace(node, assumptions=assumptions, guarantees=guarantees)
 
     return over(replace(concrete, inputs=inputs, outputs=outputs), recast), over(abstract, lambda term: term)
-
-
-def _over_runs(concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
-    """Where clauses speak of other steps, of every run; of the same ports."""
-    answers, certificates = _answered(concrete, abstract, bounds)
-
-    def demand(node: str, clause: Clause, answer: Answer) -> Demand:
-        needed = tuple(map(str, answer.details.get("needed", ())))  # type: ignore[call-overload]
-        vacuous = answer.vacuous or (answer.established is not None and answer.established.vacuous)
-        shown = answer.counterexample
-        if shown is not None:  # what is remembered follows from the ports
-            values = tuple((name, value) for name, value in shown.values if CELL not in name)
-            shown = replace(shown, values=values)
-        return Demand(node, clause, answer.verdict, needed, shown, answer.summary, vacuous)
-
-    clauses = [(concrete.name, c) for c in concrete.assumptions] + [(abstract.name, c) for c in abstract.guarantees]
-    demands = tuple(demand(node, clause, answer) for (node, clause), answer in zip(clauses, answers, strict=True))
-    found = Refinement(concrete.name, abstract.name, (), demands, certificates=certificates)
-    if found.verdict is not Verdict.PROVED:
-        return found
-    asked = replace(concrete, inputs=abstract.inputs, assumptions=abstract.assumptions)
-    lasting = viable(one_step(asked), effort=2 * bounds.effort, seed=bounds.seed)
-    match lasting.verdict:
-        case Verdict.REFUTED:
-            what = f"a run after which no output of {concrete.name} meets what it guarantees"
-            return replace(found, unrealizable=lasting.run or Counterexample((), what))
-        case Verdict.PROVED:
-            return found
-        case _:  # no answer: a doubt, never a proof
-            return replace(found, doubt=lasting.reason or NO_ANSWER)
-
-
-def _kept_by_something(found: Refinement, concrete: Node, abstract: Node, bounds: Bounds) -> Refinement:
-    answer = realizable(
-        tuple(port.variable for port in abstract.inputs),
-        tuple(port.variable for port in concrete.outputs),
-        {a.name: a.formula for a in abstract.assumptions},
-        {g.name: g.formula for g in concrete.guarantees},
-        effort=bounds.effort,
-        seed=bounds.seed,
-        doubtful=True,
-    )
-    match answer.verdict:
-        case Verdict.REFUTED:
-            what = f"no output of {concrete.name} meets {', '.join(answer.group)}"
-            return replace(found, unrealizable=Counterexample(show_values(answer.inputs), what))
-        case Verdict.PROVED:
-            return found
-        case _:  # no answer: a doubt, never a proof
-            return replace(found, doubt=answer.reason or NO_ANSWER)
 
 
 def renamed(node: Node, names: Mapping[str, str]) -> Node:
@@ -327,59 +285,13 @@ def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
     return mapping[sort] if sort in mapping else rebuilt(sort, (_mapped(part, mapping) for part in parts(sort)))
 
 
-# -- what the kernel says ----------------------------------------------------------------------------------------------
-
-
-def _established(concrete: Node, abstract: Node) -> tuple[Certificate, dict[tuple[Claimed, str], Established]]:
-    """The certificate that was found, and by kind and name what the kernel establishes of the assumptions of the first
-    node, and (as requirements) of the guarantees of the second. Types have to be the same in both.
-
-    It is `Refined` in proofs/instances.dfy: the refining node stands alone, all inputs are the environment's, of which
-    the refined node's assumptions are assumed; the refined node's guarantees are what has to be shown.
-    """
-    at = concrete.name
-    known = statements(
-        Wiring(
-            (concrete,),
-            {(Role.OUTPUT, at, p.name): Place(f"{at}.{p.name}", at, 0, p.sort) for p in concrete.outputs}
-            | {(Role.INPUT, at, p.name): Place(f"in.{p.name}", None, 0, p.sort) for p in abstract.inputs},
-            (
-                *((Claimed.ENVIRONMENT, at, a.name, a.formula) for a in abstract.assumptions),
-                *((Claimed.REQUIREMENT, at, g.name, g.formula) for g in abstract.guarantees),
-            ),
-        )
-    )
-    given = tuple((f"environment {a.name}", 0) for a in abstract.assumptions)
-    hints = {f"{at}.{a.name}": Hint(given) for a in concrete.assumptions}
-    goals = tuple(claim for claim in known.every if claim.kind is Claimed.REQUIREMENT)
-    finder = Finder(known, "refinement", (at,), lambda _: frozenset(), False, frozenset(), hints, goals=goals)
-    certificate = finder.find()
-    kernel = Kernel(known, certificate, finder.solvers)
-    wanted = [claim for claim in known.every if claim.kind in (Claimed.ASSUMPTION, Claimed.REQUIREMENT)]
-    assumed = {claim.digest for claim in known.every if claim.kind is Claimed.ENVIRONMENT}
-    found = {(claim.kind, claim.name): _shown(kernel, claim, assumed) for claim in wanted}
-    return certificate, {name: one for name, one in found.items() if one is not None}
-
-
-def _shown(kernel: Kernel, claim: Statement, assumed: set[str]) -> Established | None:
-    """Up to the node's own evidence, and what the refined node assumes."""
-    for i, entry in enumerate(kernel.certificate.entries):
-        if (entry.how, entry.node, entry.digest) == (How.SHOWN, claim.node, claim.digest):
-            try:
-                found = kernel.establish(i)
-            except Refused:
-                continue
-            if all(need.kind is How.GUARANTEE or need.digest in assumed for need in found.hypotheses):
-                return found
-    return None
-
-
-# -- over runs ---------------------------------------------------------------------------------------------------------
+# -- questions ---------------------------------------------------------------------------------------------------------
 
 
 def _answered(concrete: Node, abstract: Node, bounds: Bounds) -> tuple[tuple[Answer, ...], tuple[Certificate, ...]]:
     """For each assumption of the first node, then each guarantee of the second, whether it follows in every run, by
-    induction over steps; and what the kernel established it from. The types of both are the same.
+    induction over steps; and what the kernel established it from (`Refined` in proofs/instances.dfy). The types of both
+    are the same.
 
     The refining node stands alone in a system, of whose environment the refined node's assumptions are assumed. First
     its assumptions are required, of whatever it puts out: its guarantees hold only where these do, and may not be used.

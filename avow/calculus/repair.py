@@ -1,12 +1,11 @@
 """What would make it hold: where an entailment between contracts fails, a clause with which it would not.
 
-Looked for are a further guarantee of a provider (in its own ports), a further assumption about the environment's
+The search looks for a further guarantee of a provider (in its own ports), a further assumption about the environment's
 inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination
-where the formulas allow that (`avow.solving.quantifier_elimination`), or by trying all values where they are few. Where
-neither does, a place that can speak of all that the goal speaks of (by other names, where equations say so) gets the
-goal itself. An offer is checked: with it the goal is proved; it does not contradict what else is known; and of a
-guarantee it is not known that the node could not keep it. The search is bounded in steps: that nothing is offered says
-nothing.
+where the formulas allow that (`avow.solving.quantifier_elimination`), or by trying all values where they are few.
+Otherwise a place that can speak of all that the goal speaks of gets the goal itself. Each offer is checked: with it the
+goal is proved, it does not contradict what else is known, and no guarantee is offered that its node could not keep. The
+search is bounded in steps, so a missing offer means nothing.
 """
 
 from __future__ import annotations
@@ -17,37 +16,19 @@ from fractions import Fraction
 from itertools import product
 
 from avow.base.records import dataclass
-from avow.base.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS, VALUES_TRIED
+from avow.base.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, VALUES_TRIED
 from avow.base.tuning.effort import OFFER_STEP_EFFORT, OFFER_WRITING_STEPS, OFFERS_EFFORT
 from avow.base.verdict import Verdict
 from avow.calculus.variables import Frame
 from avow.evaluation.evaluate import finite_values
-from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.written import value_term
+from avow.language import terms as t
 from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
 from avow.language.sorts import SetSort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    TRUE,
-    And,
-    Compare,
-    Iff,
-    Implies,
-    In,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SetTerm,
-    Term,
-    Variable,
-    Widen,
-)
 from avow.solving.limits import spend, spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
@@ -61,7 +42,7 @@ class Place:
     kind: str
     """``guarantee`` of a node, ``environment`` assumption, or ``initial`` value of ``node.port``."""
     of: str
-    ports: Mapping[Variable, Variable]
+    ports: Mapping[t.Variable, t.Variable]
     without: str = ""
     """The label of a hypothesis that the clause would replace."""
 
@@ -72,7 +53,7 @@ class Offer:
 
     kind: str
     of: str
-    formula: Term
+    formula: t.Term
     weakest: bool
 
     @property
@@ -100,7 +81,7 @@ class Offer:
         return found | ({"when": when} if when else {})
 
 
-def offers(frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place]) -> tuple[Offer, ...]:
+def offers(frame: Frame, hypotheses: Mapping[str, t.Term], goal: t.Term, places: Iterable[Place]) -> tuple[Offer, ...]:
     """What would make the hypotheses imply the goal, at most one offer for each place."""
     end = until(OFFERS_EFFORT)
     found: dict[tuple[str, str], Offer] = {}
@@ -116,15 +97,12 @@ def offers(frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Ite
     return tuple(found.values())
 
 
-def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) -> Offer | None:
+def _offer(frame: Frame, known: Mapping[str, t.Term], goal: t.Term, place: Place) -> Offer | None:
     found = _eliminated(known, goal, place)
     if found is None or not found[1]:
         # What elimination cannot do, or only without some hypothesis, trying every value can, if they are few.
         tried = _enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
         found = tried if tried is not None and (tried[1] or found is None) else found
-    if found is None:
-        rewritten = _rewritten(known, goal, place)
-        found = (rewritten, False) if rewritten is not None else None
     if found is None:
         return None
     formula = substitute(found[0], place.ports)
@@ -133,11 +111,11 @@ def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) ->
     return Offer(place.kind, place.of, formula, found[1])
 
 
-def _eliminated(known: Mapping[str, Term], goal: Term, place: Place) -> tuple[Term, bool] | None:
+def _eliminated(known: Mapping[str, t.Term], goal: t.Term, place: Place) -> tuple[t.Term, bool] | None:
     """By quantifier elimination; else the goal itself, if the place can speak of all that it does. And whether it is
     the weakest."""
     usable = {label: term for label, term in known.items() if eliminable(term)}
-    assumption: Term | None = None
+    assumption: t.Term | None = None
     weakest = False
     if eliminable(goal) and len(usable) <= OFFER_HYPOTHESES:
         remedied = remedy(usable, goal, place.ports, effort=OFFER_STEP_EFFORT)
@@ -153,68 +131,40 @@ def _eliminated(known: Mapping[str, Term], goal: Term, place: Place) -> tuple[Te
     return assumption, weakest
 
 
-def _rewritten(known: Mapping[str, Term], goal: Term, place: Place) -> Term | None:
-    """The goal, with what equations among the hypotheses say its variables are: ``f(x)`` as ``f(k + 1)``."""
-    equations: dict[Variable, Term] = {}
-    for part in reversed(conjuncts(conjunction(known.values()), True)):
-        match part:
-            case Iff(left=Variable() as left, right=right) if left not in place.ports:
-                equations.setdefault(left, right)
-            case Iff(left=left, right=Variable() as right) if right not in place.ports:
-                equations.setdefault(right, left)
-            case Compare(operator="==", left=Variable() as left, right=right) if left not in place.ports:
-                equations.setdefault(left, right)
-            case Compare(operator="==", left=left, right=Variable() as right) if right not in place.ports:
-                equations.setdefault(right, left)
-    term = goal
-    for _ in range(OFFER_REWRITINGS):
-        foreign = free_variables(term) - frozenset(place.ports)
-        if not foreign:
-            break
-        usable = {v: equations[v] for v in foreign if v in equations and v not in free_variables(equations[v])}
-        if not usable:
-            return None
-        term = substitute(term, usable)
-    if term == goal or not free_variables(term) <= frozenset(place.ports):
-        return None
-    together = {**known, "the offer": term}
-    if entails(together, goal, effort=OFFER_STEP_EFFORT).verdict is not Verdict.PROVED:
-        return None
-    return term if solve(together, effort=OFFER_STEP_EFFORT).status == "sat" else None
-
-
 def _is_whole(value: object) -> bool:
     return not isinstance(value, bool | str) and isinstance(value, int | Fraction) and value == int(value) >= 0
 
 
-def _tidy(term: Term) -> Term:
+def _tidy(term: t.Term) -> t.Term:
     """``not x >= 1`` as ``x < 1``, and ``k > 2.0`` of an integer as ``k > 2``: elimination leaves the first."""
     match term:
-        case Not(body=Compare(operator=operator, left=left, right=right)):
-            return _tidy(Compare(OPPOSITE[operator], left, right))
-        case Compare(left=Widen(term=left), right=Literal(value=value)) if _is_whole(value):
-            return Compare(term.operator, left, Literal(int(value), left.sort))
-        case And(items=items):
+        case t.Not(body=t.Compare(operator=operator, left=left, right=right)):
+            return _tidy(t.Compare(OPPOSITE[operator], left, right))
+        case t.Compare(left=t.Widen(term=left), right=t.Literal(value=value)) if _is_whole(value):
+            return t.Compare(term.operator, left, t.Literal(int(value), left.sort))
+        case t.And(items=items):
             return conjunction(map(_tidy, items))
-        case Or(items=items):
+        case t.Or(items=items):
             return disjunction(map(_tidy, items))
     return term
 
 
-def _may_be_kept(frame: Frame, name: str, further: Term) -> bool:
+def _may_be_kept(frame: Frame, name: str, further: t.Term) -> bool:
     """False where, for some inputs that the node has to accept, no outputs meet its guarantees and the further one."""
     node = frame.node(name)
     meets = conjunction([*(clause.formula for clause in node.guarantees), further])
     outputs = tuple(port.variable for port in node.outputs)
-    bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in outputs}
-    possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), substitute(meets, bound)) if bound else meets
-    accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else TRUE
-    return entails({}, Implies(accepted, possible), effort=OFFER_STEP_EFFORT).verdict is not Verdict.REFUTED
+    bound = {v: t.Variable(t.Role.BOUND, f"some {v.name}", v.sort) for v in outputs}
+    possible: t.Term = (
+        t.Quantified(t.Quantifier.EXISTS, tuple(bound.values()), substitute(meets, bound)) if bound else meets
+    )
+    accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else t.TRUE
+    return entails({}, t.Implies(accepted, possible), effort=OFFER_STEP_EFFORT).verdict is not Verdict.REFUTED
 
 
 def _enumerated(
-    known: Mapping[str, Term], goal: Term, ports: Sequence[Variable], effort: int
-) -> tuple[Term, bool] | None:
+    known: Mapping[str, t.Term], goal: t.Term, ports: Sequence[t.Variable], effort: int
+) -> tuple[t.Term, bool] | None:
     """A condition on some of the ports with which the goal follows, and whether it is the weakest. None where there is
     none, or where they have too many values."""
     spoken = free_variables(goal).union(*map(free_variables, known.values()))
@@ -222,8 +172,8 @@ def _enumerated(
     # A relation's values are as finite as its points, and a question each: only what can be written as a set is tried.
     if not finite or math.prod(len(values) for _, values in finite) > VALUES_TRIED:
         return None
-    good: list[tuple[Term, ...]] = []
-    bad: list[tuple[Term, ...]] = []
+    good: list[tuple[t.Term, ...]] = []
+    bad: list[tuple[t.Term, ...]] = []
     possible = sure = True
     for choice in product(*(values for _, values in finite)):
         terms = tuple(value_term(value, v.sort) for (v, _), value in zip(finite, choice, strict=True))
@@ -235,7 +185,7 @@ def _enumerated(
     variables = [v for v, _ in finite]
     if not good or not bad:
         return None
-    found = Not(_one_of(variables, bad)) if len(bad) < len(good) else _one_of(variables, good)
+    found = t.Not(_one_of(variables, bad)) if len(bad) < len(good) else _one_of(variables, good)
     together = {**known, "the condition": found}
     possible = solve(together, effort=effort).status == "sat"
     if not possible or entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
@@ -243,15 +193,15 @@ def _enumerated(
     return found, sure and frozenset(variables) >= spoken & frozenset(ports)
 
 
-def _one_of(variables: Sequence[Variable], choices: Sequence[tuple[Term, ...]]) -> Term:
+def _one_of(variables: Sequence[t.Variable], choices: Sequence[tuple[t.Term, ...]]) -> t.Term:
     if len(variables) == 1:
         [variable] = variables
         options = [option for (option,) in choices]
         if len(options) == 1:
-            return Compare("==", variable, options[0])
-        return In(variable, SetTerm(tuple(options), SetSort(variable.sort)))
+            return t.Compare("==", variable, options[0])
+        return t.In(variable, t.SetTerm(tuple(options), SetSort(variable.sort)))
     return disjunction(
-        conjunction(Compare("==", v, term) for v, term in zip(variables, choice, strict=True)) for choice in choices
+        conjunction(t.Compare("==", v, term) for v, term in zip(variables, choice, strict=True)) for choice in choices
     )
 
 
@@ -267,7 +217,7 @@ def providers(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[
 def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[Place]:
     """The inputs of some nodes that nothing provides: each alone, as the plan would have it; then a node's together."""
     nodes = tuple(nodes)
-    ports: dict[Variable, tuple[str, Variable]] = {}
+    ports: dict[t.Variable, tuple[str, t.Variable]] = {}
     for name in nodes:
         for port in frame.node(name).inputs:
             if CELL not in port.name and Endpoint(name, port.name) not in frame.graph.by_target:
@@ -301,11 +251,11 @@ def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:
             yield Place("initial", str(source), {variable: called}, f"initial {source}")
 
 
-def _called(frame: Frame, name: str, earlier: int) -> dict[Variable, Variable]:
+def _called(frame: Frame, name: str, earlier: int) -> dict[t.Variable, t.Variable]:
     """System-level variables as the node's own ports. Of two inputs that read one value, one is enough; what its
     clauses remember is no port."""
-    found: dict[Variable, Variable] = {}
+    found: dict[t.Variable, t.Variable] = {}
     for variable, meant in frame.mapping(name, earlier).items():
-        if isinstance(meant, Variable) and CELL not in variable.name:
+        if isinstance(meant, t.Variable) and CELL not in variable.name:
             found.setdefault(meant, variable)
     return found

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 from avow.base.tuning.bounds import COMPLETIONS
 from avow.base.tuning.effort import REPLAY_EFFORT
+from avow.calculus.narrowing import Undecided, closed, is_open
 from avow.calculus.node_outputs import Doubts, judge
-from avow.calculus.open_values import Undecided, closed, is_open
 from avow.calculus.scenario import CannotRun, key
 from avow.calculus.transition import Machine, Step
 from avow.calculus.variables import system_term

@@ -3,16 +3,26 @@ run of the composed contracts have it?
 
 A formula is proved of every step: from the guarantees that the plan names as its support where these suffice, from all
 contracts otherwise; or by induction over steps, from the initial values on.
+
+A formula that holds whatever the nodes do, or only because its condition never comes about, is satisfied by every
+design, and a proof of it shows nothing. So a formula that the contracts imply is asked what the sanity analysis asks of
+a guarantee: is it a tautology, or does it follow from the plan's assumptions alone; can each of its conditions come
+about (`avow.sanity.claims.triggers`); do the contracts exclude any of its mutants (`avow.sanity.mutants`)? These
+questions are about one step, which need not be reached, so "nothing" is only said where it is proved. A temporal
+property is asked the same over the runs of the plan's scenario.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 from avow.base.files import sha256
+from avow.base.plain import listed
 from avow.base.records import dataclass
-from avow.base.tuning.effort import QUICK_EFFORT
+from avow.base.tuning.bounds import PROPERTY_ATOMS, REQUIREMENT_MUTANTS
+from avow.base.tuning.effort import CONSISTENT_EFFORT, QUICK_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
@@ -21,17 +31,20 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import INVARIANT, Written, further, in_words, steps
-from avow.calculus.model_checking import cannot_run, judge_property, refuting_run
+from avow.calculus.ltl import TooLong, violation
+from avow.calculus.model_checking import cannot_run, explored, judge_property
 from avow.calculus.questions import Answer, as_far_as_shown, certified, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.scenario import CannotRun
 from avow.calculus.variables import Frame, Observed, system_term
-from avow.formulas.formula import digest, free_variables
+from avow.formulas.formula import digest, free_variables, negation
 from avow.language.printer import show_term
-from avow.language.terms import Term
-from avow.solving.questions import Entailment
+from avow.language.terms import FALSE, Term
+from avow.sanity.claims import triggers
+from avow.sanity.mutants import mutants
+from avow.solving.questions import Entailment, solve
 from avow.system.plan import Requirement
-from avow.system.temporal import Property, State, Temporal, parse_property, show_property
+from avow.system.temporal import Operator, Property, State, Temporal, parse_property, show_property, states_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +58,8 @@ class FormulaQuestion:
     support: tuple[str, ...]
     unsaid: str = ""
     """Why there is no formula of one step, where it speaks of others."""
+    required: bool = False
+    """The formula is a requirement's, which has to say something; a demand of a refinement may follow from anything."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         """In short rounds first: what one way cannot show, at any length, another may in no time. A run over the plan's
@@ -52,7 +67,27 @@ class FormulaQuestion:
         if self.unsaid:
             told = f"{self.unsaid}: nothing can be shown of it step by step; a `temporal` property is judged over runs"
             return Answer(Verdict.UNKNOWN, told)
-        return as_far_as_shown(composition.frame, self.searched(composition, bounds))
+        answer = as_far_as_shown(composition.frame, self.searched(composition, bounds))
+        if not self.required or answer.verdict is not Verdict.PROVED or answer.vacuous:
+            return answer
+        frame, assumed = composition.frame, composition.assumed(self.name)
+        known = self.known(frame, _every_guarantee(frame))
+        why = _formula_says_nothing(frame, self.formula, known, assumed, bounds)
+        return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
+
+    def unused_support(self, frame: Frame, answer: Answer, assumed: Mapping[str, Term]) -> str:
+        """Why the proof of a formula uses no guarantee, or none that the plan names as its support; else an empty
+        text."""
+        listed = answer.details.get("needed")
+        labels = tuple(map(str, listed)) if isinstance(listed, list) else ()
+        used = _guarantees(frame, labels)
+        needed = {label.removesuffix(" one step before") for label in labels} - {self.name}
+        if needed and not used and needed <= assumed.keys():
+            alone = ", ".join(sorted(needed))
+            return f"the formula follows from the assumptions alone, whatever the nodes guarantee: {alone}"
+        if used and self.support and set(used).isdisjoint(self.support):
+            return f"it needs none of the guarantees that supported_by names, but {', '.join(used)}: name these"
+        return ""
 
     def searched(self, composition: Composition, bounds: Bounds) -> Answer:
         """The answer, of the clauses that have formulas of one step."""
@@ -75,11 +110,14 @@ class FormulaQuestion:
         how far it was looked for."""
         if composition.frame.system.plan.scenario is None:
             return None, ""
+        always = Temporal(Operator.ALWAYS, (State(self.formula),))
         try:
-            machine = composition.machine(bounds.seed, self.name)
+            found = explored(composition.machine(bounds.seed, self.name), self.name, always, bounds, None)
         except CannotRun:
             return None, ""
-        return refuting_run(machine, self.name, system_term(composition.frame, self.formula), bounds)
+        if found.verdict is Verdict.REFUTED and found.counterexample is not None:
+            return replace(found, details={"genuine": True, "run": len(found.counterexample.trace)}), ""
+        return None, f"no run of the {found.bound['steps']} kinds of steps looked at over the scenario makes it false"
 
     def attempt(self, composition: Composition, bounds: Bounds, *, patient: bool = False) -> Answer:
         """One round. The `patient` one, after a quick one, asks only the widest question of each kind: what nothing
@@ -104,7 +142,7 @@ class FormulaQuestion:
         self, frame: Frame, goal: Term, answer: Answer, further: Mapping[str, Term] | None = None, when: str = ""
     ) -> Answer:
         """A refutation, or a step at which induction fails, with what would make it hold; another answer as it is."""
-        if answer.verdict is not Verdict.REFUTED and "induction" not in answer.details:
+        if not self.required or (answer.verdict is not Verdict.REFUTED and "induction" not in answer.details):
             return answer
         nodes = frame.graph.nodes
         everything = _every_guarantee(frame)
@@ -200,7 +238,7 @@ class FormulaQuestion:
         if before > 1:
             how = f"at the first {before} steps, and from each {before} steps to the next"
         named = [label for label in needed if not about_memory(label) and not label.startswith(INVARIANT)]
-        summary = f"follows {how} from {', '.join(named) or 'the types alone'}"
+        summary = f"follows {how} from {', '.join(named) or 'the wiring and the types alone'}"
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
         details: dict[str, object] = {"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {})
@@ -245,8 +283,19 @@ class TemporalQuestion:
         answer = as_far_as_shown(composition.frame, judged)
         if not answer.verdict.supports:
             return answer
+
+        def holds(other: Property) -> bool:
+            return judge_property(composition.machine(bounds.seed), self.name, other, bounds).verdict.supports
+
+        frame, assumed = composition.frame, composition.assumed()
+        answer = _says_nothing(answer, _property_says_nothing(frame, self.formula, holds, assumed, bounds))
         # every node was taken at its word, which it keeps only where its assumptions are met
         return replace(answer, everything=True)
+
+
+def _says_nothing(answer: Answer, why: str) -> Answer:
+    """An answer that shows nothing, where there is a reason why."""
+    return replace(answer, vacuous=True, summary=f"says nothing: {why}") if why else answer
 
 
 def requirement_question(
@@ -255,7 +304,7 @@ def requirement_question(
     """The question behind a requirement; None where it is prose. Raises Rejected for a formula that is wrong."""
     frame = composition.frame
     if requirement.formula is not None:
-        return formula_question(frame, requirement.id, supports(composition, requirement))
+        return replace(formula_question(frame, requirement.id, supports(composition, requirement)), required=True)
     if requirement.temporal is not None:
         formula = parse_property(requirement.temporal, frame.system.contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
@@ -303,3 +352,93 @@ def _meaning(formula: Property) -> str:
             return digest(term)
         case Temporal(operator=operator, parts=parts):
             return f"({operator} {' '.join(map(_meaning, parts))})"
+
+
+def _formula_says_nothing(
+    frame: Frame, formula: Term, known: Mapping[str, Term], assumed: Mapping[str, Term], bounds: Bounds
+) -> str:
+    """Why a formula that `known` implies says nothing, else an empty text. `formula` is written over ``node.port``;
+    `assumed` are those hypotheses that no guarantee gives."""
+    effort = min(CONSISTENT_EFFORT, bounds.effort)
+
+    def proves(hypotheses: Mapping[str, Term], goal: Term) -> tuple[str, ...] | None:
+        found = implied(hypotheses, goal, effort=effort, seed=bounds.seed)
+        return found.needed if found.verdict is Verdict.PROVED else None
+
+    goal = system_term(frame, formula)
+    if proves({}, formula) is not None:
+        return "the formula is a tautology: it holds whatever the nodes do"
+    if needed := proves(assumed, goal):
+        return f"the formula follows from the assumptions alone, whatever the nodes guarantee: {listed(needed, 6)}"
+    for trigger in triggers(goal):
+        if (needed := proves(known, negation(trigger))) is not None:
+            return f"its condition never comes about: {show_term(trigger)} is excluded by {listed(needed, 6)}"
+    changed = mutants(goal)[:REQUIREMENT_MUTANTS]
+    if all(proves(known, mutant.formula) is not None for mutant in changed):
+        other = [mutant.change for mutant in changed if proves({"": goal}, mutant.formula) is None]
+        if other:
+            return f"it holds just as well when it is changed to say something else: {listed(other, 4)}"
+    return ""
+
+
+def _property_says_nothing(
+    frame: Frame, formula: Property, holds: Callable[[Property], bool], assumed: Mapping[str, Term], bounds: Bounds
+) -> str:
+    """Why a temporal property that every run has says nothing, else an empty text. `holds`: whether every run has
+    another property."""
+    if _tautological(frame, formula, assumed, bounds):
+        return "the property holds of every run, whatever the nodes do"
+    for condition, mutant in _without_demand(formula):
+        try:
+            if holds(mutant):
+                return f"its condition never comes about on any run of the scenario: {condition}"
+        except (CannotRun, TooLong):
+            continue
+    return ""
+
+
+def _tautological(frame: Frame, formula: Property, assumed: Mapping[str, Term], bounds: Bounds) -> bool:
+    """Whether no sequence of steps, each of which the assumptions allow, breaks the property."""
+    states = states_of(formula)
+    if len(states) > PROPERTY_ATOMS:
+        return False
+    rows = [
+        dict(zip(states, values, strict=True))
+        for values in product((True, False), repeat=len(states))
+        if _possible(frame, states, values, assumed, bounds)
+    ]
+    every = range(len(rows))
+    try:
+        return violation(formula, every, lambda _: every, lambda step, state: rows[step][state]) is None
+    except TooLong:
+        return False
+
+
+def _possible(
+    frame: Frame, states: Sequence[State], values: Sequence[bool], assumed: Mapping[str, Term], bounds: Bounds
+) -> bool:
+    terms = [system_term(frame, state.term) for state in states]
+    wanted = {f"state {k}": t if v else negation(t) for k, (t, v) in enumerate(zip(terms, values, strict=True))}
+    effort = min(CONSISTENT_EFFORT, bounds.effort)
+    return solve({**assumed, **wanted}, effort=effort, seed=bounds.seed, values="unused").status != "unsat"
+
+
+def _without_demand(formula: Property) -> Iterator[tuple[str, Property]]:
+    """For each condition under which the property demands something: the condition, and the property that it never
+    comes about."""
+    match formula:
+        case State(term=term):
+            for trigger in triggers(term):
+                yield show_term(trigger), State(negation(trigger))
+        case Temporal(operator=Operator.IMPLIES, parts=(left, right)):
+            yield show_property(left), Temporal(Operator.IMPLIES, (left, State(FALSE)))
+            for condition, changed in _without_demand(right):
+                yield condition, Temporal(Operator.IMPLIES, (left, changed))
+        case Temporal(operator=Operator.ALWAYS | Operator.NEXT as operator, parts=(body,)):
+            for condition, changed in _without_demand(body):
+                yield condition, Temporal(operator, (changed,))
+        case Temporal(operator=Operator.AND, parts=parts):
+            for part in parts:
+                yield from _without_demand(part)
+        case _:  # it demands something without a condition
+            return

@@ -21,21 +21,8 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
 from avow.formulas.finite import Ranges
 from avow.formulas.temporal.clock import pace_of
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
+from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.sorts import (
-    BOOL,
-    BUILTINS,
-    REAL,
-    DataSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
 from avow.language.terms import Literal, Variable
 from avow.system.names import ports_named
 from avow.system.plan import STEP_LENGTH, Scenario
@@ -53,7 +40,7 @@ class World:
 
     frame: Frame
     scenario: Scenario
-    domains: dict[Sort, tuple[Value, ...]]
+    domains: dict[s.Sort, tuple[Value, ...]]
     effort: int = 10_000
     """For one question to the solver."""
 
@@ -71,7 +58,7 @@ class World:
         limits = [(p.relation, Fraction(p.amount.value)) for p in paces if isinstance(p.amount, Literal)]
         texts = self.scenario.domains.get(STEP_LENGTH)
         if texts is not None:
-            tried = [t for text in texts if isinstance(t := self.parse(text, REAL), Fraction)]
+            tried = [t for text in texts if isinstance(t := self.parse(text, s.REAL), Fraction)]
         else:
             tried = [part for relation, most in limits for part in ((most,) if relation == "==" else (most / 2, most))]
         found = tuple(
@@ -95,7 +82,7 @@ class World:
     def results(self, node: str, port: Port) -> tuple[Value, ...]:
         """The values that a function may have at each point. Raises CannotRun."""
         sort = port.sort
-        assert isinstance(sort, FunctionSort)
+        assert isinstance(sort, s.FunctionSort)
         texts = self.domain(("out", node), port)
         if texts is not None:
             return tuple(dict.fromkeys(self.parse(text, sort.result) for text in texts))
@@ -109,10 +96,10 @@ class World:
     def points(self, node: str, port: Port) -> tuple[Point, ...]:
         """The points at which a relation may hold. Raises CannotRun."""
         sort = port.sort
-        assert isinstance(sort, FunctionSort)
+        assert isinstance(sort, s.FunctionSort)
         texts = self.domain(("out", "in", node), port)
         if texts is not None:
-            wanted = sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
+            wanted = sort.parameters[0] if len(sort.parameters) == 1 else s.TupleSort(sort.parameters)
             found = [self.parse(text, wanted) for text in texts]
             return tuple(v if isinstance(v, tuple) else (v,) for v in found)
         found_points = self.tuples(sort.parameters)
@@ -123,7 +110,7 @@ class World:
             )
         return found_points
 
-    def tuples(self, sorts: Sequence[Sort]) -> tuple[Point, ...] | None:
+    def tuples(self, sorts: Sequence[s.Sort]) -> tuple[Point, ...] | None:
         """The combinations of values that are tried: of the given ranges if every sort has one, else the places that
         the interpreted tables speak of (a relation on REAL x REAL x NATURAL speaks of pairs of reals)."""
         if all(finite_values(sort, self.domains) is not None for sort in sorts):
@@ -135,26 +122,26 @@ class World:
                     found.update(dict.fromkeys(row[start : start + len(sorts)] for row in rows))
         return tuple(found) or None
 
-    def rows(self) -> Iterator[tuple[tuple[Sort, ...], list[Point]]]:
+    def rows(self) -> Iterator[tuple[tuple[s.Sort, ...], list[Point]]]:
         """Every interpreted table: the sorts of its columns, and its rows."""
         for name, (table, columns) in self.scenario.interpret.items():
             ports = ports_named(name, self.frame.system.contract.nodes)
-            if not ports or not isinstance(ports[0][1].sort, FunctionSort):
+            if not ports or not isinstance(ports[0][1].sort, s.FunctionSort):
                 continue
             sort = ports[0][1].sort
-            signature = sort.parameters if sort.result == BOOL else (*sort.parameters, sort.result)
+            signature = sort.parameters if sort.result == s.BOOL else (*sort.parameters, sort.result)
             cells = [self.scenario.table(table).column(column) for column in columns]
             yield (
                 signature,
                 [
-                    tuple(self.parse(c, s) for c, s in zip(row, signature, strict=False))
+                    tuple(self.parse(c, part) for c, part in zip(row, signature, strict=False))
                     for row in zip(*cells, strict=True)
                 ],
             )
 
-    def plain_values(self, sort: Sort) -> tuple[Value, ...] | None:
+    def plain_values(self, sort: s.Sort) -> tuple[Value, ...] | None:
         """The values of a sort that are tried; None where they are not finitely many."""
-        if isinstance(sort, DataSort) and sort not in self.domains:
+        if isinstance(sort, s.DataSort) and sort not in self.domains:
             found: list[Value] = []
             for constructor in sort.constructors:
                 arguments = self.tuples(constructor.parameters) if constructor.parameters else ((),)
@@ -162,17 +149,17 @@ class World:
                     return None
                 found += [Data(constructor.name, values) for values in arguments]
             return tuple(found)
-        if isinstance(sort, TupleSort) and sort not in self.domains:
+        if isinstance(sort, s.TupleSort) and sort not in self.domains:
             return self.tuples(sort.items)
         return finite_values(sort, self.domains) or (tuple(p[0] for p in self.tuples((sort,)) or ()) or None)
 
     def values(self, name: str, owners: Sequence[str], port: Port) -> tuple[Value, ...]:
         texts = self.domain(owners, port)
-        if texts is not None and not isinstance(port.sort, FunctionSort):
+        if texts is not None and not isinstance(port.sort, s.FunctionSort):
             return tuple(self.parse(text, port.sort) for text in texts)
-        if isinstance(port.sort, OpaqueSort):
+        if isinstance(port.sort, s.OpaqueSort):
             return (Opaque(port.sort.name, 0),)
-        if isinstance(port.sort, FunctionSort):
+        if isinstance(port.sort, s.FunctionSort):
             raise CannotRun(f"{name}: say where it holds: scenario.interpret: {{in.{port.name}: table(column, …)}}")
         found = self.plain_values(port.sort)
         if found is None or len(found) > VALUES_OF_A_PORT:
@@ -180,42 +167,42 @@ class World:
             raise CannotRun(f"{name} ({port.type_name}) {why}; give scenario.domains: {{{owners[0]}.{port.name}: …}}")
         return tuple(found)
 
-    def interpreted(self, sort: Sort, table: str, columns: tuple[str, ...]) -> FunctionValue:
+    def interpreted(self, sort: s.Sort, table: str, columns: tuple[str, ...]) -> FunctionValue:
         """A relation that holds at exactly the rows of a table, or a function given by them."""
-        assert isinstance(sort, FunctionSort)
+        assert isinstance(sort, s.FunctionSort)
         found = self.scenario.table(table)
         cells = [found.column(column) for column in columns]
         rows = list(zip(*cells, strict=True))
-        keys = [tuple(self.parse(cell, s) for cell, s in zip(row, sort.parameters, strict=False)) for row in rows]
-        if sort.result == BOOL:
+        keys = [tuple(self.parse(cell, part) for cell, part in zip(row, sort.parameters, strict=False)) for row in rows]
+        if sort.result == s.BOOL:
             return FunctionValue(dict.fromkeys(keys, True), False)
         results = [self.parse(row[-1], sort.result) for row in rows]
         return FunctionValue(dict(zip(keys, results, strict=True)), self.elsewhere(sort.result, results))
 
-    def elsewhere(self, sort: Sort, results: Sequence[Value]) -> Value:
+    def elsewhere(self, sort: s.Sort, results: Sequence[Value]) -> Value:
         """A function's value beside its table: one that the table does not give, and that does not follow on it."""
-        if isinstance(sort, NaturalSort | IntegerSort | RealSort):
+        if isinstance(sort, s.NaturalSort | s.IntegerSort | s.RealSort):
             numbers = [value for value in results if isinstance(value, int | Fraction)]
             top = max(numbers, default=0)
-            return Fraction(top + 2) if isinstance(sort, RealSort) else int(top) + 2
+            return Fraction(top + 2) if isinstance(sort, s.RealSort) else int(top) + 2
         known = finite_values(sort, self.domains) or tuple(results)
         unused = [value for value in known if value not in results]
         if not (unused or known):
             raise CannotRun("a function's table is empty, and nothing else says what its values may be")
         return (unused or list(known))[0]
 
-    def parse(self, text: str, sort: Sort) -> Value:
+    def parse(self, text: str, sort: s.Sort) -> Value:
         """A cell or a value as RCL writes it. Raises CannotRun."""
         from avow.language.load import parse_term
 
-        if isinstance(sort, StringSort) and not text.startswith('"'):
+        if isinstance(sort, s.StringSort) and not text.startswith('"'):
             return text
         try:
-            if isinstance(sort, RealSort):
+            if isinstance(sort, s.RealSort):
                 return exact(text)
-            if isinstance(sort, IntegerSort | NaturalSort):
+            if isinstance(sort, s.IntegerSort | s.NaturalSort):
                 number = int(text)
-                if number < 0 and isinstance(sort, NaturalSort):
+                if number < 0 and isinstance(sort, s.NaturalSort):
                     raise CannotRun(f"scenario: {text} is no natural number")
                 return number
         except ValueError:
@@ -232,10 +219,10 @@ def world(frame: Frame) -> World:
     """The scenario of a system. Raises CannotRun where there is none, or its values cannot be read."""
     scenario = frame.system.plan.scenario or Scenario()
     found = World(frame, scenario, {})
-    named = {**BUILTINS, **dict(frame.system.contract.types)}
+    named = {**s.BUILTINS, **dict(frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         sort = named.get(name)
-        if sort is not None and not isinstance(sort, FunctionSort):
+        if sort is not None and not isinstance(sort, s.FunctionSort):
             found.domains[sort] = tuple(dict.fromkeys(found.parse(text, sort) for text in texts))
     return found
 
@@ -253,7 +240,7 @@ def ranges(whole: Frame, node: Node) -> Ranges:
     inputs: dict[Variable, tuple[Value, ...]] = {}
     for port in node.inputs:
         texts = found.domain(("in", node.name), port)
-        if texts is None or isinstance(port.sort, FunctionSort):
+        if texts is None or isinstance(port.sort, s.FunctionSort):
             continue
         with suppress(CannotRun):
             inputs[port.variable] = tuple(found.parse(text, port.sort) for text in texts)
@@ -264,11 +251,11 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
     """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
     leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
     scenario, found = world.scenario, list[Hypothesis]()
-    named = {**BUILTINS, **dict(world.frame.system.contract.types)}
+    named = {**s.BUILTINS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         ports = ports_named(name, world.frame.system.contract.nodes)
         sort = named.get(name) or (ports[0][1].sort if ports else None)
-        everything = None if sort is None or isinstance(sort, FunctionSort) else finite_values(sort)
+        everything = None if sort is None or isinstance(sort, s.FunctionSort) else finite_values(sort)
         if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
             place = f"scenario.domains.{name}"
             found.append(bound(place, f"{place}: it is one of {listed(texts, DOMAIN_VALUES)}"))
@@ -287,10 +274,10 @@ def restrictions(world: World) -> tuple[Hypothesis, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _is_sampled(sort: Sort) -> bool:
+def _is_sampled(sort: s.Sort) -> bool:
     """Whether not all of a sort's values are tried, though no range for it is written down."""
-    if isinstance(sort, FunctionSort):
-        return any(finite_values(s) is None for s in (*sort.parameters, sort.result))
+    if isinstance(sort, s.FunctionSort):
+        return any(finite_values(part) is None for part in (*sort.parameters, sort.result))
     return finite_values(sort) is None
 
 

@@ -16,10 +16,19 @@ from avow.base.graphs import components, cycles_in
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.tuning.effort import SEARCH_STEPS
-from avow.calculus.choices import Values, by_variable, search
-from avow.calculus.narrowing import Narrowing, Unknown, forcings
-from avow.calculus.node_outputs import Answerer, Doubts, Stuck, another_first, first_cut, is_restricted, judge, possible
-from avow.calculus.open_values import Holds, Undecided, decided
+from avow.calculus.narrowing import Holds, Narrowing, Undecided, Unknown, Values, decided, forcings
+from avow.calculus.node_outputs import (
+    Answerer,
+    Doubts,
+    Stuck,
+    another_first,
+    by_variable,
+    first_cut,
+    is_restricted,
+    judge,
+    possible,
+    search,
+)
 from avow.calculus.scenario import CannotRun, World, key
 from avow.evaluation.evaluate import NotEvaluable, compile_term
 from avow.formulas.formula import free_variables

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger, readable
 from avow.evidence.signing import Signed, new_key_pair, sign, signature_path, verify_signature
+from avow.pipeline.assess import edited_pages
+from avow.pipeline.export import edited
 from avow.pipeline.integrity import confirm, discrepancies, reported_heads, settle_losses
 from avow.pipeline.workload import Survey, survey
 
@@ -52,10 +55,12 @@ def command(
     acknowledge: str | None,
     who: str | None,
 ) -> int:
-    """Re-digest everything that the ledger of each SYSTEM (its name or folder; all, if none is named) refers to.
+    """Re-digest everything that the ledger of each SYSTEM (its name or folder; all, if none is named) refers to, and
+    compare generated files with what is generated today.
 
-    Exit code 1 if the ledger or a file behind today's evidence was tampered with, or a ledger is not the one that the
-    index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence stale.
+    Exit code 1 if the ledger, a file behind today's evidence or a generated file was edited, or a ledger is not the
+    one that the index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence
+    stale.
     A ledger that was cut, rolled back, rewritten or begun anew fails the gate *integrity* until a person, by name,
     says with --acknowledge that it was seen and why it happened.
     """
@@ -129,11 +134,25 @@ def _audit_system(
     place: Workspace, name: str, public_key: Path | None = None, anchors: Sequence[Anchor] = ()
 ) -> tuple[tuple[Discrepancy, ...], int]:
     """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
-    ledger = Ledger(place.ledger(name))
+    ledger, surveyed = Ledger(place.ledger(name)), _surveyed(place, name)
     with readable(ledger.path):
-        found = discrepancies(place, ledger, _surveyed(place, name), anchors, strict=True)
+        found = discrepancies(place, ledger, surveyed, anchors, strict=True)
         count = len(ledger.records())
-    return (*found, *_signature(place.ledger(name), _head_of(ledger), public_key)), count
+    signature = _signature(place.ledger(name), _head_of(ledger), public_key)
+    return (*found, *(_edited(place, surveyed) if surveyed else ()), *signature), count
+
+
+def _edited(place: Workspace, surveyed: Survey) -> Iterable[Discrepancy]:
+    """The generated files that somebody has edited: people read them in place of the contract and the ledger."""
+    paths = [*edited_pages(place, surveyed.system.name)]
+    for work in surveyed.catalogue.works:
+        if not work.is_engine:
+            with contextlib.suppress(Rejected):  # what a backend refuses is an error of the plan: see `avow check`
+                paths += edited(place, work)
+    for path in paths:
+        name = place.relative(path)
+        text = f"{name} was edited since it was generated: `avow verify` writes it again"
+        yield Discrepancy(Fault.CHANGED, str(name), text)
 
 
 def _surveyed(place: Workspace, name: str) -> Survey | None:

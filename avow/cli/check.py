@@ -134,7 +134,7 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
         found.extend(faults)
         given = Path.cwd() / folder
         names = [folder / f.relative_to(given) if f.is_relative_to(given) else f for f in plan.contract_files]
-        return names, frozenset(plan.lints_off)
+        return names, plan.off
     files = sorted(folder.glob("*.rcl"))
     if not files:
         found.append(Diagnostic("RCL002", f"{folder} holds neither a plan.yaml nor an .rcl file"))
@@ -151,7 +151,7 @@ def _shelf(folder: Path) -> Shelf:
 
 def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
     """What there is to say of the folder's plan beside its contract files (which are checked already)."""
-    from avow.pipeline.check import of_plan, of_rest
+    from avow.pipeline.plan_check import of_plan, of_rest
     from avow.system.load import load_system
 
     try:
@@ -179,6 +179,6 @@ def _off(folder: Path) -> frozenset[str]:
     from avow.system.plan_file import read_plan
 
     try:
-        return frozenset(read_plan(folder / "plan.yaml")[0].lints_off)
+        return read_plan(folder / "plan.yaml")[0].off
     except Rejected:
         return frozenset()

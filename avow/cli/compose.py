@@ -24,9 +24,9 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.document import told
 from avow.calculus.export import derived_contract
 from avow.calculus.notation import write_goal
-from avow.calculus.obligations import composition_obligations, settle_each
+from avow.calculus.obligations import all_tasks, settle_each
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option, system_of
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Kind, Obligation
 from avow.language.translate import to_rcl
 from avow.solving.limits import from_seconds
 
@@ -86,11 +86,12 @@ def command(
     seconds: float,
     seed: int,
 ) -> int:
-    """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions.
+    """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions and the
+    requirements that have a formula.
 
     SYSTEM is a system's name or folder, or an .rcl file (without a plan, ports of one name are connected). Code 1 where
-    a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's stderr tells the
-    answers as they come; who interrupts it gets those so far.
+    a side condition or requirement is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's
+    stderr tells the answers as they come; who interrupts it gets those so far.
     """
     system = system_of(path)
     composition = compose(system)
@@ -118,8 +119,9 @@ def command(
         return 0
     if goals:  # a derivation stands only with those of the subsystems that it is made of
         chosen = list({part.name: part for goal in chosen for part in goal.inner_first()}.values())
-    prefixes = tuple(f"{goal.name}." for goal in chosen) if goals else ("",)
-    obligations = [o for o in composition_obligations(system) if o.name.startswith(prefixes)]
+    prefixes = tuple(f"{goal.name}." for goal in chosen)
+    every = (task.obligation for task in all_tasks(composition))
+    obligations = [o for o in every if not goals or (o.kind is Kind.COMPOSITION and o.name.startswith(prefixes))]
 
     asked = {o.name for o in obligations} | {f"{goal.name}.{c.about}" for goal in chosen for c in goal.conditions}
     with progress(len(asked)) as telling:

@@ -37,7 +37,7 @@ from avow.pipeline.workload import survey
     type=click.Choice(["worse", "never"]),
     default="worse",
     show_default=True,
-    help="Exit code 1 where less is shown or more supposed than before, or never.",
+    help="Exit code 1 where less is shown or more assumed than before, or never.",
 )
 def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on: str) -> int:
     """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.

@@ -1,4 +1,4 @@
-"""``avow doctor``: which tools are here."""
+"""``avow doctor``: which tools are here, and whether they work."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from avow.cli.options import json_option
 @click.command()
 @json_option()
 def command(as_json: bool) -> int:
-    """Which backends' tools are here, which versions, and the one command that installs a missing one."""
+    """Tries each tool with a one-line job; of a missing one, names the command that installs it.
+
+    Ends with 3 if a backend lacks the tool that it cannot work without."""
     from avow.pipeline.doctor import findings
 
-    found = findings()
+    found = findings(tried=True)
     if as_json:
         click.echo(document({"tools": found}))
     else:
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.table import Table
-
-        table = Table("for", "tool", "version", "where, or how to get it", box=None, header_style="bold")
+        width = max(len(f.used_by) for f in found)
         for f in found:
-            state = "[yellow]missing[/]" if f.version is None else f"[green]{f.version}[/]"
-            where = f.install if f.version is None else f.path or ""
-            table.add_row(escape(f.used_by), escape(f.tool), state, escape(where))
-        Console(highlight=False, soft_wrap=True).print(table)
-    return 3 if any(f.version is None and not f.optional for f in found) else 0
+            if f.version is None:
+                state, colour, where = "missing", "yellow", f.install
+            elif f.fault:
+                state, colour, where = f"{f.version} fails", "red", f"{f.fault} ({f.path or f.install})"
+            else:
+                state, colour, where = f.version, "green", f.path or ""
+            click.echo(f"{f.used_by:<{width}}  {f.tool:<13} {click.style(f'{state:<13}', fg=colour)} {where}".rstrip())
+    return 3 if any((f.version is None or f.fault) and not f.optional for f in found) else 0

@@ -18,7 +18,7 @@ from avow.base.workspace import Workspace, workspace
 from avow.cli.options import json_option
 from avow.evidence.ledger import Ledger, readable
 from avow.evidence.obligation import Kind
-from avow.pipeline.report_check import differences
+from avow.pipeline.report_check import outdated
 from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
 from avow.system.names import renamed
@@ -31,9 +31,10 @@ def command(name: str, as_json: bool) -> int:
     """Any name of a report. Of an obligation: its formula, where it stands, its evidence, how to run it again.
 
     ID is an obligation's id, whole (system/node/kind/name) or in part, a guarantee as node.name, or the name of a
-    requirement, a supposition (S1, or its key), a node, a gate, a weakening, a derivation, a method, an element of the
-    argument (G4 of gsn.yaml), a digest, a file, a diagnostic's code, or a word such as argued. It is told as the report
-    has it, and where that is not what the ledger says: exit code 1, or 2 where the ledger cannot be read.
+    requirement, an assumption (A1, or its key), a node, a gate, an assurance deficit, a derivation, a method, an
+    element of the argument (G4 of gsn.yaml), a digest, a file, a diagnostic's code, or a word such as argued. The
+    answer is the report's. Where the report is stale (the ledger, the contract, the plan or a program says something
+    else now), the answer is *not shown*: exit code 1, or 2 where the ledger cannot be read.
     """
     place = workspace()
     cases_here = _reported_cases(place)
@@ -49,14 +50,17 @@ def command(name: str, as_json: bool) -> int:
     told = [(system, title, lines) for system, title, lines in told if system in wrong]
     found = tuple((case, view) for case, view in found if case.system in wrong)
     wrong = {system: lines for system, lines in wrong.items() if lines}
+    stale = [view.id for case, view in found if case.system in wrong]
+    told = [(system, title, lines) for system, title, lines in told if system not in wrong]
+    found = tuple((case, view) for case, view in found if case.system not in wrong)
     if as_json:
         wanted = {view.id for _, view in found}
         cases = {case.system: case for case, _ in found}.values()
         listed = [o for case in cases for o in to_json(case)["obligations"] if _id(o["obligation"]) in wanted]
         others = [{"system": system, "title": title, "lines": lines} for system, title, lines in told]
-        click.echo(document({"obligations": listed, "others": others, "differences": wrong}))
+        click.echo(document({"obligations": listed, "others": others, "not_shown": stale, "differences": wrong}))
     else:
-        _show(told, found, wrong)
+        _show(told, found, stale, wrong)
     if faults:
         raise Rejected(*faults)
     return 1 if wrong else 0
@@ -65,15 +69,18 @@ def command(name: str, as_json: bool) -> int:
 def _show(
     told: Sequence[tuple[str, str, list[str]]],
     found: Sequence[tuple[Case, ObligationView]],
+    stale: Sequence[str],
     wrong: Mapping[str, Sequence[str]],
 ) -> None:
     for system, lines in wrong.items():
-        click.echo(f"{system}: as of an earlier state: its report does not say what the ledger says")
+        click.echo(f"{system}: not shown: its report is stale (`avow verify {system}` makes a new one)")
         for line in lines[:DIFF_REASONS]:
             click.echo(f"  ✘ {line}")
         if len(lines) > DIFF_REASONS:
             click.echo(f"  and {len(lines) - DIFF_REASONS} more: `avow report --check {system}`")
         click.echo()
+    for name in stale:
+        click.echo(f"{name}: not shown")
     for system, title, lines in told:
         click.echo(f"{system}: {title}")
         for line in lines:
@@ -88,14 +95,14 @@ def _show(
 
 
 def _held_against_ledgers(place: Workspace, cases: Sequence[Case]) -> tuple[dict[str, list[str]], list[Diagnostic]]:
-    """System → how its report differs from its ledger, where that can be read; what is wrong where it cannot."""
+    """System → why its report is stale, where its ledger can be read; what is wrong where it cannot."""
     wrong: dict[str, list[str]] = {}
     faults: list[Diagnostic] = []
     for case in cases:
         path = place.ledger(case.system)
         try:
             with readable(path):
-                wrong[case.system] = list(differences(case, path, place.root))
+                wrong[case.system] = list(outdated(case, path, place.root))
         except Rejected as rejected:
             faults += rejected.diagnostics
     return wrong, faults
@@ -172,7 +179,7 @@ def find_claim(
     guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
     such = f" (such as {guarantees[0]})" if guarantees else ""
     kinds = (
-        f"a guarantee{such}, a requirement, node, supposition, gate or file, a diagnostic's code, a word of the report"
+        f"a guarantee{such}, a requirement, node, assumption, gate or file, a diagnostic's code, a word of the report"
     )
     hint = f"did you mean `{today}`?" if today else did_you_mean(wanted, known, 3) or f"known: {kinds}"
     raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
@@ -183,8 +190,8 @@ def _names(case: Case) -> Iterator[str]:
     yield case.system
     yield from (node.name for node in case.nodes)
     yield from (r.id for r in case.requirements)
-    yield from (name for s in case.suppositions for name in (s.number, s.key))
-    yield from (w.key for w in case.weakenings)
+    yield from (name for s in case.assumptions for name in (s.number, s.key))
+    yield from (w.key for w in case.deficits)
     yield from (gate.id for gate in case.gates)
     yield from (d.derivation.name for d in case.derivations)
     yield from (method.name for method in case.methods)

@@ -15,18 +15,18 @@ from avow.base.tuning.running import DRAFT_MESSAGES
 from avow.base.tuning.sizes import ROS_GRAPH_BYTES
 from avow.language.format import format_text
 from avow.language.lexer import KEYWORDS
-from avow.ros.bags import Carried, NoBag, Origin, carried, messages
+from avow.ros.bags import Carried, Event, NoBag, Origin, carried, digest_trace, messages
 from avow.ros.calls import is_part, parts_of, with_calls
 from avow.ros.dds import LOOPBACK, ask_domain, domain_of
 from avow.ros.definitions import Definitions
-from avow.ros.drafting import Given, draft, is_plumbing, watch
+from avow.ros.drafting import Given, by_names, draft, is_plumbing, watch
 from avow.ros.listing import EVERY_SIDE, Listed, Listing, NoListing, parse_listing
 from avow.ros.master import ask_master
 from avow.ros.names import is_name
 from avow.ros.sources import definitions
 
 _MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
-_DOMAIN = re.compile(r"(dds(?::\d+)?)(?:@([\w.:-]+))?\Z")
+_DOMAIN = re.compile(r"((?:dds|ros2)(?::\d+)?)(?:@([\w.:-]+))?\Z")
 
 
 def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
@@ -34,6 +34,7 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     known, wrong = definitions((), distro)
     if wrong:
         raise Rejected(*wrong)
+    base = known
     listing = _listing(graph) if graph is not None else None
     origins: list[str] = []
     given = Given(folder.name, "", listing or Listing(()), known, frozenset(KEYWORDS), distro=distro)
@@ -43,15 +44,21 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
             known = Definitions({**known.messages, **found.known})
             seen, note = watch(known, found.types)
             whole = {topic for topic, kind in found.types.items() if not parts_of(topic, kind)}
+            heard: set[str] = set()
             for event, _ in islice(messages(bag, Origin(distro), whole.__contains__), DRAFT_MESSAGES):
                 note(event)
+                heard |= _names_in(event)
         except NoBag as no:
             raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None
-        listing = _together(listing, found)
+        listing, unsaid = _together(listing, found, heard)
         given = replace(
-            given, known=known, seen=seen, ros2=found.ros2, counts=found.counts, traces=(f"traces/{bag.name}",)
+            given,
+            known=known,
+            seen=seen,
+            ros2=found.ros2,
+            unsaid=unsaid,
+            traces={f"traces/{bag.name}": digest_trace(bag)},
         )
-        given = replace(given, publishers_known=graph is not None or any(found.publishers.values()))
         origins.append(bag.name)
     assert listing is not None
     if graph is not None:
@@ -60,15 +67,20 @@ def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder
     listing = with_calls(_sound(listing))
     if not any(node.publishes or node.subscribes for node in listing.nodes):
         raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: there is no node with a topic"))
+    if bag is not None:
+        given = replace(given, messages=_own_types(listing, known, base))
     graph_file = "models/rosgraph.txt" if graph is not None else None
     given = replace(given, listing=listing, origin=" and ".join(origins), graph=graph_file)
     made = draft(given)
     write(folder / "system.rcl", format_text(made.contract, str(folder / "system.rcl")))
     write(folder / "plan.yaml", made.plan)
+    for name, text in given.messages.items():
+        package, _, kind = name.partition("/")
+        write(folder / "msg" / package / "msg" / f"{kind}.msg", text)
     if graph is not None:
         write(folder / "models/rosgraph.txt", listing.text())
     if bag is not None:
-        (folder / "traces").mkdir(parents=True, exist_ok=True)
+        write(folder / "traces/.gitignore", f"# large, and named in plan.yaml with its digest\n/{bag.name}\n")
         (shutil.copytree if bag.is_dir() else shutil.copyfile)(bag, folder / "traces" / bag.name)
 
 
@@ -94,20 +106,42 @@ def _listing(graph: str) -> Listing:
         raise Rejected(Diagnostic("CLI011", f"{graph} cannot be read: {error.strerror or error}")) from None
 
 
-def _together(listing: Listing | None, found: Carried) -> Listing:
-    """What a bag says of who publishes, beside what a graph does. Where neither does, all of it is one node's."""
+def _names_in(event: Event) -> set[str]:
+    """The node that a message of ROS's own log or of its parameters names."""
+    match event:
+        case {"topic": "/rosout", "name": str(name)} if name:
+            return {f"/{name.strip('/').replace('.', '/')}"}
+        case {"topic": "/parameter_events", "node": str(name)}:
+            return {name}
+    return set()
+
+
+def _together(listing: Listing | None, found: Carried, heard: set[str]) -> tuple[Listing, frozenset[str]]:
+    """What a bag says of who publishes, beside what a graph does, and the nodes of which neither says so: these follow
+    from the topics' names."""
     nodes = listing.nodes if listing is not None else ()
     known = {topic for node in nodes for topic in node.publishes}
     callers: dict[str, list[str]] = {}
     for topic, names in found.publishers.items():
         for name in names if topic not in known else ():
             callers.setdefault(name, []).append(topic)
+    unsaid = frozenset[str]()
     if listing is None and not callers:
-        callers["/robot"] = [topic for topic in found.types if not is_plumbing(topic) and not _asks(topic)]
+        callers = by_names((topic for topic in found.types if not is_plumbing(topic)), heard)
+        unsaid = frozenset(callers)
     nodes = tuple(replace(n, publishes=(*n.publishes, *callers.pop(n.name, ()))) for n in nodes)
-    asked = tuple(topic for topic in found.types if _asks(topic)) if "/robot" in callers else ()
-    nodes += tuple(Listed(name, tuple(topics), asked) for name, topics in callers.items())
-    return Listing(nodes, {**(listing.types if listing is not None else {}), **found.types})
+    for name, topics in callers.items():
+        asked = tuple(filter(_asks, topics))
+        nodes += (Listed(name, tuple(t for t in topics if t not in asked), asked),)
+    return Listing(nodes, {**(listing.types if listing is not None else {}), **found.types}), unsaid
+
+
+def _own_types(listing: Listing, known: Definitions, base: Definitions) -> dict[str, str]:
+    """The definitions that a bag alone has, of what the topics carry: they are needed where the bag is not."""
+    kinds = (known.get(kind) for topic, kind in listing.types.items() if not is_plumbing(topic) and not is_part(topic))
+    wanted = {name for kind in kinds if kind is not None for name in (kind.name, *known.within(kind))}
+    found = ((name, known.get(name)) for name in sorted(wanted - base.messages.keys()))
+    return {name: message.text() for name, message in found if message is not None}
 
 
 def _asks(topic: str) -> bool:

@@ -54,7 +54,8 @@ _MONITOR = """\
     "graph",
     metavar="SOURCE",
     help="Draft it from a running ROS 1 master (`ros1`, or its http://… address), from a running ROS 2 graph "
-    "(`dds[:DOMAIN][@ADDRESS]`), or from a file: what `rosnode info` or `ros2 node info` say of the nodes, or JSON.",
+    "(`ros2[:DOMAIN][@ADDRESS]`, over DDS), or from a file: what `rosnode info` or `ros2 node info` say of the nodes, "
+    "or JSON.",
 )
 @click.option("--distro", help="The ROS distribution whose message types hold: noetic, humble, jazzy, …")
 @json_option()
@@ -90,7 +91,7 @@ def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str |
 
     outer = find_workspace(directory.resolve().parent)
     within = outer is not None and directory.resolve().parent == outer.contracts.resolve()
-    name = re.sub(r"[^A-Za-z0-9_-]", "_", bag.stem if bag is not None else "robot").lstrip("_-0123456789") or "robot"
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", directory.resolve().name).lstrip("_-0123456789") or "robot"
     draft_system(bag, graph, distro, directory if within else directory / "contracts" / name)
     if not within:
         _workspace(directory)

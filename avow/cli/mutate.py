@@ -14,7 +14,8 @@ from avow.base.diagnostics import Rejected
 from avow.base.workspace import system_folder, workspace
 from avow.cli.options import json_option, node_option, seconds_option
 from avow.pipeline.mutation import Score, hunt
-from avow.pipeline.run_info import SECONDS, new_run
+from avow.pipeline.run_info import new_run
+from avow.pipeline.settings import SECONDS
 from avow.pipeline.tasks import execute
 from avow.pipeline.workload import survey
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from avow.assurance.rates import RateView, misstated
 from avow.base.codec import Foreign, Unreadable, document, from_json, parsed
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import read_regular
@@ -30,10 +31,17 @@ class _Kernel(Foreign):
 
 
 @dataclass(frozen=True, slots=True)
+class _Requirement(Foreign):
+    id: str
+    rate: RateView | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class _Report(Foreign):
     """What of a report is of interest here."""
 
     kernel: _Kernel
+    requirements: tuple[_Requirement, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +73,9 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
 
     SYSTEM is a system's name or folder; CERTIFICATES a file certificates.json of its artifacts, or report.json.
-    Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
-    the claims under it; code 2 where there is nothing to establish.
+    Code 1 where a claim is not established from contract and plan as they are, where a label is not that of
+    the claims under it, and where a failure rate does not follow from its samples; code 2 where there is nothing to
+    establish.
     """
     claims = (How.SHOWN, How.POSSIBLE)
     system = load_path(path if path.is_dir() else system_folder(str(path)))
@@ -76,7 +85,8 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     try:
         kept = parsed(read_regular(certificates))
         whole = isinstance(kept, dict) and "kernel" in kept
-        found = from_json(_Report, kept).kernel.certificates if whole else from_json(dict[str, Certificate], kept)
+        report = from_json(_Report, kept) if whole else None
+        found = report.kernel.certificates if report else from_json(dict[str, Certificate], kept)
     except (OSError, Unreadable) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
     if not any(entry.how in claims for certificate in found.values() for entry in certificate.entries):
@@ -118,6 +128,9 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
                     continue
                 rests = f"on {rests_on} hypotheses" + (", vacuous" if true.vacuous else "")
                 click.echo(f"certified-{true.solvers}  {scope}: {called}, {rests}, key {true.key[:12]}")
+    for requirement in report.requirements if report else ():
+        if requirement.rate and (wrong := misstated(requirement.rate)):
+            refuse(f"requirement {requirement.id}", "failure rate", wrong)
     if as_json:
         click.echo(document({"claims": told, "solvers": dict(versions())}))
     else:

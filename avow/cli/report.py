@@ -13,9 +13,10 @@ from avow.base.workspace import find_workspace, report_folder, require_systems, 
 from avow.cli.options import PathArgument, json_option
 from avow.evidence.ledger import Ledger
 from avow.pipeline.report_check import check, stale
-from avow.pipeline.run_info import sign_with
+from avow.pipeline.settings import sign_with
 from avow.pipeline.state import task_name
 from avow.pipeline.tasks import execute
+from avow.report.pdf import write_pdf
 
 
 @click.command()
@@ -27,9 +28,10 @@ from avow.pipeline.tasks import execute
     metavar="REPORT",
     help="Does the report of this system, or in this folder, say what the ledger says?",
 )
+@click.option("--pdf", is_flag=True, help="Write report.pdf as well.")
 @click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Sign the attestations (AVOW_KEY).")
 @json_option()
-def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json: bool) -> int:
+def command(systems: tuple[str, ...], folder: Path | None, pdf: bool, key: object, as_json: bool) -> int:
     """Render the report of each SYSTEM (its name or folder; else all) from its ledger; nothing is verified.
 
     With --check REPORT nothing is written: every record that the report quotes is looked up in the ledger, every
@@ -42,7 +44,12 @@ def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json:
     systems = require_systems(place, systems)
     sign_with(key)
     wanted = [f"report:{task_name(name)}" for name in systems] or ["report"]
-    return execute(place.root, wanted, answer=sys.stdout if as_json else None)
+    code = execute(place.root, wanted, answer=sys.stdout if as_json else None)
+    if pdf and code == 0:
+        for folder in sorted({path.parent for path in place.reports.glob("*/report.json")}):
+            if not systems or folder.name in systems:
+                print(place.relative(write_pdf(read_case(folder), folder)), file=sys.stderr)
+    return code
 
 
 def _check(folder: Path, as_json: bool) -> int:

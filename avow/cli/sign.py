@@ -28,7 +28,7 @@ from avow.report.exchange import render_attestation
 @click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="A private key (`avow audit --new-key`).")
 @json_option()
 def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
-    """Sign a report: an in-toto statement of its verdict, suppositions and weakenings, in signed/SYSTEM/.
+    """Sign a report: an in-toto statement of its verdict, assumptions and deficits, in signed/SYSTEM/.
 
     The report has to say what the ledger says (as `avow report --check` does). Later reports tell what changed since.
     Without --key it is a name only. With one, the report's attestations stand beside the signature, each in a DSSE
@@ -72,6 +72,8 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
         click.echo(document({"system": case.system, "signed": str(path), "verdict": case.answers.verdict}))
     else:
         click.echo(case.answers.statement)
+        for s in case.assumptions:
+            click.echo(f"  {s.number} {s.words}")
         click.echo(f"signed as {who}, until {until}: {place.relative(path)}")
         click.echo(f"next: avow report {case.system}   (keep signed/ with the sources)")
     return 0

@@ -27,7 +27,7 @@ NOTATIONS = {
     "fretish": "avow.fretish.writing",
 }
 """Notation → the module with its function ``to_<notation>(contract)``, imported when it is asked for: it gives a text,
-or (`avow.fretish.writing.Partial`) a text and what is left out. Further notations are those of the backends
+or (`avow.language.contract.Partial`) a text and what is left out. Further notations are those of the backends
 (`avow.backend_kit.protocol.Backend`)."""
 
 

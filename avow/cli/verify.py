@@ -13,7 +13,7 @@ from avow.cli.options import PathArgument, json_option, seconds_option
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Cluster
-    from avow.pipeline.executors import Elsewhere
+    from avow.pipeline.remote import Remote
 
 
 @click.command()
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @seconds_option()
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
 @click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
-@click.option("--on", "address", help="Send works to a cluster: dask+tls://HOST:PORT (docs/scale.md).")
+@click.option("--on", "address", help="Send jobs to a cluster: dask+tls://HOST:PORT (docs/developers/scale.md).")
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
 )
@@ -43,7 +43,7 @@ def command(
 ) -> int:
     """Verify every system under contracts/, or only each SYSTEM (its name or folder)."""
     from avow.base.workspace import require_systems, workspace
-    from avow.pipeline.run_info import asked_of_runs, sign_with
+    from avow.pipeline.settings import asked_of_runs, sign_with
     from avow.pipeline.state import task_name
     from avow.pipeline.tasks import execute
 
@@ -52,25 +52,25 @@ def command(
     sign_with(key)
     asked_of_runs(fresh=fresh, explain=explain, sandbox=sandbox, seconds=seconds)
     wanted = [f"verify:{task_name(name)}" for name in systems] or ["verify"]
-    cluster, elsewhere = _cluster(address) if address else (None, None)
+    cluster, there = _cluster(address) if address else (None, None)
     if jobs is None:
         jobs = max(2, cluster.slots) if cluster else 2
     try:
-        return execute(place.root, wanted, jobs, sys.stdout if as_json else None, elsewhere)
+        return execute(place.root, wanted, jobs, sys.stdout if as_json else None, there)
     finally:
         if cluster:
             cluster.close()
 
 
-def _cluster(address: str) -> tuple[Cluster, Elsewhere]:
+def _cluster(address: str) -> tuple[Cluster, Remote]:
     """Raises Rejected where there is none, or none that could do anything."""
-    from avow.pipeline.asking import elsewhere
     from avow.pipeline.cluster import Address, Cluster
-    from avow.pipeline.run_info import ON
+    from avow.pipeline.remote import remote
+    from avow.pipeline.settings import ON
 
     found = Cluster(Address.read(address))
     try:
-        there = elsewhere(found)
+        there = remote(found)
     except Rejected:
         found.close()
         raise

@@ -17,8 +17,7 @@ def command(address: str, slots: int | None) -> int:
     What is offered are the backends that are installed here and the tools that they find. TLS needs the files that
     AVOW_TLS_CA, AVOW_TLS_CERT and AVOW_TLS_KEY name.
     """
-    from avow.pipeline.cluster import Address
-    from avow.pipeline.cluster_worker import serve
+    from avow.pipeline.cluster import Address, serve
 
     serve(Address.read(address), slots or os.cpu_count() or 1)
     print(f"the cluster at {address} has ended, or let this worker go", file=sys.stderr)

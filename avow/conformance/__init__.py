@@ -9,7 +9,7 @@ A test file names the backend and seeds it with contracts whose verdicts are kno
         seeded = (Seeded("heads", CONTRACT, {"heads": True}, {"same": Verdict.TESTED}), …)
 
 `avow.conformance.suite` says what is tested, `avow.conformance.seeded` what a seeded case is, and
-`avow.conformance.plugin` is what pytest loads. See `docs/adding-a-backend.md`.
+`avow.conformance.plugin` is what pytest loads. See `docs/developers/adding-a-backend.md`.
 """
 
 from __future__ import annotations

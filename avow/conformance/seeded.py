@@ -16,7 +16,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import from_json, to_json
 from avow.base.files import write
 from avow.base.verdict import Verdict
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 

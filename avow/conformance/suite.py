@@ -1,4 +1,4 @@
-"""What every backend is held to. The rules are those of `docs/adding-a-backend.md`; a test's docstring says which."""
+"""The rules that every backend must keep. `docs/developers/adding-a-backend.md` explains them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import pytest
 from avow.backend_kit import registry
 from avow.backend_kit.protocol import COMMON_OPTIONS, Backend, Job, Limits, lacks
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
 from avow.base.tools import find_tool
 from avow.base.tuning.running import CONFORMANCE_PATIENCE
 from avow.base.verdict import Outcome, Verdict
@@ -25,8 +26,8 @@ from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.sorts import BOOL
 from avow.language.terms import TRUE, And, History, Not, Past
 from avow.pipeline.evidence_keys import surroundings
-from avow.pipeline.work import method_job
-from avow.solving.smtlib import end_cvc5
+from avow.pipeline.methods import method_job
+from avow.solving.smtlib import CVC5
 from avow.system.plan import System
 
 _HOSTILE = ("class", "ensures", "lambda", "None", "self", "exit", "con", "x" * 120)
@@ -175,6 +176,16 @@ class Conformance:
             assert not Path(name).is_absolute()
             assert ".." not in Path(name).parts
             assert str(job.root) not in text, f"{name} holds this machine's paths"
+
+    def test_outside_checks(self, job: Job, tmp_path: Path) -> None:
+        """Each names a file that is there, and guarantees that the method takes on."""
+        files = self.backend.export(job)
+        for name, text in files.items():
+            write(tmp_path / name, text)
+        for check in self.backend.outside_checks(job, tmp_path, tuple(files)):
+            assert check.file.is_file(), check.file
+            assert check.command
+            assert set(check.guarantees) <= set(job.method.guarantees)
 
     def test_translations(self, job: Job) -> None:
         """Every notation says something or what it lacks; input at fault is Rejected, with a place or a reason."""
@@ -394,7 +405,7 @@ def _tree(folder: Path) -> dict[str, bytes]:
 def _children() -> set[int]:
     """The processes that this one started and that still run; none where the system does not tell. The second solver's
     is the pipeline's own, which keeps it for the next question: it is ended first."""
-    end_cvc5()
+    CVC5.close()
     if sys.platform != "linux":
         return set()
     found = set()

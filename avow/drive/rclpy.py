@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import types
 from collections.abc import Callable
 from typing import Any
@@ -28,9 +29,47 @@ OF_NODES += ("executor",)
 
 def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
     """Install them; what drives a class. `base` is the module `callbacks`."""
+    driven = _world(base, spec)
+    time, duration = _moments(base, driven)
+    kinds = _endpoints(base, driven, time)
+    node = _node(base, driven, kinds)
+    driven.install()
+    content = {
+        name: driven.module(f"rclpy.{name}", inside)
+        for name, inside in (
+            ("node", {"Node": node}),
+            ("time", {"Time": time}),
+            ("duration", {"Duration": duration}),
+            ("qos", _qos()),
+            *((name.lower(), {name: kind}) for name, kind in kinds.items()),
+        )
+    }
+    driven.module("rclpy", content)
+    return base.answers(driven, values, _maker(driven, node))  # type: ignore[no-any-return]
+
+
+def _world(base: Any, spec: Any) -> Any:
+    class World(base.Driven):  # type: ignore[misc]
+        def moment(self, wire: str, nanoseconds: int) -> Any:
+            made = self.classes[WIRES[wire]]()
+            made.sec, made.nanosec = divmod(nanoseconds, SECOND)
+            return made
+
+        def nanoseconds(self, wire: str, value: Any) -> int:
+            if type(value) is not self.classes[WIRES[wire]]:
+                raise TypeError(f"{value!r} is no {WIRES[wire]}")
+            return int(value.sec) * SECOND + int(value.nanosec)
+
+    return World(spec)
+
+
+def _moments(base: Any, driven: Any) -> tuple[Any, Any]:
+    """rclpy's Time and Duration."""
 
     @functools.total_ordering
     class Moment(base.Strict):  # type: ignore[misc]
+        _driven = driven
+
         def __init__(self, *, nanoseconds: int = 0, seconds: float = 0) -> None:
             self.nanoseconds = int(seconds * SECOND) + nanoseconds
 
@@ -68,19 +107,11 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
             kind: Any = Duration if type(other) is Time else Time
             return kind(nanoseconds=self.nanoseconds - other.nanoseconds)
 
-    class World(base.Driven):  # type: ignore[misc]
-        def moment(self, wire: str, nanoseconds: int) -> Any:
-            made = self.classes[WIRES[wire]]()
-            made.sec, made.nanosec = divmod(nanoseconds, SECOND)
-            return made
+    return Time, Duration
 
-        def nanoseconds(self, wire: str, value: Any) -> int:
-            if type(value) is not self.classes[WIRES[wire]]:
-                raise TypeError(f"{value!r} is no {WIRES[wire]}")
-            return int(value.sec) * SECOND + int(value.nanosec)
 
-    driven = World(spec)
-    Moment._driven = driven
+def _endpoints(base: Any, driven: Any, time: Any) -> dict[str, Any]:
+    """What a node makes, and its clock; by name."""
 
     class Publisher(base.Strict):  # type: ignore[misc]
         _driven, _called = driven, "rclpy.publisher.Publisher"
@@ -128,8 +159,12 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         _driven, _called = driven, "rclpy.clock.Clock"
 
         def now(self) -> Any:
-            return Time(nanoseconds=driven.now)
+            return time(nanoseconds=driven.now)
 
+    return {kind.__name__: kind for kind in (Publisher, Timer, Subscription, Parameter, Clock)}
+
+
+def _node(base: Any, driven: Any, kinds: dict[str, Any]) -> Any:
     class Node:
         """What a node inherits. Whatever else rclpy's Node has is refused by name."""
 
@@ -138,26 +173,24 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
 
         def create_subscription(self, msg_type: Any, topic: str, callback: Any, qos_profile: Any) -> Any:
             driven.hear(topic, msg_type, callback)
-            return Subscription()
+            return kinds["Subscription"]()
 
         def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any) -> Any:
-            return Publisher(driven.speak(topic, msg_type), msg_type)
+            return kinds["Publisher"](driven.speak(topic, msg_type), msg_type)
 
         def create_timer(self, timer_period_sec: float, callback: Any) -> Any:
             if not timer_period_sec > 0:
                 raise ValueError(f"a timer's period is above 0, not {timer_period_sec!r}")
-            return Timer(int(float(timer_period_sec) * SECOND), callback)
+            return kinds["Timer"](int(float(timer_period_sec) * SECOND), callback)
 
         def declare_parameter(self, name: str, value: Any = None) -> Any:
             if name in self._avow_declared:
                 raise driven.refuse(f"a second declaration of the parameter {name}")
-            at: Any = driven.params
-            for part in name.split("."):
-                at = at[part] if isinstance(at, dict) and part in at else None
+            at = dict(flat(driven.params)).get(name)
             found = value if at is None else at
             if at is not None and value is not None and type(at) is not type(value):
                 raise TypeError(f"the parameter {name} is declared as {value!r}, and set to {at!r}")
-            self._avow_declared[name] = Parameter(name, found)
+            self._avow_declared[name] = kinds["Parameter"](name, found)
             return self._avow_declared[name]
 
         def declare_parameters(self, namespace: str, parameters: Any) -> Any:
@@ -173,7 +206,7 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
             return self._avow_declared[name]
 
         def get_clock(self) -> Any:
-            return Clock()
+            return kinds["Clock"]()
 
         def get_logger(self) -> Any:
             return base.Log(LOGS)
@@ -195,6 +228,10 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
                 raise driven.refuse(f"rclpy.node.Node.{name}")
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
+    return Node
+
+
+def _qos() -> dict[str, Any]:
     class QoSProfile:
         """How much is kept, and how surely it is sent: here every message arrives."""
 
@@ -212,28 +249,34 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
     ):
         qos |= dict.fromkeys((f"{short}Policy", long), policy(short, *words))
     qos |= dict.fromkeys(("qos_profile_sensor_data", "qos_profile_system_default"), QoSProfile(depth=10))
-    driven.install()
-    content: dict[str, Any] = {}
-    for name, inside in (
-        ("node", {"Node": Node}),
-        ("time", {"Time": Time}),
-        ("duration", {"Duration": Duration}),
-        ("qos", qos),
-        ("publisher", {"Publisher": Publisher}),
-        ("timer", {"Timer": Timer}),
-        ("subscription", {"Subscription": Subscription}),
-        ("parameter", {"Parameter": Parameter}),
-        ("clock", {"Clock": Clock}),
-    ):
-        content[name] = driven.module(f"rclpy.{name}", inside)
-    driven.module("rclpy", content)
+    return qos
 
+
+def _maker(driven: Any, base_class: Any) -> Callable[[Any, Any], Any]:
     def make(made: Any, params: Any) -> Any:
-        if not issubclass(made, Node):
+        if not issubclass(made, base_class):
             raise TypeError(f"{made.__name__} is no rclpy.node.Node")
-        return made()
+        node = made()
+        unknown = [name for name, _ in flat(driven.params) if name not in node._avow_declared and not OWN.match(name)]
+        if unknown:
+            known = ", ".join(sorted(node._avow_declared)) or "none"
+            raise ValueError(f"the parameter {unknown[0]} is set, and the class declares {known}")
+        return node
 
-    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+    return make
+
+
+OWN = re.compile(r"use_sim_time\Z|start_type_description_service\Z|qos_overrides\.")
+"""Parameters that every node of rclpy declares itself."""
+
+
+def flat(params: Any, before: str = "") -> Any:
+    """Parameters by their dotted names."""
+    for name, value in params.items():
+        if isinstance(value, dict):
+            yield from flat(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
 
 
 WIRES = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}

@@ -13,7 +13,61 @@ LOGS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
 
 def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[[str], str]]:
     """Install them; what drives a class. `base` is the module `callbacks`."""
+    driven = _world(base, spec)
+    driven.time, driven.duration = time, duration = _times(driven, _moment(driven))
+    find = _parameters(driven)
 
+    def init_node(name: str, anonymous: bool = False, log_level: Any = None, disable_signals: bool = False) -> None:
+        """The node's name is what the plan says of it."""
+
+    class ROSException(Exception):  # noqa: N818 - rospy's name
+        pass
+
+    class ROSInterruptException(ROSException, KeyboardInterrupt):
+        pass
+
+    every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
+    content: dict[str, Any] = dict.fromkeys(every, base.Log.nothing)
+    content |= {cls.__name__: cls for cls in (*_endpoints(base, driven), time, duration, ROSException)}
+    content["ROSInterruptException"] = ROSInterruptException
+    content |= {
+        "get_param": _getter(find),
+        "init_node": init_node,
+        "has_param": lambda name: find(name) is not _NONE,
+        "get_time": lambda: time.now().to_sec(),
+        "get_rostime": time.now,
+        "get_name": lambda: driven.name,
+        "get_namespace": lambda: driven.name.rpartition("/")[0] + "/",
+        "resolve_name": driven.whole,
+        "is_shutdown": lambda: False,
+        "on_shutdown": base.Log.nothing,
+    }
+    driven.install()
+    driven.module("rospy", content)
+
+    def make(made: Any, params: Any) -> Any:
+        return made(params) if _takes(made) else made()
+
+    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+
+
+_NONE = object()
+
+
+def _world(base: Any, spec: Any) -> Any:
+    class World(base.Driven):  # type: ignore[misc]
+        def moment(self, wire: str, nanoseconds: int) -> Any:
+            return (self.time if wire == "time" else self.duration).of(nanoseconds)
+
+        def nanoseconds(self, wire: str, value: Any) -> int:
+            if type(value) is not (self.time if wire == "time" else self.duration):
+                raise TypeError(f"{value!r} is no {wire}")
+            return int(value.ns)
+
+    return World(spec)
+
+
+def _moment(driven: Any) -> Any:
     @functools.total_ordering
     class Moment:
         """Whole nanoseconds, as genpy's times are."""
@@ -92,11 +146,17 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def __repr__(self) -> str:
             return f"rospy.{type(self).__name__}[{self.ns}]"
 
-    class Duration(Moment):
+    return Moment
+
+
+def _times(driven: Any, moment: Any) -> tuple[Any, Any]:
+    """rospy's Time and Duration."""
+
+    class Duration(moment):  # type: ignore[misc]
         __slots__ = ()
 
         def __add__(self, other: Any) -> Any:
-            return type(other).of(self.ns + other.ns) if isinstance(other, Moment) else NotImplemented
+            return type(other).of(self.ns + other.ns) if isinstance(other, moment) else NotImplemented
 
         def __sub__(self, other: Any) -> Any:
             return Duration.of(self.ns - other.ns) if isinstance(other, Duration) else NotImplemented
@@ -127,7 +187,7 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def __abs__(self) -> Any:
             return Duration.of(abs(self.ns))
 
-    class Time(Moment):
+    class Time(moment):  # type: ignore[misc]
         __slots__ = ()
 
         def possible(self) -> None:
@@ -146,17 +206,10 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
                 return Duration.of(self.ns - other.ns)
             return Time.of(self.ns - other.ns) if isinstance(other, Duration) else NotImplemented
 
-    class World(base.Driven):  # type: ignore[misc]
-        def moment(self, wire: str, nanoseconds: int) -> Any:
-            return (Time if wire == "time" else Duration).of(nanoseconds)
+    return Time, Duration
 
-        def nanoseconds(self, wire: str, value: Any) -> int:
-            if type(value) is not (Time if wire == "time" else Duration):
-                raise TypeError(f"{value!r} is no {wire}")
-            return int(value.ns)
 
-    driven = World(spec)
-
+def _endpoints(base: Any, driven: Any) -> tuple[Any, Any, Any]:
     class Subscriber(base.Strict):  # type: ignore[misc]
         _driven, _called = driven, "rospy.Subscriber"
 
@@ -195,7 +248,7 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         _driven, _called = driven, "rospy.Timer"
 
         def __init__(self, period: Any, callback: Any, oneshot: bool = False, reset: bool = False) -> None:
-            if type(period) is not Duration or period.ns <= 0:
+            if type(period) is not driven.duration or period.ns <= 0:
                 raise TypeError(f"a timer's period is a Duration above 0, not {period!r}")
             self.period, self.callback, self.oneshot, self.before, self.over = period.ns, callback, oneshot, None, False
             driven.later(driven.now + self.period, self.fire)
@@ -203,7 +256,7 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def fire(self) -> None:
             if self.over:
                 return
-            now = Time.of(driven.now)
+            now = driven.time.of(driven.now)
             event, self.before = TimerEvent(self.before, now), now
             if not self.oneshot:
                 driven.later(driven.now + self.period, self.fire)
@@ -212,51 +265,28 @@ def modules(base: Any, spec: Any, values: Any) -> Callable[[Any, Any], Callable[
         def shutdown(self) -> None:
             self.over = True
 
-    none = object()
+    return Subscriber, Publisher, Timer
 
+
+def _parameters(driven: Any) -> Callable[[str], Any]:
     def find(name: str) -> Any:
         """Parameters of the declared file are the node's own: ``~limit``, and ``limit`` by no namespace."""
         at: Any = driven.params
         for part in name.lstrip("~").strip("/").split("/"):
-            at = at[part] if isinstance(at, dict) and part in at else none
+            at = at[part] if isinstance(at, dict) and part in at else _NONE
         return at
 
-    def get_param(name: str, default: Any = none) -> Any:
+    return find
+
+
+def _getter(find: Callable[[str], Any]) -> Callable[..., Any]:
+    def get_param(name: str, default: Any = _NONE) -> Any:
         found = find(name)
-        if found is none and default is none:
+        if found is _NONE and default is _NONE:
             raise KeyError(name)
-        return default if found is none else found
+        return default if found is _NONE else found
 
-    def init_node(name: str, anonymous: bool = False, log_level: Any = None, disable_signals: bool = False) -> None:
-        """The node's name is what the plan says of it."""
-
-    class ROSException(Exception):  # noqa: N818 - rospy's name
-        pass
-
-    class ROSInterruptException(ROSException, KeyboardInterrupt):
-        pass
-
-    every = [f"{name}{kind}" for name in LOGS for kind in ("", "_once", "_throttle", "_throttle_identical")]
-    content: dict[str, Any] = dict.fromkeys(every, base.Log.nothing)
-    content |= {cls.__name__: cls for cls in (Subscriber, Publisher, Timer, Time, Duration, ROSException)}
-    content |= {"ROSInterruptException": ROSInterruptException, "get_param": get_param, "init_node": init_node}
-    content |= {
-        "has_param": lambda name: find(name) is not none,
-        "get_time": lambda: Time.now().to_sec(),
-        "get_rostime": Time.now,
-        "get_name": lambda: driven.name,
-        "get_namespace": lambda: driven.name.rpartition("/")[0] + "/",
-        "resolve_name": driven.whole,
-        "is_shutdown": lambda: False,
-        "on_shutdown": base.Log.nothing,
-    }
-    driven.install()
-    driven.module("rospy", content)
-
-    def make(made: Any, params: Any) -> Any:
-        return made(params) if _takes(made) else made()
-
-    return base.answers(driven, values, make)  # type: ignore[no-any-return]
+    return get_param
 
 
 def _takes(made: Any) -> bool:

@@ -16,56 +16,13 @@ from avow.base.tuning.bounds import VALUES_ENUMERATED
 from avow.formulas import values
 from avow.formulas.disjunctions import Part
 from avow.formulas.values import Data, Element, FunctionValue, Value
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.operators import OPERATORS, implementation
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Item,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 Env = list[Any]
 Code = Callable[[Env], Any]
-Domains = Mapping[Sort, Sequence[Value]]
+Domains = Mapping[s.Sort, Sequence[Value]]
 
 
 class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
@@ -76,21 +33,21 @@ class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
         self.reason = reason
 
 
-def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ...] | None:
+def finite_values(sort: s.Sort, domains: Domains | None = None) -> tuple[Value, ...] | None:
     """Every value of a sort, or None where they are infinitely many, unspecified or too many to enumerate."""
     if domains and sort in domains:
         return tuple(domains[sort])
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return (False, True)
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return tuple(Element(member) for member in members)
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return combinations(items, domains)
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             found: list[Value] = []
             for constructor in constructors:
-                if any(isinstance(p, DataSort) for p in constructor.parameters):
+                if any(isinstance(p, s.DataSort) for p in constructor.parameters):
                     return None
                 arguments = combinations(constructor.parameters, domains)
                 if arguments is None:
@@ -102,7 +59,7 @@ def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ..
 
 
 def combinations(
-    sorts: Sequence[Sort], domains: Domains | None = None, most: int = VALUES_ENUMERATED
+    sorts: Sequence[s.Sort], domains: Domains | None = None, most: int = VALUES_ENUMERATED
 ) -> tuple[tuple[Value, ...], ...] | None:
     """Every combination of values of some sorts, or None where one has no end of values, or there are too many."""
     ranges = complete(finite_values(sort, domains) for sort in sorts)
@@ -126,11 +83,11 @@ class Quantifiers(Protocol):
     """How quantifiers are decided. It is handed to the compiler, since the two recurse: a quantifier's body is a term,
     and a term may hold quantifiers."""
 
-    def code(self, compiler: Compiler, term: Quantified) -> Code:
+    def code(self, compiler: Compiler, term: t.Quantified) -> Code:
         """The closure for a quantified formula, whose variables have slots."""
         ...
 
-    def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable]) -> Candidates: ...
+    def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[t.Variable]) -> Candidates: ...
 
 
 @dataclass(slots=True)
@@ -142,10 +99,10 @@ class Compiler:
     free: dict[str, int] = field(default_factory=dict)
     bound: dict[str, int] = field(default_factory=dict)
     size: int = 0
-    known: dict[int, tuple[Term, Code]] = field(default_factory=dict)
+    known: dict[int, tuple[t.Term, Code]] = field(default_factory=dict)
     """By identity; a term is kept with its closure, so that no other has its place."""
 
-    def slot(self, variable: Variable) -> int:
+    def slot(self, variable: t.Variable) -> int:
         """Where the environment holds the variable; a bound name that no quantifier binds is a free one."""
         name = variable.qualified
         if name in self.bound:
@@ -154,7 +111,7 @@ class Compiler:
             self.free[name] = self.new_slot()
         return self.free[name]
 
-    def bind(self, variable: Variable) -> int:
+    def bind(self, variable: t.Variable) -> int:
         if variable.name not in self.bound:
             self.bound[variable.name] = self.new_slot()
         return self.bound[variable.name]
@@ -163,7 +120,7 @@ class Compiler:
         self.size += 1
         return self.size - 1
 
-    def code(self, term: Term) -> Code:
+    def code(self, term: t.Term) -> Code:
         """The closure for a term, the same for the same object: planning asks for a part more than once, and clauses
         with memory share parts. To compare what terms say would cost their whole size at each of their parts."""
         found = self.known.get(id(term))
@@ -171,79 +128,85 @@ class Compiler:
             found = self.known[id(term)] = (term, self._code(term))
         return found[1]
 
-    def _code(self, term: Term) -> Code:
+    def _code(self, term: t.Term) -> Code:
         match term:
-            case Literal(value=value, sort=sort):
-                constant: Any = Fraction(value) if isinstance(sort, RealSort) and not isinstance(value, str) else value
+            case t.Literal(value=value, sort=sort):
+                constant: Any = (
+                    Fraction(value) if isinstance(sort, s.RealSort) and not isinstance(value, str) else value
+                )
                 return lambda env: constant
-            case EnumValue(name=name):
+            case t.EnumValue(name=name):
                 element = Element(name)
                 return lambda env: element
-            case Variable():
+            case t.Variable():
                 return operator.itemgetter(self.slot(term))
-            case Construct(constructor=constructor, arguments=arguments):
-                codes = tuple(map(self.code, arguments))
-                return lambda env: Data(constructor, tuple([c(env) for c in codes]))
-            case TupleTerm(items=items):
-                codes = tuple(map(self.code, items))
-                return lambda env: tuple([c(env) for c in codes])
-            case SequenceTerm(items=items) | SetTerm(items=items):
-                codes = tuple(map(self.code, items))
-                return lambda env: values.SequenceValue(tuple([c(env) for c in codes]))
-            case Apply():
+            case t.Construct() | t.TupleTerm() | t.SequenceTerm() | t.SetTerm():
+                return self._built(term)
+            case t.Apply():
                 return self._apply(term)
-            case Index():
+            case t.Index():
                 return self._index(term)
-            case Item(record=record, position=position):
-                inner = self.code(record)
-                return lambda env: inner(env)[position]
-            case Argument():
+            case t.Item() | t.Length() | t.Widen() | t.Negative() | t.Not():
+                return self._unary(term)
+            case t.Argument():
                 raise NotEvaluable("an argument of a value's constructor is asked for")
-            case Length(sequence=sequence):
-                inner = self.code(sequence)
-                return lambda env: len(inner(env).items)
-            case SequenceRange():
+            case t.SequenceRange():
                 return self._range(term)
-            case Widen(term=inside):
-                inner = self.code(inside)
-                return lambda env: Fraction(inner(env))
-            case Negative(term=inside):
-                inner = self.code(inside)
-                return lambda env: -inner(env)
-            case Arithmetic():
+            case t.Arithmetic():
                 return self._arithmetic(term)
-            case Operation(operator=name, arguments=arguments):
+            case t.Operation(operator=name, arguments=arguments):
                 codes, act = tuple(map(self.code, arguments)), implementation(OPERATORS[name].evaluate)
                 return lambda env: act(*[c(env) for c in codes])
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
+            case t.Conditional(condition=condition, then=then, otherwise=otherwise):
                 test, yes, no = self.code(condition), self.code(then), self.code(otherwise)
                 return lambda env: yes(env) if test(env) else no(env)
-            case Compare():
+            case t.Compare():
                 return self._compare(term)
-            case In():
+            case t.In():
                 return self._member(term)
-            case Not(body=body):
-                inner = self.code(body)
-                return lambda env: not inner(env)
-            case And(items=items):
+            case t.And(items=items):
                 return _all(tuple(map(self.code, items)))
-            case Or(items=items):
+            case t.Or(items=items):
                 return _any(tuple(map(self.code, items)))
-            case Implies(left=left, right=right):
-                return _any((self.code(Not(left)), self.code(right)))
-            case Iff(left=left, right=right):
+            case t.Implies(left=left, right=right):
+                return _any((self.code(t.Not(left)), self.code(right)))
+            case t.Iff(left=left, right=right):
                 one, other = self.code(left), self.code(right)
                 return lambda env: one(env) == other(env)
-            case Quantified():
+            case t.Quantified():
                 for variable in term.variables:
                     self.bind(variable)
                 return self.quantifiers.code(self, term)
-            case History(operator=name):
+            case t.History(operator=name):
                 raise NotEvaluable(f"`{name}` speaks of other steps")
             case _:
                 assert_never(term)
 
-    def _apply(self, term: Apply) -> Code:
+    def _built(self, term: t.Construct | t.TupleTerm | t.SequenceTerm | t.SetTerm) -> Code:
+        codes = tuple(map(self.code, term.children))
+        match term:
+            case t.Construct(constructor=constructor):
+                return lambda env: Data(constructor, tuple([c(env) for c in codes]))
+            case t.TupleTerm():
+                return lambda env: tuple([c(env) for c in codes])
+            case t.SequenceTerm() | t.SetTerm():
+                return lambda env: values.SequenceValue(tuple([c(env) for c in codes]))
+
+    def _unary(self, term: t.Item | t.Length | t.Widen | t.Negative | t.Not) -> Code:
+        inner = self.code(*term.children)
+        match term:
+            case t.Item(position=position):
+                return lambda env: inner(env)[position]
+            case t.Length():
+                return lambda env: len(inner(env).items)
+            case t.Widen():
+                return lambda env: Fraction(inner(env))
+            case t.Negative():
+                return lambda env: -inner(env)
+            case t.Not():
+                return lambda env: not inner(env)
+
+    def _apply(self, term: t.Apply) -> Code:
         function = self.code(term.function)
         codes = tuple(map(self.code, term.arguments))
         if len(codes) == 1:
@@ -261,7 +224,7 @@ class Compiler:
 
         return many
 
-    def _index(self, term: Index) -> Code:
+    def _index(self, term: t.Index) -> Code:
         sequence, index = self.code(term.sequence), self.code(term.index)
 
         def run(env: Env) -> Any:
@@ -272,7 +235,7 @@ class Compiler:
 
         return run
 
-    def _range(self, term: SequenceRange) -> Code:
+    def _range(self, term: t.SequenceRange) -> Code:
         low, high = self.code(term.low), self.code(term.high)
 
         def run(env: Env) -> Any:
@@ -283,7 +246,7 @@ class Compiler:
 
         return run
 
-    def _arithmetic(self, term: Arithmetic) -> Code:
+    def _arithmetic(self, term: t.Arithmetic) -> Code:
         left, right = self.code(term.left), self.code(term.right)
         act = implementation(OPERATORS[term.operator].evaluate)
         if term.operator == "/":
@@ -297,9 +260,9 @@ class Compiler:
             return divide
         return lambda env: act(left(env), right(env))
 
-    def _compare(self, term: Compare) -> Code:
+    def _compare(self, term: t.Compare) -> Code:
         left, right = self.code(term.left), self.code(term.right)
-        if isinstance(term.left.sort, FunctionSort):
+        if isinstance(term.left.sort, s.FunctionSort):
             ranges = [finite_values(sort) for sort in term.left.sort.parameters]
             size = None if None in ranges else math.prod(len(r) for r in ranges if r is not None)
             wanted = term.operator == "=="
@@ -307,16 +270,16 @@ class Compiler:
         act = implementation(OPERATORS[term.operator].evaluate)
         return lambda env: act(left(env), right(env))
 
-    def _member(self, term: In) -> Code:
+    def _member(self, term: t.In) -> Code:
         item = self.code(term.item)
         match term.collection:
-            case SetTerm(items=items) | SequenceTerm(items=items):
-                codes = tuple(self.code(Compare("==", term.item, each)) for each in items)
-                if all(isinstance(each, EnumValue) for each in items):
-                    names = frozenset(Element(each.name) for each in items if isinstance(each, EnumValue))
+            case t.SetTerm(items=items) | t.SequenceTerm(items=items):
+                codes = tuple(self.code(t.Compare("==", term.item, each)) for each in items)
+                if all(isinstance(each, t.EnumValue) for each in items):
+                    names = frozenset(Element(each.name) for each in items if isinstance(each, t.EnumValue))
                     return lambda env: item(env) in names
                 return _any(codes)
-            case SequenceRange(low=low, high=high):
+            case t.SequenceRange(low=low, high=high):
                 start, end = self.code(low), self.code(high)
                 return lambda env: start(env) <= item(env) <= end(env)
             case collection:
@@ -368,30 +331,38 @@ def _same_function(left: FunctionValue, right: FunctionValue, size: int | None) 
     return left.default == right.default or (size is not None and len(points) >= size)
 
 
-def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
+def member_of(sort: s.Sort, domains: Domains) -> Callable[[Any], bool] | None:
     """The test that a value found elsewhere lies in a variable's range, or None where every found value does."""
     if sort in domains:
         known = frozenset(domains[sort])
         return lambda value: value in known
     match sort:
-        case NaturalSort():
+        case s.NaturalSort():
             return lambda value: value.__class__ is int and value >= 0
-        case IntegerSort():
+        case s.IntegerSort():
             return lambda value: value.__class__ is int
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return _members(items, domains)
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             made = {c.name: test for c in constructors if (test := _members(c.parameters, domains)) is not None}
             return (lambda value: made.get(value.constructor, lambda _: True)(value.arguments)) if made else None
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             each = member_of(item, domains)
             return None if each is None else lambda value: all(map(each, value.items))
-        case BoolSort() | RealSort() | StringSort() | EnumSort() | OpaqueSort() | FunctionSort() | SetSort():
+        case (
+            s.BoolSort()
+            | s.RealSort()
+            | s.StringSort()
+            | s.EnumSort()
+            | s.OpaqueSort()
+            | s.FunctionSort()
+            | s.SetSort()
+        ):
             return None  # what is found for such a variable is of its sort
         case _:
             assert_never(sort)
 
 
-def _members(sorts: Sequence[Sort], domains: Domains) -> Callable[[Any], bool] | None:
+def _members(sorts: Sequence[s.Sort], domains: Domains) -> Callable[[Any], bool] | None:
     tests = [(k, test) for k, sort in enumerate(sorts) if (test := member_of(sort, domains)) is not None]
     return (lambda values: all(test(values[k]) for k, test in tests)) if tests else None

@@ -3,8 +3,8 @@
 ``exists(x, y in REAL | in.at(x, y) and …)`` can only hold at a point of the table ``in.at``; ``out.c == move(x, y)``
 fixes x and y; ``0 <= i < n`` leaves n values. A `Search` turns the body into alternatives of conjunctions, finds for
 each an order in which its parts bind the variables, and checks every candidate against all parts. ``forall`` is the
-search for a counterexample. A variable that no part restricts is left to `avow.evaluation.unrestricted_variables`; if
-that cannot treat it either, `NotEvaluable` says which variable it is.
+search for a counterexample. For a variable that no part restricts a solver is asked
+(`avow.evaluation.solved_variables`); where it finds no answer, `NotEvaluable` says which variable it is.
 """
 
 from __future__ import annotations
@@ -16,26 +16,13 @@ from typing import Any
 from avow.base.tuning.bounds import DISJUNCTION_DEPTH, VALUES_ENUMERATED
 from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
 from avow.evaluation.patterns import pattern, patterns
+from avow.evaluation.solved_variables import solved_step
 from avow.evaluation.table_rows import Lookup, Step, Unrestricted, table_rows
-from avow.evaluation.unrestricted_variables import leftover_steps
 from avow.formulas.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.formulas.renaming import bound_names
+from avow.language import terms as t
 from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
-from avow.language.terms import (
-    Apply,
-    Compare,
-    In,
-    Not,
-    Quantified,
-    Quantifier,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    Variable,
-    Widen,
-)
 
 Doubt = NotEvaluable | None
 """What comes with a candidate: None where it surely satisfies the body, else why that could not be found out."""
@@ -49,7 +36,7 @@ class Search:
     """The assignments to `variables` under which `body` is `positive`."""
 
     def __init__(
-        self, compiler: Compiler, variables: Sequence[Variable], body: Term, positive: bool, *, unique: bool = False
+        self, compiler: Compiler, variables: Sequence[t.Variable], body: t.Term, positive: bool, *, unique: bool = False
     ) -> None:
         self._compiler = compiler
         self._unique = unique
@@ -150,7 +137,7 @@ class Plan:
         self,
         compiler: Compiler,
         parts: Sequence[Part],
-        variables: Sequence[Variable],
+        variables: Sequence[t.Variable],
         true_defaults: frozenset[int],
         *,
         complete: bool,
@@ -214,7 +201,7 @@ class Plan:
         pending[:] = [p for p in pending if p.names & unbound]
         return tuple(_truth(self._compiler, p) for p in ready)
 
-    def _best(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, Variable]) -> Step | None:
+    def _best(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, t.Variable]) -> Step | None:
         step = self._restriction(pending, unbound, by_name)
         if step is not None:
             return step
@@ -225,7 +212,7 @@ class Plan:
                     return _one_of(self._compiler, by_name[name], finite)
         return None
 
-    def _restriction(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, Variable]) -> Step | None:
+    def _restriction(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, t.Variable]) -> Step | None:
         found: list[Step] = []
         for part in pending:
             step = self._restrict(part, unbound)
@@ -237,12 +224,10 @@ class Plan:
             found = [s for n in by_name if n in unbound and (s := self._interval(pending, by_name[n], unbound))]
         return min(found, key=lambda s: s.rank, default=None)
 
-    def _leftover(self, pending: Sequence[Part], variables: list[Variable], unique: bool) -> None:
+    def _leftover(self, pending: Sequence[Part], variables: list[t.Variable], unique: bool) -> None:
         truths = [_truth(self._compiler, p) for p in pending]
-        for step in leftover_steps(self._compiler, pending, variables, unique=unique):
-            self._steps.append(step)
-            self._checks.append(())
-        self._checks[-1] = tuple(truths)
+        self._steps.append(solved_step(self._compiler, pending, variables, unique=unique))
+        self._checks.append(tuple(truths))
 
     def _restrict(self, part: Part, unbound: set[str]) -> Step | None:
         term, positive = part.term, part.positive
@@ -250,20 +235,20 @@ class Plan:
         if options is not None:
             return self._cover(options, unbound)
         match term:
-            case Quantified(quantifier=Quantifier.UNIQUE) if positive:
+            case t.Quantified(quantifier=t.Quantifier.UNIQUE) if positive:
                 return self._cover(((term.body, True),), unbound, term.variables)
-            case Apply(sort=BoolSort()) if self._tables and not bound_names(term.function):
+            case t.Apply(sort=BoolSort()) if self._tables and not bound_names(term.function):
                 return self._points(term, positive, unbound)
-            case Compare(operator=operator) if operator == ("==" if positive else "!="):
+            case t.Compare(operator=operator) if operator == ("==" if positive else "!="):
                 found = self._equation(term.left, term.right, unbound) or self._equation(term.right, term.left, unbound)
-            case In() if positive:
+            case t.In() if positive:
                 found = self._membership(term, unbound)
             case _:  # only by what functions have elsewhere
                 found = None
         return found or (table_rows(self._compiler, part, unbound) if self._rows else None)
 
     def _cover(
-        self, options: Sequence[tuple[Term, bool]], unbound: set[str], variables: Sequence[Variable] = ()
+        self, options: Sequence[tuple[t.Term, bool]], unbound: set[str], variables: Sequence[t.Variable] = ()
     ) -> Step | None:
         """A disjunction restricts what every one of its sides restricts."""
         if self._depth >= DISJUNCTION_DEPTH:
@@ -274,7 +259,7 @@ class Plan:
             parts, inner = conjunction(option, positive)
             for variable in (*variables, *inner):
                 self._compiler.bind(variable)
-            wanted = [Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
+            wanted = [t.Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
             wanted += occurring(parts, unbound)
             plan = Plan(
                 self._compiler,
@@ -307,8 +292,8 @@ class Plan:
 
         return Step(2, common, run)
 
-    def _points(self, term: Apply, positive: bool, unbound: set[str]) -> Step | None:
-        if isinstance(term.function, Variable) and (self._compiler.slot(term.function) in self._true) is positive:
+    def _points(self, term: t.Apply, positive: bool, unbound: set[str]) -> Step | None:
+        if isinstance(term.function, t.Variable) and (self._compiler.slot(term.function) in self._true) is positive:
             return None
         left = set(unbound)
         matching = patterns(self._compiler, term.arguments, left)
@@ -328,7 +313,7 @@ class Plan:
 
         return Step(1, frozenset(unbound - left), run)
 
-    def _equation(self, left: Term, right: Term, unbound: set[str]) -> Step | None:
+    def _equation(self, left: t.Term, right: t.Term, unbound: set[str]) -> Step | None:
         """``left == right`` where the left side is known."""
         if bound_names(left) & unbound:
             return None
@@ -343,11 +328,11 @@ class Plan:
                     yield None
 
             return Step(0, frozenset(unbound - free), once)
-        if self._tables and isinstance(right, Apply) and not bound_names(right.function):
+        if self._tables and isinstance(right, t.Apply) and not bound_names(right.function):
             return self._preimage(right, known, unbound)
         return None
 
-    def _preimage(self, term: Apply, known: Code, unbound: set[str]) -> Step | None:
+    def _preimage(self, term: t.Apply, known: Code, unbound: set[str]) -> Step | None:
         free = set(unbound)
         matching = patterns(self._compiler, term.arguments, free)
         if matching is None or len(free) == len(unbound):
@@ -364,7 +349,7 @@ class Plan:
 
         return Step(1, frozenset(unbound - free), run)
 
-    def _membership(self, term: In, unbound: set[str]) -> Step | None:
+    def _membership(self, term: t.In, unbound: set[str]) -> Step | None:
         if bound_names(term.collection) & unbound:
             return None
         free = set(unbound)
@@ -374,13 +359,13 @@ class Plan:
         match = matching
         candidates: Callable[[Env], Iterable[Any]]
         match term.collection:
-            case SetTerm(items=items) | SequenceTerm(items=items):
+            case t.SetTerm(items=items) | t.SequenceTerm(items=items):
                 codes = tuple(map(self._compiler.code, items))
 
                 def candidates(env: Env) -> Iterable[Any]:
                     return [c(env) for c in codes]
 
-            case SequenceRange(low=low, high=high):
+            case t.SequenceRange(low=low, high=high):
                 start, end = self._compiler.code(low), self._compiler.code(high)
 
                 def candidates(env: Env) -> Iterable[Any]:
@@ -400,7 +385,7 @@ class Plan:
 
         return Step(1, frozenset(unbound - free), run)
 
-    def _interval(self, parts: Sequence[Part], variable: Variable, unbound: set[str]) -> Step | None:
+    def _interval(self, parts: Sequence[Part], variable: t.Variable, unbound: set[str]) -> Step | None:
         """An integer variable between two known bounds."""
         if not isinstance(variable.sort, IntegerSort | NaturalSort) or variable.sort in self._compiler.domains:
             return None
@@ -439,7 +424,7 @@ def _integers(low: int, high: int) -> range:
     return range(low, high + 1)
 
 
-def _one_of(compiler: Compiler, variable: Variable, finite: Sequence[Any]) -> Step:
+def _one_of(compiler: Compiler, variable: t.Variable, finite: Sequence[Any]) -> Step:
     slot = compiler.bind(variable)
 
     def run(env: Env) -> Iterator[None]:
@@ -450,9 +435,9 @@ def _one_of(compiler: Compiler, variable: Variable, finite: Sequence[Any]) -> St
     return Step(3, frozenset((variable.name,)), run)
 
 
-def _bound(part: Part, name: str) -> tuple[str, Term] | None:
+def _bound(part: Part, name: str) -> tuple[str, t.Term] | None:
     """``("<", t)`` where the part says that the variable is less than t."""
-    if not isinstance(part.term, Compare) or part.term.operator not in FLIPPED:
+    if not isinstance(part.term, t.Compare) or part.term.operator not in FLIPPED:
         return None
     operator = part.term.operator if part.positive else OPPOSITE[part.term.operator]
     if _is(part.term.left, name):
@@ -462,11 +447,11 @@ def _bound(part: Part, name: str) -> tuple[str, Term] | None:
     return None
 
 
-def _is(term: Term, name: str) -> bool:
-    if isinstance(term, Widen):
+def _is(term: t.Term, name: str) -> bool:
+    if isinstance(term, t.Widen):
         term = term.term
-    return isinstance(term, Variable) and term.qualified == name
+    return isinstance(term, t.Variable) and term.qualified == name
 
 
 def _truth(compiler: Compiler, part: Part) -> Code:
-    return compiler.code(part.term if part.positive else Not(part.term))
+    return compiler.code(part.term if part.positive else t.Not(part.term))

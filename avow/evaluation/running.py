@@ -14,21 +14,7 @@ from avow.formulas.formula import conjunction, disjunction, equation, negation, 
 from avow.formulas.renaming import rename_apart
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.values import Data, FunctionValue, Opaque, SequenceValue, Value
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.language.terms import Apply, Conditional, Role, Term, Variable
 
 
@@ -87,7 +73,7 @@ def _compile_table(term: Term, parameters: Sequence[Variable], instances: int) -
     """The function from the parameters to the term, of at most so many points. A guess (the term at the points before,
     and at values that nothing names) is held against the term, exactly, until no argument tells them apart. The result
     raises NotEvaluable: where there are more points, or infinitely many."""
-    kept = Variable(Role.INPUT, "kept#", FunctionSort(tuple(v.sort for v in parameters), term.sort))
+    kept = Variable(Role.INPUT, "kept#", s.FunctionSort(tuple(v.sort for v in parameters), term.sort))
     now = compile_term(term)
     body = rename_apart(_differ(term, Apply(kept, tuple(parameters), term.sort)), [v.name for v in parameters])
     compiler = Compiler({}, SEARCHES)
@@ -124,30 +110,30 @@ def _differ(term: Term, kept: Term) -> Term:
     return opposite(equation(term, kept))
 
 
-def unnamed(sort: Sort) -> Value:
+def unnamed(sort: s.Sort) -> Value:
     """A value that nothing names, as far as one can guess; of a finite sort, any: all are looked at."""
     finite = finite_values(sort)
     if finite:
         return finite[0]
     match sort:
-        case NaturalSort() | IntegerSort():
+        case s.NaturalSort() | s.IntegerSort():
             return 10**60
-        case RealSort():
+        case s.RealSort():
             return Fraction(10**61 + 1, 10)
-        case StringSort():
+        case s.StringSort():
             return "\0" * 60
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return tuple(map(unnamed, items))
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             return SequenceValue((unnamed(item),))
-        case OpaqueSort(name=name):
+        case s.OpaqueSort(name=name):
             return Opaque(name, 10**60)
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             made = max(constructors, key=lambda each: len(each.parameters))
-            if not any(isinstance(part, DataSort) for part in made.parameters):
+            if not any(isinstance(part, s.DataSort) for part in made.parameters):
                 return Data(made.name, tuple(map(unnamed, made.parameters)))
             raise NotEvaluable(f"something is remembered for each value of {sort}")
-        case BoolSort() | EnumSort() | FunctionSort() | SetSort():  # one value of many, or none of its own
+        case s.BoolSort() | s.EnumSort() | s.FunctionSort() | s.SetSort():  # one value of many, or none of its own
             raise NotEvaluable(f"something is remembered for each value of {sort}")
         case _:
             assert_never(sort)

@@ -8,6 +8,7 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Value
 from avow.language.subterms import ports_of
 from avow.language.terms import Term, Variable
+from avow.solving.replay import opaque_sorts, replay
 
 
 def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
@@ -22,16 +23,12 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
     sorts = _free_sorts(term)
     if not sorts.keys() <= valuation.keys():
         return None
-    from avow.solving.replay import replay  # Z3 takes a quarter of a second to load, and is seldom needed here
-
     return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
 
 
 def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
     """Whether the formula holds of the values, whatever those are that the valuation leaves out; None where that
     depends on them, or where Z3 cannot tell."""
-    from avow.solving.replay import opaque_sorts, replay
-
     if opaque_sorts(term):  # how many elements they have is not known
         return None
     known = {v: valuation[v.qualified] for v in _free_sorts(term).values() if v.qualified in valuation}

@@ -92,7 +92,7 @@ def _stand(claim: Claim, done: Mapping[str, Standing]) -> Standing:
     elif below:
         status = Status.UNSUPPORTED
     else:
-        status = Status.LINKED if claim.prose and worst[1].rank > Status.LINKED.rank else worst[1]
+        status = Status.ARGUED if claim.prose and worst[1].rank > Status.ARGUED.rank else worst[1]
     links = [link for link in (claim.link, *(s.link for _, s in under)) if link is not None]
     if claim.prose:
         links.append(Link.GUIDED)

@@ -22,8 +22,9 @@ from avow.isolation.observed import Observed, Seen, look, marks
 
 
 def stands(record: Evidence, root: Path) -> bool:
-    """Whether all that the subject looked at is as it was, and it was kept as far apart as is asked for now."""
-    return not changed(record, root) and _apart(record)
+    """Whether all that the unit under test looked at is as it was, and it was kept as far apart as is asked for now. A
+    refutation stands however it was kept: another isolation is no repair."""
+    return not changed(record, root) and (record.verdict is Verdict.REFUTED or _apart(record))
 
 
 def changed(record: Evidence, root: Path) -> tuple[str, ...]:
@@ -75,11 +76,6 @@ def looked_at(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
     for entry in entries:
         found |= {(o.path, o.kind): o for o in _rows(entry.evidence) or () if o.kind is not Seen.OUTSIDE}
     return tuple(Observed(o.kind, os.path.join(root, o.path), o.digest) for o in found.values())  # noqa: PTH118
-
-
-def undeclared(record: Evidence) -> bool:
-    """Whether what it used that cannot be recorded kept it from an answer."""
-    return record.verdict is Verdict.UNKNOWN and any(o.kind is Seen.OUTSIDE for o in _rows(record) or ())
 
 
 def _rows(record: Evidence) -> tuple[Observed, ...] | None:

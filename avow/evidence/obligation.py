@@ -9,6 +9,9 @@ from dataclasses import field
 from enum import StrEnum
 
 from avow.base.diagnostics import Span
+from avow.language.contract import TO_WRITE
+from avow.language.printer import show_term
+from avow.language.terms import TRUE
 
 
 class Kind(StrEnum):
@@ -29,6 +32,8 @@ class ProgramClaim(StrEnum):
     LINKED = "agrees-with-model"
     """The model that was verified in its place answers as it does."""
 
+
+_SAYS_NOTHING = show_term(TRUE)
 
 SYSTEM_LEVEL = "system"
 """Stands in an id where an obligation belongs to no single node."""
@@ -61,6 +66,11 @@ class Obligation:
     def id(self) -> str:
         """``system/node/kind/name``: for people, stable under edits of the formula."""
         return f"{self.system}/{self.node}/{self.kind}/{self.name}"
+
+    @property
+    def unwritten(self) -> bool:
+        """Whether it is a draft's placeholder (`avow.language.contract.Clause.unwritten`): no method answers it."""
+        return self.kind is Kind.GUARANTEE and self.name == TO_WRITE and self.formula == _SAYS_NOTHING
 
     def at(self, span: Span | None) -> Obligation:
         """The same claim, with another place in a text."""

@@ -30,6 +30,9 @@ OBSERVED = "observed"
 ISOLATION = "isolation"
 """Among a record's details: how far the subject was kept from its judge."""
 
+RATE = "rate"
+"""Among the details of a sample: its strata (`avow.kernel.rates.Stratum`), from which rates are composed."""
+
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records that say the same may count and the other not."""
 
@@ -74,7 +77,7 @@ class Evidence:
     run: str = ""
     """Id of the run that produced it."""
     rests_on: tuple[Hypothesis, ...] = field(default=(), metadata=LATER)
-    """What the answer rests on: claims of the case, and suppositions that a person has to accept."""
+    """What the answer rests on: claims of the case, and assumptions that a person has to accept."""
     of: Object = field(default=Object.MODEL, metadata=LATER)
     """What was verified."""
     numbers: str = field(default="exact", metadata=LATER)
@@ -82,6 +85,8 @@ class Evidence:
 
     @property
     def tool_told(self) -> str:
-        """The tool and its version, the name once."""
+        """The tool and its version, the name once. A person's reason is no tool's."""
+        if self.verdict is Verdict.JUSTIFIED:
+            return "a person"
         named = self.tool_version.casefold().startswith(self.tool.casefold())
         return self.tool_version if named and self.tool else f"{self.tool} {self.tool_version}".strip()

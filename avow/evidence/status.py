@@ -12,7 +12,7 @@ from enum import StrEnum
 from functools import cache, reduce
 
 from avow.base.records import dataclass
-from avow.base.verdict import Hypothesis, Link, Verdict, said
+from avow.base.verdict import Hypothesis, Link, Verdict
 from avow.evidence.record import Evidence
 
 
@@ -25,10 +25,12 @@ class Status(StrEnum):
     MONITORED = "monitored"
     REVIEWED = "reviewed"
     JUSTIFIED = "justified"
-    LINKED = "linked"
+    ARGUED = "argued"
     """A claim in prose: a person says that what stands below it, which holds, amounts to it."""
     PARTIAL = "partial"
     """Proved of every run that ends; that the runs end is not shown, and nobody has taken it upon himself."""
+    UNWRITTEN = "unwritten"
+    """A draft's placeholder: what the node promises is still to be written. Whatever else is open is told first."""
     VACUOUS = "vacuous"
     """Evidence whose trigger was never met: it supports nothing."""
     UNKNOWN = "unknown"
@@ -52,11 +54,6 @@ class Status(StrEnum):
         return self in _SUPPORTING
 
     @property
-    def word(self) -> str:
-        """What people read for it. JSON, SARIF and ledger have the value."""
-        return said(self.value)
-
-    @property
     def rank(self) -> int:
         """Greater is better; a total order, used to find the weakest and for nothing that needs commensurability."""
         return _RANK[self]
@@ -64,7 +61,7 @@ class Status(StrEnum):
 
 _BEST_FIRST = tuple(Status)
 _RANK = {status: len(_BEST_FIRST) - at for at, status in enumerate(_BEST_FIRST)}
-_SUPPORTING = frozenset(_BEST_FIRST[: _BEST_FIRST.index(Status.LINKED) + 1])
+_SUPPORTING = frozenset(_BEST_FIRST[: _BEST_FIRST.index(Status.ARGUED) + 1])
 _LINK_RANK = {Link.GENERATED: 3, Link.MAPPED: 2, Link.GUIDED: 1}
 
 

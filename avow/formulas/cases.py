@@ -12,46 +12,33 @@ from collections.abc import Iterator
 
 from avow.base.tuning.bounds import ATOMS_MADE
 from avow.formulas.traversal import Steps, run
+from avow.language import terms as t
 from avow.language.operators import definition
 from avow.language.sorts import BOOL
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Conditional,
-    History,
-    Iff,
-    Implies,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Term,
-)
 
 
 class TooManyCases(Exception):  # noqa: N818 - it names what the formula has
     """Its conditionals make more than `ATOMS_MADE` atoms."""
 
 
-def lifted(formula: Term) -> Term:
+def lifted(formula: t.Term) -> t.Term:
     """The formula without operators that choose between terms. Raises TooManyCases."""
     return run(_formula(formula, iter(range(ATOMS_MADE))))
 
 
-def _formula(term: Term, left: Iterator[int]) -> Steps[Term]:
+def _formula(term: t.Term, left: Iterator[int]) -> Steps[t.Term]:
     match term:
-        case Operation() if (made_of := definition(term)) is not None:
-            defined: Term = yield _formula(made_of, left)
+        case t.Operation() if (made_of := definition(term)) is not None:
+            defined: t.Term = yield _formula(made_of, left)
             return defined
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            parts = (Implies(condition, then, term.span), Implies(Not(condition), otherwise, term.span))
-            cases: Term = yield _formula(And(parts, term.span), left)
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise):
+            parts = (t.Implies(condition, then, term.span), t.Implies(t.Not(condition), otherwise, term.span))
+            cases: t.Term = yield _formula(t.And(parts, term.span), left)
             return cases
-        case Not() | And() | Or() | Implies() | Iff() | Quantified():
-            made: list[Term] = []
+        case t.Not() | t.And() | t.Or() | t.Implies() | t.Iff() | t.Quantified():
+            made: list[t.Term] = []
             for child in term.children:
-                part: Term = yield _formula(child, left)
+                part: t.Term = yield _formula(child, left)
                 made.append(part)
             return term.rebuild(tuple(made))
         case _:  # an atom
@@ -61,18 +48,18 @@ def _formula(term: Term, left: Iterator[int]) -> Steps[Term]:
             if chosen is None:
                 return term
             condition, one, other = chosen
-            result: Term = yield _formula(Conditional(condition, one, other, BOOL, term.span), left)
+            result: t.Term = yield _formula(t.Conditional(condition, one, other, BOOL, term.span), left)
             return result
 
 
-def _choice(term: Term) -> tuple[Term, Term, Term] | None:
+def _choice(term: t.Term) -> tuple[t.Term, t.Term, t.Term] | None:
     """The first choice within a term: on which condition it is which of two terms; None where there is none."""
     match term:
-        case Conditional():
+        case t.Conditional():
             return term.condition, term.then, term.otherwise
-        case Operation() if (made_of := definition(term)) is not None:
-            return _choice(made_of) if isinstance(made_of, Conditional) else (made_of, TRUE, FALSE)
-        case Quantified() | History():
+        case t.Operation() if (made_of := definition(term)) is not None:
+            return _choice(made_of) if isinstance(made_of, t.Conditional) else (made_of, t.TRUE, t.FALSE)
+        case t.Quantified() | t.History():
             return None  # what is chosen within depends on its variables, or on the step
         case _:  # no choice itself: the first one within it
             parts = term.children

@@ -17,44 +17,29 @@ from avow.base.tuning.sizes import CONDITION_DEPTH
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth
+from avow.language import terms as t
 from avow.language.definedness import demanded, with_value
 from avow.language.operators import definition
 from avow.language.sorts import BOOL, BoolSort
-from avow.language.terms import (
-    TRUE,
-    And,
-    Compare,
-    Conditional,
-    Iff,
-    Implies,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
     """`parts` hold together for some values of the `outer` variables: then something is demanded."""
 
-    outer: tuple[Variable, ...]
-    parts: tuple[Term, ...]
+    outer: tuple[t.Variable, ...]
+    parts: tuple[t.Term, ...]
 
     @property
-    def formula(self) -> Term:
+    def formula(self) -> t.Term:
         """That it comes about."""
         whole = with_value(conjunction(self.parts))
         free = free_variables(whole)
         used = tuple(v for v in self.outer if v in free)
-        return Quantified(Quantifier.EXISTS, used, whole) if used else whole
+        return t.Quantified(t.Quantifier.EXISTS, used, whole) if used else whole
 
 
-def conditions(formula: Term) -> tuple[Condition, ...]:
+def conditions(formula: t.Term) -> tuple[Condition, ...]:
     """Every condition under which the formula demands something, each once; none where it always demands all of it."""
     if depth(formula) > CONDITION_DEPTH:
         return ()
@@ -70,12 +55,12 @@ def conditions(formula: Term) -> tuple[Condition, ...]:
 class _Clause:
     """One disjunction. `halved`: it is one direction of an equivalence."""
 
-    outer: tuple[Variable, ...]
-    items: tuple[Term, ...]
+    outer: tuple[t.Variable, ...]
+    items: tuple[t.Term, ...]
     halved: bool = False
 
 
-def _parts(clause: _Clause) -> tuple[Term, ...]:
+def _parts(clause: _Clause) -> tuple[t.Term, ...]:
     given = [item for item in clause.items if _of_inputs(item)]
     rest = [item for item in clause.items if item not in given]
     if not given or not rest:
@@ -85,53 +70,53 @@ def _parts(clause: _Clause) -> tuple[Term, ...]:
     denials = [item for item in rest if _is_denial(item)]
     if len(denials) < len(rest):
         given += denials
-    return tuple(dict.fromkeys(part for item in given if (part := _denied(item)) != TRUE))
+    return tuple(dict.fromkeys(part for item in given if (part := _denied(item)) != t.TRUE))
 
 
-def _of_inputs(term: Term) -> bool:
-    return all(v.role is not Role.OUTPUT for v in free_variables(term))
+def _of_inputs(term: t.Term) -> bool:
+    return all(v.role is not t.Role.OUTPUT for v in free_variables(term))
 
 
-def _is_denial(item: Term) -> bool:
-    return isinstance(item, Not) or (isinstance(item, Compare) and item.operator == "!=")
+def _is_denial(item: t.Term) -> bool:
+    return isinstance(item, t.Not) or (isinstance(item, t.Compare) and item.operator == "!=")
 
 
-def _denied(item: Term) -> Term:
-    if isinstance(item, Compare) and item.operator == "!=":
-        return Compare("==", item.left, item.right)
+def _denied(item: t.Term) -> t.Term:
+    if isinstance(item, t.Compare) and item.operator == "!=":
+        return t.Compare("==", item.left, item.right)
     return negation(item)
 
 
-def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause]:
+def _clauses(term: t.Term, positive: bool, halve: bool = True) -> Iterator[_Clause]:
     """The disjunctions that together are the term, or its negation. Bound names are apart. Within an equivalence
     another one is not halved (`halve`): each would double what is said."""
     match term:
-        case Not(body=body):
+        case t.Not(body=body):
             yield from _clauses(body, not positive, halve)
-        case And(items=items) if positive:
+        case t.And(items=items) if positive:
             for item in items:
                 yield from _clauses(item, True, halve)
-        case Or(items=items) if not positive:
+        case t.Or(items=items) if not positive:
             for item in items:
                 yield from _clauses(item, False, halve)
-        case Or(items=items) | And(items=items):
+        case t.Or(items=items) | t.And(items=items):
             yield from _joined([(item, positive) for item in items], halve)
-        case Implies(left=left, right=right) if positive:
+        case t.Implies(left=left, right=right) if positive:
             yield from _joined([(left, False), (right, True)], halve)
-        case Implies(left=left, right=right):
+        case t.Implies(left=left, right=right):
             yield from _clauses(left, True, halve)
             yield from _clauses(right, False, halve)
-        case Iff(left=left, right=right) if halve:
+        case t.Iff(left=left, right=right) if halve:
             yield from _halves(left, right, positive)
-        case Operation(sort=BoolSort()) if halve and (defined := definition(term)) is not None:
+        case t.Operation(sort=BoolSort()) if halve and (defined := definition(term)) is not None:
             yield from _clauses(defined, positive, halve)
-        case Conditional(condition=condition, then=then, otherwise=otherwise) if halve:
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise) if halve:
             yield from _joined([(condition, False), (then, positive)], False)
             yield from _joined([(condition, True), (otherwise, positive)], False)
-        case Compare(operator="==" | "!=" as operator, left=left, right=right) if halve and left.sort == BOOL:
+        case t.Compare(operator="==" | "!=" as operator, left=left, right=right) if halve and left.sort == BOOL:
             yield from _halves(left, right, positive is (operator == "=="))
-        case Quantified(quantifier=quantifier, variables=variables, body=body) if quantifier is (
-            Quantifier.FORALL if positive else Quantifier.EXISTS
+        case t.Quantified(quantifier=quantifier, variables=variables, body=body) if quantifier is (
+            t.Quantifier.FORALL if positive else t.Quantifier.EXISTS
         ):
             for clause in _clauses(body, positive, halve):
                 yield _Clause((*variables, *clause.outer), clause.items, clause.halved)
@@ -139,13 +124,13 @@ def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause
             yield _Clause((), (term if positive else negation(term),))
 
 
-def _halves(left: Term, right: Term, same: bool) -> Iterator[_Clause]:
+def _halves(left: t.Term, right: t.Term, same: bool) -> Iterator[_Clause]:
     for one in (False, True):
         for clause in _joined([(left, one), (right, same is not one)], False):
             yield _Clause(clause.outer, clause.items, True)
 
 
-def _joined(parts: list[tuple[Term, bool]], halve: bool) -> Iterator[_Clause]:
+def _joined(parts: list[tuple[t.Term, bool]], halve: bool) -> Iterator[_Clause]:
     """The disjunction of some terms. A conjunction among them is spread over the others only where it says something
     of inputs and something of outputs: ``(a or b) -> c`` is under one condition."""
     choices: list[list[_Clause]] = []
@@ -169,15 +154,15 @@ def _joined(parts: list[tuple[Term, bool]], halve: bool) -> Iterator[_Clause]:
             )
 
 
-def _is_junction(term: Term, positive: bool) -> bool:
+def _is_junction(term: t.Term, positive: bool) -> bool:
     """Whether it is, as it stands here, a conjunction: of inputs only, it stays one condition."""
     match term:
-        case Not(body=body):
+        case t.Not(body=body):
             return _is_junction(body, not positive)
-        case And():
+        case t.And():
             return positive
-        case Or() | Implies():
+        case t.Or() | t.Implies():
             return not positive
-        case Iff():
+        case t.Iff():
             return True
     return False

@@ -14,136 +14,87 @@ from typing import assert_never
 from avow.base.remembered import by_identity
 from avow.formulas.flattening import joined
 from avow.formulas.traversal import Steps, run
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPPOSITE
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Builtin,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Item,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 # -- building ----------------------------------------------------------------------------------------------------------
 
 
-def conjunction(terms: Iterable[Term]) -> Term:
+def conjunction(terms: Iterable[t.Term]) -> t.Term:
     """``and`` of all of them, flattened; TRUE of none."""
-    return joined(terms, And, TRUE, FALSE)
+    return joined(terms, t.And, t.TRUE, t.FALSE)
 
 
-def disjunction(terms: Iterable[Term]) -> Term:
+def disjunction(terms: Iterable[t.Term]) -> t.Term:
     """``or`` of all of them, flattened; FALSE of none."""
-    return joined(terms, Or, FALSE, TRUE)
+    return joined(terms, t.Or, t.FALSE, t.TRUE)
 
 
-def negation(term: Term) -> Term:
+def negation(term: t.Term) -> t.Term:
     """``not``, without doubling it."""
-    if isinstance(term, Not):
+    if isinstance(term, t.Not):
         return term.body
-    if isinstance(term, Literal) and isinstance(term.value, bool):
-        return FALSE if term.value else TRUE
-    return Not(term)
+    if isinstance(term, t.Literal) and isinstance(term.value, bool):
+        return t.FALSE if term.value else t.TRUE
+    return t.Not(term)
 
 
-def opposite(term: Term) -> Term:
+def opposite(term: t.Term) -> t.Term:
     """An equivalent of ``not term``, without a `not` in front if there is one."""
-    return Compare(OPPOSITE[term.operator], term.left, term.right) if isinstance(term, Compare) else negation(term)
+    return t.Compare(OPPOSITE[term.operator], term.left, term.right) if isinstance(term, t.Compare) else negation(term)
 
 
-def equation(one: Term, other: Term) -> Term:
+def equation(one: t.Term, other: t.Term) -> t.Term:
     """That two terms have one value: ``<=>`` of formulas."""
-    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)
+    return t.Iff(one, other) if one.sort == s.BOOL else t.Compare("==", one, other)
 
 
 # -- variables ---------------------------------------------------------------------------------------------------------
 
 
-def free_variables(term: Term) -> frozenset[Variable]:
+def free_variables(term: t.Term) -> frozenset[t.Variable]:
     """Inputs, outputs, and bound variables whose quantifier is not in the term."""
-    free: set[Variable] = set()
-    stack: list[tuple[Term, frozenset[Variable]]] = [(term, frozenset())]
+    free: set[t.Variable] = set()
+    stack: list[tuple[t.Term, frozenset[t.Variable]]] = [(term, frozenset())]
     while stack:
         current, bound = stack.pop()
-        if isinstance(current, Variable):
+        if isinstance(current, t.Variable):
             if current not in bound:
                 free.add(current)
             continue
-        if isinstance(current, Quantified):
+        if isinstance(current, t.Quantified):
             bound = bound | frozenset(current.variables)
         stack.extend((child, bound) for child in current.children)
     return frozenset(free)
 
 
-def substitute(term: Term, mapping: Mapping[Variable, Term]) -> Term:
+def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
     """Put terms for free variables, all at once; bound variables are renamed where they would capture one."""
     if not mapping:
         return term
     taken = {variable.name for replacement in mapping.values() for variable in free_variables(replacement)}
     taken |= {variable.name for variable in free_variables(term)}
 
-    def steps(current: Term, active: Mapping[Variable, Term]) -> Steps[Term]:
-        if isinstance(current, Variable):
+    def steps(current: t.Term, active: Mapping[t.Variable, t.Term]) -> Steps[t.Term]:
+        if isinstance(current, t.Variable):
             return active.get(current, current)
-        if isinstance(current, Quantified):
-            inner = {v: t for v, t in active.items() if v not in current.variables}
-            renewed: list[Variable] = []
+        if isinstance(current, t.Quantified):
+            inner = {v: term for v, term in active.items() if v not in current.variables}
+            renewed: list[t.Variable] = []
             for variable in current.variables:
                 name = fresh(variable.name, taken) if inner and variable.name in taken else variable.name
-                renamed = Variable(Role.BOUND, name, variable.sort, variable.span)
+                renamed = t.Variable(t.Role.BOUND, name, variable.sort, variable.span)
                 if renamed != variable:
                     taken.add(name)
                     inner[variable] = renamed
                 renewed.append(renamed)
-            body: Term = yield steps(current.body, inner)
-            return Quantified(current.quantifier, tuple(renewed), body, current.span)
-        parts: list[Term] = []
+            body: t.Term = yield steps(current.body, inner)
+            return t.Quantified(current.quantifier, tuple(renewed), body, current.span)
+        parts: list[t.Term] = []
         for child in current.children:
-            part: Term = yield steps(child, active)
+            part: t.Term = yield steps(child, active)
             parts.append(part)
         return current.rebuild(tuple(parts)) if parts else current
 
@@ -160,18 +111,18 @@ def fresh(name: str, taken: Collection[str]) -> str:
 # -- normal form and digest --------------------------------------------------------------------------------------------
 
 
-def normalise(term: Term) -> Term:
+def normalise(term: t.Term) -> t.Term:
     """The normal form: same meaning, bound variables renamed by depth, commutative parts in a fixed order."""
     return run(_normal(term, {}, 0))[0]
 
 
-def digest(*terms: Term) -> str:
+def digest(*terms: t.Term) -> str:
     """SHA-256 of the meaning of some formulas; their order does not count."""
     return _hash("formulas", *sorted(set(map(meaning, terms))), "sorts")
 
 
 @by_identity(50_000)
-def meaning(term: Term) -> str:
+def meaning(term: t.Term) -> str:
     """SHA-256 of the meaning of one formula."""
     return run(_normal(term, {}, 0))[1]
 
@@ -183,25 +134,25 @@ def node_digest(node: Node, clause: Clause) -> str:
     return _hash(str(clause.kind), digest(clause.formula), assumed)
 
 
-def sort_digest(sort: Sort) -> str:
+def sort_digest(sort: s.Sort) -> str:
     """SHA-256 of a sort by its definition: the name of an enumeration or a data type does not count."""
     match sort:
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
+        case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
             return _hash(type(sort).__name__)
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return _hash("enum", *sorted(members))
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             made = (_hash(c.name, *map(sort_digest, c.parameters)) for c in constructors)
             return _hash("data", *sorted(made))
-        case OpaqueSort(name=name):
+        case s.OpaqueSort(name=name):
             return _hash("opaque", name)
-        case FunctionSort(parameters=parameters, result=result):
+        case s.FunctionSort(parameters=parameters, result=result):
             return _hash("function", *map(sort_digest, parameters), sort_digest(result))
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return _hash("tuple", *map(sort_digest, items), *(f"label {name}" for name in sort.labels))
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             return _hash("sequence", sort_digest(item))
-        case SetSort(item=item):
+        case s.SetSort(item=item):
             return _hash("set", sort_digest(item))
 
 
@@ -210,19 +161,19 @@ def _hash(*parts: str) -> str:
     return hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
-_Keyed = tuple[Term, str]
+_Keyed = tuple[t.Term, str]
 """A normal term and its digest: hashes of hashes, so that deep terms cost no more than wide ones."""
 
 _FLIPPED = {">": "<", ">=": "<="}
 
 
-def _normal(term: Term, scope: Mapping[Variable, Variable], level: int) -> Steps[_Keyed]:
-    if isinstance(term, Quantified):
+def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
+    if isinstance(term, t.Quantified):
         quantified: _Keyed = yield _normal_quantified(term, scope, level)
         return quantified
-    if isinstance(term, Variable):
+    if isinstance(term, t.Variable):
         return _keyed(scope.get(term, term))
-    if isinstance(term, And | Or):
+    if isinstance(term, t.And | t.Or):
         junction: _Keyed = yield _normal_junction(term, scope, level)
         return junction
     parts: list[_Keyed] = []
@@ -230,47 +181,49 @@ def _normal(term: Term, scope: Mapping[Variable, Variable], level: int) -> Steps
         part: _Keyed = yield _normal(child, scope, level)
         parts.append(part)
     match term:
-        case Not():
+        case t.Not():
             return _not(parts[0])
-        case Iff():
+        case t.Iff():
             return _iff(*parts)
-        case Compare(operator=operator):
+        case t.Compare(operator=operator):
             return _compare(operator, *parts)
-        case Operation(operator=Builtin.XOR):
+        case t.Operation(operator=t.Builtin.XOR):
             return _not(_iff(*parts))
-        case Arithmetic(operator="+" | "*") | Operation(operator=Builtin.MIN | Builtin.MAX):
+        case t.Arithmetic(operator="+" | "*") | t.Operation(operator=t.Builtin.MIN | t.Builtin.MAX):
             return _make(term, sorted(parts, key=_key))
-        case SetTerm():
+        case t.SetTerm():
             return _make(term, sorted({key: (part, key) for part, key in parts}.values(), key=_key))
-        case Literal() | EnumValue():
+        case t.Literal() | t.EnumValue():
             return _keyed(term)
         case _:  # its normal form is that of its parts, in their order
             return _make(term, parts)
 
 
-def _normal_quantified(term: Quantified, scope: Mapping[Variable, Variable], level: int) -> Steps[_Keyed]:
+def _normal_quantified(term: t.Quantified, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
     variables, body = list(term.variables), term.body
     while (
-        term.quantifier is not Quantifier.UNIQUE and isinstance(body, Quantified) and body.quantifier is term.quantifier
+        term.quantifier is not t.Quantifier.UNIQUE
+        and isinstance(body, t.Quantified)
+        and body.quantifier is term.quantifier
     ):
         variables.extend(body.variables)
         body = body.body
     inner = dict(scope)
-    fresh: list[Variable] = []
+    fresh: list[t.Variable] = []
     for offset, variable in enumerate(variables):
-        canonical = Variable(Role.BOUND, f"${level + offset}", variable.sort)
+        canonical = t.Variable(t.Role.BOUND, f"${level + offset}", variable.sort)
         fresh.append(canonical)
         inner[variable] = canonical
     part: _Keyed = yield _normal(body, inner, level + len(variables))
     sorts = (sort_digest(v.sort) for v in fresh)
-    return Quantified(term.quantifier, tuple(fresh), part[0]), _hash(term.quantifier, *sorts, part[1])
+    return t.Quantified(term.quantifier, tuple(fresh), part[0]), _hash(term.quantifier, *sorts, part[1])
 
 
-def _normal_junction(term: And | Or, scope: Mapping[Variable, Variable], level: int) -> Steps[_Keyed]:
+def _normal_junction(term: t.And | t.Or, scope: Mapping[t.Variable, t.Variable], level: int) -> Steps[_Keyed]:
     kind = type(term)
-    unit, zero = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
-    unique: dict[str, Term] = {}
-    stack: list[Term] = list(reversed(term.items))
+    unit, zero = (t.TRUE, t.FALSE) if kind is t.And else (t.FALSE, t.TRUE)
+    unique: dict[str, t.Term] = {}
+    stack: list[t.Term] = list(reversed(term.items))
     while stack:
         item = stack.pop()
         if isinstance(item, kind):
@@ -295,49 +248,49 @@ def _compare(operator: str, left: _Keyed, right: _Keyed) -> _Keyed:
     if operator in _FLIPPED:
         operator, left, right = _FLIPPED[operator], right, left
     if operator == "==":
-        if left[0].sort == BOOL:
+        if left[0].sort == s.BOOL:
             return _iff(left, right)
         left, right = sorted((left, right), key=_key)
-    return _make(Compare(operator, left[0], right[0]), [left, right])
+    return _make(t.Compare(operator, left[0], right[0]), [left, right])
 
 
 def _iff(left: _Keyed, right: _Keyed) -> _Keyed:
     for one, other in ((left, right), (right, left)):
-        if one[0] == TRUE:
+        if one[0] == t.TRUE:
             return other
-        if one[0] == FALSE:
+        if one[0] == t.FALSE:
             return _not(other)
     left, right = sorted((left, right), key=_key)
-    return _make(Iff(left[0], right[0]), [left, right])
+    return _make(t.Iff(left[0], right[0]), [left, right])
 
 
 def _not(part: _Keyed) -> _Keyed:
-    if isinstance(part[0], Not):
+    if isinstance(part[0], t.Not):
         return _keyed(part[0].body)
-    if part[0] == TRUE:
-        return _keyed(FALSE)
-    if part[0] == FALSE:
-        return _keyed(TRUE)
-    return _make(Not(part[0]), [part])
+    if part[0] == t.TRUE:
+        return _keyed(t.FALSE)
+    if part[0] == t.FALSE:
+        return _keyed(t.TRUE)
+    return _make(t.Not(part[0]), [part])
 
 
 def _key(part: _Keyed) -> str:
     return part[1]
 
 
-def _make(term: Term, parts: Iterable[_Keyed]) -> _Keyed:
+def _make(term: t.Term, parts: Iterable[_Keyed]) -> _Keyed:
     parts = tuple(parts)
     return term.rebuild(tuple(part for part, _ in parts)), _hash(*_head(term), *(key for _, key in parts))
 
 
-def _keyed(term: Term) -> _Keyed:
+def _keyed(term: t.Term) -> _Keyed:
     return term, _term_key(term)
 
 
-def _term_key(term: Term) -> str:
+def _term_key(term: t.Term) -> str:
     """The digest of a term that is normal already."""
 
-    def steps(current: Term) -> Steps[str]:
+    def steps(current: t.Term) -> Steps[str]:
         keys: list[str] = []
         for child in current.children:
             key: str = yield steps(child)
@@ -347,58 +300,58 @@ def _term_key(term: Term) -> str:
     return run(steps(term))
 
 
-def _head(term: Term) -> tuple[str, ...]:
+def _head(term: t.Term) -> tuple[str, ...]:
     """What a term says beside its direct subterms."""
     match term:
-        case Literal(value=value, sort=sort):
+        case t.Literal(value=value, sort=sort):
             return (
                 "literal",
                 type(value).__name__ if isinstance(value, bool | str) else "",
                 str(value),
                 sort_digest(sort),
             )
-        case EnumValue(name=name, sort=sort):
+        case t.EnumValue(name=name, sort=sort):
             return ("element", name, sort_digest(sort))
-        case Variable(role=role, name=name, sort=sort):
+        case t.Variable(role=role, name=name, sort=sort):
             return ("variable", role, name, sort_digest(sort))
-        case Construct(constructor=constructor, sort=data):
+        case t.Construct(constructor=constructor, sort=data):
             return ("construct", constructor, sort_digest(data))
-        case Arithmetic(operator=operator, sort=sort):
+        case t.Arithmetic(operator=operator, sort=sort):
             return ("arithmetic", operator, sort_digest(_integers(sort)))
-        case Compare(operator=operator):
+        case t.Compare(operator=operator):
             return ("compare", operator)
-        case Quantified(quantifier=quantifier, variables=variables):
+        case t.Quantified(quantifier=quantifier, variables=variables):
             return (quantifier, *(sort_digest(v.sort) for v in variables))
-        case Item(position=position):
+        case t.Item(position=position):
             return ("item", str(position))
-        case Argument(constructor=constructor, position=position):
+        case t.Argument(constructor=constructor, position=position):
             return ("argument", constructor, str(position))
-        case SequenceTerm(sort=sort) | SequenceRange(sort=sort) | SetTerm(sort=sort) | TupleTerm(sort=sort):
+        case t.SequenceTerm(sort=sort) | t.SequenceRange(sort=sort) | t.SetTerm(sort=sort) | t.TupleTerm(sort=sort):
             return (type(term).__name__, sort_digest(sort))
-        case Operation(operator=operator, sort=sort):
+        case t.Operation(operator=operator, sort=sort):
             return ("operation", operator, sort_digest(_integers(sort)))
-        case History(operator=operator, sort=sort, limit=limit):
+        case t.History(operator=operator, sort=sort, limit=limit):
             bound = () if limit is None else (limit.relation, "steps" if limit.steps else "seconds")
             return ("history", operator, sort_digest(_integers(sort)), *bound)
         case (
-            Apply()
-            | Index()
-            | Length()
-            | Widen()
-            | Negative()
-            | In()
-            | Not()
-            | And()
-            | Or()
-            | Implies()
-            | Iff()
-            | Conditional()
+            t.Apply()
+            | t.Index()
+            | t.Length()
+            | t.Widen()
+            | t.Negative()
+            | t.In()
+            | t.Not()
+            | t.And()
+            | t.Or()
+            | t.Implies()
+            | t.Iff()
+            | t.Conditional()
         ):
             return (type(term).__name__,)
         case _:
             assert_never(term)
 
 
-def _integers(sort: Sort) -> Sort:
+def _integers(sort: s.Sort) -> s.Sort:
     """NATURAL and INTEGER arithmetic is the same arithmetic."""
-    return IntegerSort() if isinstance(sort, NaturalSort) else sort
+    return s.IntegerSort() if isinstance(sort, s.NaturalSort) else sort

@@ -18,26 +18,11 @@ from avow.base.tuning.bounds import NUMBERS_WRITTEN_OUT, PARTS_SEARCHED
 from avow.formulas.disjunctions import conjuncts
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite, substitute
 from avow.formulas.traversal import transform
+from avow.language import terms as t
 from avow.language.bounds import constant
 from avow.language.operators import FLIPPED
 from avow.language.sorts import INTEGER, NATURAL, REAL, IntegerSort, NaturalSort, Sort, TupleSort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    Argument,
-    Arithmetic,
-    Compare,
-    Construct,
-    Iff,
-    Implies,
-    Item,
-    Literal,
-    Quantified,
-    Quantifier,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +30,13 @@ class Solved:
     """What an equation says of some variables: the `values` that they have, in terms of none of them, and the `rest`,
     which has to hold besides."""
 
-    values: Mapping[Variable, Term]
-    rest: tuple[Term, ...]
+    values: Mapping[t.Variable, t.Term]
+    rest: tuple[t.Term, ...]
 
 
-def solved(equation: Term, unknown: Collection[Variable]) -> Solved | None:
+def solved(equation: t.Term, unknown: Collection[t.Variable]) -> Solved | None:
     """An equation solved for those of the `unknown` variables that it determines; None where it determines none."""
-    if not isinstance(equation, Iff) and not (isinstance(equation, Compare) and equation.operator == "=="):
+    if not isinstance(equation, t.Iff) and not (isinstance(equation, t.Compare) and equation.operator == "=="):
         return None
     for pattern, known in (equation.children, reversed(equation.children)):
         if _mentions(pattern, unknown) and not _mentions(known, unknown):
@@ -61,87 +46,87 @@ def solved(equation: Term, unknown: Collection[Variable]) -> Solved | None:
     return None
 
 
-def made_with(term: Term) -> str | None:
+def made_with(term: t.Term) -> str | None:
     """The constructor of which a condition says, as `solved` does, that a value was made with it (of ``!=``: was not);
     None of every other term."""
     match term:
-        case Compare(operator="==" | "!=", left=left, right=Construct(constructor=name, arguments=arguments)):
-            own = (isinstance(a, Argument) and a.constructor == name and a.value == left for a in arguments)
+        case t.Compare(operator="==" | "!=", left=left, right=t.Construct(constructor=name, arguments=arguments)):
+            own = (isinstance(a, t.Argument) and a.constructor == name and a.value == left for a in arguments)
             return name if arguments and all(own) else None
         case _:  # says it of nothing
             return None
 
 
 @by_identity(10_000)
-def without_points(formula: Term) -> Term:
+def without_points(formula: t.Term) -> t.Term:
     """The formula without the quantified variables that can have one value only, or few that are written down."""
-    if not any(isinstance(part, Quantified) for part in subterms(formula)):
+    if not any(isinstance(part, t.Quantified) for part in subterms(formula)):
         return formula
     return transform(formula, _without)
 
 
-def _mentions(term: Term, unknown: Collection[Variable]) -> bool:
+def _mentions(term: t.Term, unknown: Collection[t.Variable]) -> bool:
     return any(variable in unknown for variable in free_variables(term))
 
 
-def _matched(pattern: Term, known: Term, unknown: set[Variable]) -> Solved:
+def _matched(pattern: t.Term, known: t.Term, unknown: set[t.Variable]) -> Solved:
     """``pattern == known`` solved; `known` mentions none of the unknown variables."""
-    values: dict[Variable, Term] = {}
-    rest: list[Term] = []
+    values: dict[t.Variable, t.Term] = {}
+    rest: list[t.Term] = []
     waiting = [(pattern, known)]
     while waiting:
         pattern, known = waiting.pop()
-        turned = _turned(pattern, known, unknown) if isinstance(pattern, Arithmetic) else None
+        turned = _turned(pattern, known, unknown) if isinstance(pattern, t.Arithmetic) else None
         match pattern:
-            case Variable() if pattern in unknown and (within := _within(known, pattern.sort)) is not None:
+            case t.Variable() if pattern in unknown and (within := _within(known, pattern.sort)) is not None:
                 values[pattern] = known
                 rest += within
                 unknown.remove(pattern)
-            case Construct(constructor=name, arguments=arguments, sort=sort) if arguments and _mentions(
+            case t.Construct(constructor=name, arguments=arguments, sort=sort) if arguments and _mentions(
                 pattern, unknown
             ):
                 parameters = enumerate(sort.constructor(name).parameters)
-                own = tuple(Argument(known, name, k, s).rebuild((known,)) for k, s in parameters)
-                rest.append(Compare("==", known, Construct(name, own, sort)))
+                own = tuple(t.Argument(known, name, k, s).rebuild((known,)) for k, s in parameters)
+                rest.append(t.Compare("==", known, t.Construct(name, own, sort)))
                 waiting.extend(reversed(tuple(zip(arguments, own, strict=True))))
-            case TupleTerm(items=items) if _mentions(pattern, unknown):
+            case t.TupleTerm(items=items) if _mentions(pattern, unknown):
                 assert isinstance(known.sort, TupleSort)
-                parts = (Item(known, k, s).rebuild((known,)) for k, s in enumerate(known.sort.items))
+                parts = (t.Item(known, k, s).rebuild((known,)) for k, s in enumerate(known.sort.items))
                 waiting.extend(reversed(tuple(zip(items, parts, strict=True))))
             case _ if turned is not None:
                 waiting.append(turned)
             case _:  # determines nothing as it stands
-                rest.append(Compare("==", pattern, known))
+                rest.append(t.Compare("==", pattern, known))
     return Solved(values, tuple(rest))
 
 
-def _turned(pattern: Arithmetic, known: Term, unknown: Collection[Variable]) -> tuple[Term, Term] | None:
+def _turned(pattern: t.Arithmetic, known: t.Term, unknown: Collection[t.Variable]) -> tuple[t.Term, t.Term] | None:
     """``s + t == known`` as ``s == known - t``, where only s is unknown, or only t; of a difference likewise."""
     left, right, sort = pattern.left, pattern.right, REAL if pattern.sort == REAL else INTEGER
     if pattern.operator not in ("+", "-") or _mentions(left, unknown) == _mentions(right, unknown):
         return None
     if _mentions(left, unknown):
-        return left, Arithmetic("-" if pattern.operator == "+" else "+", known, right, sort)
+        return left, t.Arithmetic("-" if pattern.operator == "+" else "+", known, right, sort)
     if pattern.operator == "+":
-        return right, Arithmetic("-", known, left, sort)
-    return right, Arithmetic("-", left, known, sort)
+        return right, t.Arithmetic("-", known, left, sort)
+    return right, t.Arithmetic("-", left, known, sort)
 
 
-def _within(value: Term, sort: Sort) -> tuple[Term, ...] | None:
+def _within(value: t.Term, sort: Sort) -> tuple[t.Term, ...] | None:
     """What has to hold for a term's value to be of a sort; None where no formula says it. Of a natural it is said in
     any case: where a solver puts something for a variable, that is known beside the formula at best."""
     if sort == NATURAL and value.sort in (INTEGER, NATURAL):
-        return (Compare(">=", value, Literal(0, INTEGER)),)
+        return (t.Compare(">=", value, t.Literal(0, INTEGER)),)
     return () if value.sort == sort or (sort == INTEGER and value.sort == NATURAL) else None
 
 
 # -- quantifiers -------------------------------------------------------------------------------------------------------
 
 
-def _without(term: Term) -> Term:
-    if not isinstance(term, Quantified) or term.quantifier is Quantifier.UNIQUE:
+def _without(term: t.Term) -> t.Term:
+    if not isinstance(term, t.Quantified) or term.quantifier is t.Quantifier.UNIQUE:
         return term
-    exists = term.quantifier is Quantifier.EXISTS
+    exists = term.quantifier is t.Quantifier.EXISTS
     variables, parts = _eliminated(term.variables, conjuncts(term.body, exists))
     found = list(_cases(variables, parts))
     if len(found) == 1 and found[0][0] == term.variables:
@@ -150,7 +135,7 @@ def _without(term: Term) -> Term:
     return disjunction(cases) if exists else conjunction(cases)
 
 
-def _eliminated(variables: tuple[Variable, ...], parts: list[Term]) -> tuple[tuple[Variable, ...], list[Term]]:
+def _eliminated(variables: tuple[t.Variable, ...], parts: list[t.Term]) -> tuple[tuple[t.Variable, ...], list[t.Term]]:
     """Of "there are `variables` such that all `parts` hold": the variables still needed, and the parts then."""
     while variables and len(parts) <= PARTS_SEARCHED:
         for at, part in enumerate(parts):
@@ -165,20 +150,22 @@ def _eliminated(variables: tuple[Variable, ...], parts: list[Term]) -> tuple[tup
     return variables, parts
 
 
-def _cases(variables: tuple[Variable, ...], parts: list[Term]) -> Iterator[tuple[tuple[Variable, ...], list[Term]]]:
+def _cases(
+    variables: tuple[t.Variable, ...], parts: list[t.Term]
+) -> Iterator[tuple[tuple[t.Variable, ...], list[t.Term]]]:
     """The same for each of a variable's few values, where the parts bound a whole number by numbers."""
     for variable in variables:
         values = _range(variable, parts) if len(parts) <= PARTS_SEARCHED else None
         if values is not None:
             rest = tuple(v for v in variables if v != variable)
             for number in values:
-                value = Literal(number, variable.sort)
+                value = t.Literal(number, variable.sort)
                 yield from _cases(rest, [substitute(part, {variable: value}) for part in parts])
             return
     yield variables, parts
 
 
-def _range(variable: Variable, parts: Sequence[Term]) -> range | None:
+def _range(variable: t.Variable, parts: Sequence[t.Term]) -> range | None:
     if not isinstance(variable.sort, IntegerSort | NaturalSort):
         return None
     low: list[Fraction] = [Fraction(0)] if variable.sort == NATURAL else []
@@ -193,22 +180,22 @@ def _range(variable: Variable, parts: Sequence[Term]) -> range | None:
     return range(math.ceil(max(low)), math.floor(min(high)) + 1)
 
 
-def _bounds(part: Term, variable: Variable) -> Iterator[tuple[str, Fraction]]:
+def _bounds(part: t.Term, variable: t.Variable) -> Iterator[tuple[str, Fraction]]:
     """``("<", 3)`` where a part says that the variable is less than 3."""
-    if isinstance(part, Compare) and part.operator in FLIPPED:
+    if isinstance(part, t.Compare) and part.operator in FLIPPED:
         flipped = part.right, part.left, FLIPPED[part.operator]
         for one, other, sign in ((part.left, part.right, part.operator), flipped):
-            inside = one.term if isinstance(one, Widen) else one
+            inside = one.term if isinstance(one, t.Widen) else one
             if inside == variable and (number := constant(other)) is not None:
                 yield sign, number
 
 
-def _closed(term: Quantified, variables: tuple[Variable, ...], parts: Sequence[Term]) -> Term:
+def _closed(term: t.Quantified, variables: tuple[t.Variable, ...], parts: Sequence[t.Term]) -> t.Term:
     """That there are such values, or (of `forall`) that there are none: its last part as the consequence of the others,
     which reads better."""
-    if term.quantifier is Quantifier.EXISTS:
+    if term.quantifier is t.Quantifier.EXISTS:
         body = conjunction(parts)
     else:
         consequence = opposite(conjunction(parts[-1:]))
-        body = Implies(conjunction(parts[:-1]), consequence) if len(parts) > 1 else consequence
-    return Quantified(term.quantifier, variables, body, term.span) if variables else body
+        body = t.Implies(conjunction(parts[:-1]), consequence) if len(parts) > 1 else consequence
+    return t.Quantified(term.quantifier, variables, body, term.span) if variables else body

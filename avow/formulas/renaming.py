@@ -21,11 +21,6 @@ def bound_names(term: Term) -> frozenset[str]:
     return frozenset(v.name for v in free_variables(term) if v.role is Role.BOUND)
 
 
-def has_variables(term: Term) -> bool:
-    """Whether any variable, of any role, occurs in the term."""
-    return any(isinstance(part, Variable) for part in subterms(term))
-
-
 def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:
     """The same meaning, with no bound name used by two quantifiers, both bound and free, or among those `taken`."""
     if not any(isinstance(part, Quantified) for part in subterms(term)):

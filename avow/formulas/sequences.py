@@ -19,27 +19,9 @@ from avow.formulas.formula import conjunction, free_variables, fresh
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth
 from avow.formulas.values import FunctionValue, SequenceValue, Value
+from avow.language import terms as t
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, SetSort, Sort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    And,
-    Apply,
-    Arithmetic,
-    Compare,
-    Implies,
-    In,
-    Index,
-    Length,
-    Literal,
-    Not,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceRange,
-    SequenceTerm,
-    Term,
-    Variable,
-)
 
 Label = TypeVar("Label")
 
@@ -48,28 +30,28 @@ Label = TypeVar("Label")
 class Flat(Generic[Label]):
     """Formulas without some sequences: `parts` has the length and the function that stand for each."""
 
-    formulas: Mapping[Label, Term]
-    parts: Mapping[Variable, tuple[Variable, Variable]]
+    formulas: Mapping[Label, t.Term]
+    parts: Mapping[t.Variable, tuple[t.Variable, t.Variable]]
 
-    def variables(self, originals: Iterable[Variable]) -> tuple[Variable, ...]:
+    def variables(self, originals: Iterable[t.Variable]) -> tuple[t.Variable, ...]:
         """The variables that stand for these."""
         return tuple(part for v in originals for part in self.parts.get(v, (v,)))
 
-    def restored(self, term: Term) -> Term:
+    def restored(self, term: t.Term) -> t.Term:
         """A formula with the sequences again: their lengths and elements in the place of what stands for them."""
-        lengths: dict[Term, Term] = {length: Length(v, NATURAL) for v, (length, _) in self.parts.items()}
-        elements: dict[Term, Variable] = {element: v for v, (_, element) in self.parts.items()}
+        lengths: dict[t.Term, t.Term] = {length: t.Length(v, NATURAL) for v, (length, _) in self.parts.items()}
+        elements: dict[t.Term, t.Variable] = {element: v for v, (_, element) in self.parts.items()}
 
-        def put(part: Term) -> Term:
+        def put(part: t.Term) -> t.Term:
             match part:
-                case Apply(function=function, arguments=(at,)) if function in elements:
-                    return Index(elements[function], put(at), part.sort)
+                case t.Apply(function=function, arguments=(at,)) if function in elements:
+                    return t.Index(elements[function], put(at), part.sort)
                 case _:  # an element is only asked for by its position
                     return lengths[part] if part in lengths else map_children(part, put)
 
         return put(term)
 
-    def values(self, found: Mapping[Variable, Value]) -> dict[Variable, Value] | None:
+    def values(self, found: Mapping[t.Variable, Value]) -> dict[t.Variable, Value] | None:
         """The values of the original variables; None where one is too long to be of use."""
         parts = {part for pair in self.parts.values() for part in pair}
         values = {variable: value for variable, value in found.items() if variable not in parts}
@@ -84,7 +66,7 @@ class Flat(Generic[Label]):
         return values
 
 
-def flatten(formulas: Mapping[Label, Term], sequences: Iterable[Variable]) -> Flat[Label] | None:
+def flatten(formulas: Mapping[Label, t.Term], sequences: Iterable[t.Variable]) -> Flat[Label] | None:
     """The formulas without these sequences; None where a sequence is used as a whole in another value, or there is
     none of them."""
     parts = {}
@@ -92,8 +74,8 @@ def flatten(formulas: Mapping[Label, Term], sequences: Iterable[Variable]) -> Fl
         sort = variable.sort
         if not isinstance(sort, SequenceSort) or isinstance(sort.item, SequenceSort | FunctionSort | SetSort):
             return None
-        element = Variable(variable.role, f"{variable.name} (elements)", FunctionSort((INTEGER,), sort.item))
-        parts[variable] = (Variable(variable.role, f"{variable.name} (length)", NATURAL), element)
+        element = t.Variable(variable.role, f"{variable.name} (elements)", FunctionSort((INTEGER,), sort.item))
+        parts[variable] = (t.Variable(variable.role, f"{variable.name} (length)", NATURAL), element)
     if not parts or any(depth(formula) > REWRITTEN_DEPTH for formula in formulas.values()):
         return None
     changed = {label: _change(formula, parts) for label, formula in formulas.items()}
@@ -102,65 +84,67 @@ def flatten(formulas: Mapping[Label, Term], sequences: Iterable[Variable]) -> Fl
     return Flat(changed, parts)
 
 
-def _change(term: Term, parts: Mapping[Variable, tuple[Variable, Variable]]) -> Term:
+def _change(term: t.Term, parts: Mapping[t.Variable, tuple[t.Variable, t.Variable]]) -> t.Term:
     match term:
-        case Length(sequence=Variable() as s) if s in parts:
+        case t.Length(sequence=t.Variable() as s) if s in parts:
             return parts[s][0]
-        case Index(sequence=Variable() as s, index=index) if s in parts:
-            return Apply(parts[s][1], (_change(index, parts),), term.sort)
-        case In(item=item, collection=Variable() as s) if s in parts:
+        case t.Index(sequence=t.Variable() as s, index=index) if s in parts:
+            return t.Apply(parts[s][1], (_change(index, parts),), term.sort)
+        case t.In(item=item, collection=t.Variable() as s) if s in parts:
             length, element = parts[s]
             k = _position(term)
-            here = Compare("==", Apply(element, (k,), _item(s)), _change(item, parts))
-            return Quantified(Quantifier.EXISTS, (k,), And((Compare("<", k, length), here)))
-        case Compare(operator="==" | "!=" as operator, left=left, right=right) if isinstance(left.sort, SequenceSort):
+            here = t.Compare("==", t.Apply(element, (k,), _item(s)), _change(item, parts))
+            return t.Quantified(t.Quantifier.EXISTS, (k,), t.And((t.Compare("<", k, length), here)))
+        case t.Compare(operator="==" | "!=" as operator, left=left, right=right) if isinstance(left.sort, SequenceSort):
             for one, other in ((left, right), (right, left)):
-                if isinstance(one, Variable) and one in parts:
+                if isinstance(one, t.Variable) and one in parts:
                     same = _same(one, other, term, parts)
-                    return same if operator == "==" else Not(same)
+                    return same if operator == "==" else t.Not(same)
             return term
         case _:  # says nothing of a sequence itself: its parts may
             return map_children(term, lambda child: _change(child, parts))
 
 
-def _same(s: Variable, other: Term, within: Term, parts: Mapping[Variable, tuple[Variable, Variable]]) -> Term:
+def _same(
+    s: t.Variable, other: t.Term, within: t.Term, parts: Mapping[t.Variable, tuple[t.Variable, t.Variable]]
+) -> t.Term:
     """That a sequence is another one; the equation itself where nothing simpler says so."""
     length, element = parts[s]
     sort = _item(s)
     k = _position(within)
-    inside = Compare("<", k, length)
-    here = Apply(element, (k,), sort)
+    inside = t.Compare("<", k, length)
+    here = t.Apply(element, (k,), sort)
     match other:
-        case SequenceTerm(items=items):
+        case t.SequenceTerm(items=items):
             elements = (
-                Compare("==", Apply(element, (Literal(n, INTEGER),), sort), _change(item, parts))
+                t.Compare("==", t.Apply(element, (t.Literal(n, INTEGER),), sort), _change(item, parts))
                 for n, item in enumerate(items)
             )
-            return conjunction((Compare("==", length, Literal(len(items), INTEGER)), *elements))
-        case SequenceRange(low=low, high=high):
+            return conjunction((t.Compare("==", length, t.Literal(len(items), INTEGER)), *elements))
+        case t.SequenceRange(low=low, high=high):
             low, high = _change(low, parts), _change(high, parts)
-            count = Arithmetic("+", Arithmetic("-", high, low, INTEGER), Literal(1, INTEGER), INTEGER)
-            measured = And(
+            count = t.Arithmetic("+", t.Arithmetic("-", high, low, INTEGER), t.Literal(1, INTEGER), INTEGER)
+            measured = t.And(
                 (
-                    Implies(Compare("<=", low, high), Compare("==", length, count)),
-                    Implies(Compare("<", high, low), Compare("==", length, Literal(0, INTEGER))),
+                    t.Implies(t.Compare("<=", low, high), t.Compare("==", length, count)),
+                    t.Implies(t.Compare("<", high, low), t.Compare("==", length, t.Literal(0, INTEGER))),
                 )
             )
-            each = Implies(inside, Compare("==", here, Arithmetic("+", low, k, INTEGER)))
-            return And((measured, Quantified(Quantifier.FORALL, (k,), each)))
-        case Variable() if other in parts:
+            each = t.Implies(inside, t.Compare("==", here, t.Arithmetic("+", low, k, INTEGER)))
+            return t.And((measured, t.Quantified(t.Quantifier.FORALL, (k,), each)))
+        case t.Variable() if other in parts:
             other_length, other_element = parts[other]
-            each = Implies(inside, Compare("==", here, Apply(other_element, (k,), _item(other))))
-            return And((Compare("==", length, other_length), Quantified(Quantifier.FORALL, (k,), each)))
+            each = t.Implies(inside, t.Compare("==", here, t.Apply(other_element, (k,), _item(other))))
+            return t.And((t.Compare("==", length, other_length), t.Quantified(t.Quantifier.FORALL, (k,), each)))
         case _:  # no simpler form: the sequence stays, and `flatten` refuses
-            return Compare("==", s, other)
+            return t.Compare("==", s, other)
 
 
-def _item(s: Variable) -> Sort:
+def _item(s: t.Variable) -> Sort:
     assert isinstance(s.sort, SequenceSort)
     return s.sort.item
 
 
-def _position(within: Term) -> Variable:
-    taken = {part.name for part in subterms(within) if isinstance(part, Variable)}
-    return Variable(Role.BOUND, fresh("k", taken), NATURAL)
+def _position(within: t.Term) -> t.Variable:
+    taken = {part.name for part in subterms(within) if isinstance(part, t.Variable)}
+    return t.Variable(t.Role.BOUND, fresh("k", taken), NATURAL)

@@ -6,37 +6,27 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from avow.formulas.values import Data, Element, Value, show
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.language.terms import Construct, EnumValue, Literal, Role, Term, TupleTerm, Variable
 
 
-def value_term(value: Value, sort: Sort) -> Term:
+def value_term(value: Value, sort: s.Sort) -> Term:
     """A value as RCL writes it; of a sort whose values it can write: no function, no sequence, no unspecified type."""
     match sort, value:
-        case EnumSort(), Element(name=name):
+        case s.EnumSort(), Element(name=name):
             return EnumValue(name, sort)
-        case DataSort(), Data(constructor=constructor, arguments=arguments):
+        case s.DataSort(), Data(constructor=constructor, arguments=arguments):
             parameters = sort.constructor(constructor).parameters
             return Construct(constructor, tuple(map(value_term, arguments, parameters)), sort)
-        case TupleSort(items=items), tuple():
+        case s.TupleSort(items=items), tuple():
             return TupleTerm(tuple(map(value_term, value, items)), sort)
-        case BoolSort(), bool():
+        case s.BoolSort(), bool():
             return Literal(value, sort)
-        case ((IntegerSort() | NaturalSort()), int()):
+        case ((s.IntegerSort() | s.NaturalSort()), int()):
             return Literal(value, sort)
-        case RealSort(), (Fraction() | int()):
+        case s.RealSort(), (Fraction() | int()):
             return Literal(Fraction(value), sort)
-        case StringSort(), str():
+        case s.StringSort(), str():
             return Literal(value, sort)
     raise AssertionError(f"{value} of {sort}")
 

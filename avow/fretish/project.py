@@ -405,10 +405,7 @@ class _Node:
         try:
             expression = parse_expression(said)
             self._truth(expression)
-            text = f"({self._say(expression)})"
-            if len(text) > _LONGEST:
-                raise Unsaid(f"what `{name}` stands for has more than {_LONGEST} characters when written out")
-            return text
+            return f"({self._say(expression)})"
         except Unreadable as error:
             raise Unsaid(f"what `{name}` stands for is not read: {error.message} in `{means[:80]}`") from None
         finally:
@@ -420,8 +417,8 @@ def _context(constants: Mapping[str, str]) -> str:
     return f"context {{\n{lines}}}\n\n" if lines else ""
 
 
-_DEEPEST, _LONGEST = 20, 20_000
-"""Of definitions in one another; no person follows more."""
+_DEEPEST = 20
+"""Definitions within one another that are followed."""
 
 _SIGNS = {"=>": "->", "&": "and", "|": "or", "=": "=="}
 

@@ -169,8 +169,6 @@ def _shallow(read: Callable[[], _Read]) -> _Read:
 
 
 def _tree(text: str, start: str) -> Any:
-    if len(text) > _LONGEST or text.count("(") > _DEEPEST:
-        raise Unreadable("the sentence is too long to be one requirement", 1)
     if (found := re.search(r"at\s+the\s+(?:previous|next)\s+occurrence", text, re.IGNORECASE)) is not None:
         raise Unreadable(f"`{found[0]}` is not read: say it with `since` in RCL", found.start() + 1)
     try:
@@ -181,10 +179,6 @@ def _tree(text: str, start: str) -> Any:
         rest = text[column - 1 :].split(maxsplit=1)
         what = f"did not expect `{rest[0]}` here" if rest else "the sentence ends too early"
         raise Unreadable(what, column) from None
-
-
-_LONGEST, _DEEPEST = 4_000, 100
-"""No sentence that a person wrote is longer, or nests deeper."""
 
 
 def _without_commas(text: str) -> str:

@@ -2,48 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.formula import free_variables
 from avow.formulas.values import show
-from avow.language.contract import Clause, Contract, Node
+from avow.language import terms as t
+from avow.language.contract import Clause, Contract, Node, Partial
 from avow.language.printer import show_sort
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
-from avow.language.terms import (
-    RESPONSES,
-    TRUE,
-    And,
-    Arithmetic,
-    Builtin,
-    Compare,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    Limit,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Past,
-    Role,
-    Term,
-    Variable,
-    Widen,
-)
 
 from .sentence import FIRST, is_assumption
-
-
-@dataclass(frozen=True, slots=True)
-class Partial:
-    """A text, and what is left out of it."""
-
-    text: str
-    missing: tuple[Diagnostic, ...] = field(default=())
 
 
 class _Beyond(Exception):  # noqa: N818 - it names what happened
@@ -80,43 +49,43 @@ def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:
     if doubled:
         raise _Beyond(f"an input and an output that are both called `{min(doubled)}`")
     match formula:
-        case Implies(left=trigger, right=History(operator=operator) as response) if operator in RESPONSES:
+        case t.Implies(left=trigger, right=t.History(operator=operator) as response) if operator in t.RESPONSES:
             return f"{_condition(trigger)}the {node.name} shall {_response(response)}"
-        case History(operator=operator) if operator in RESPONSES:
+        case t.History(operator=operator) if operator in t.RESPONSES:
             return f"whenever true the {node.name} shall {_response(formula)}"
-        case Implies(left=History(operator=Past.ROSE) as trigger, right=right):
+        case t.Implies(left=t.History(operator=t.Past.ROSE) as trigger, right=right):
             return f"{_condition(trigger)}the {node.name} shall immediately satisfy {_say(right)}"
         case _:  # one step
             return f"the {node.name} shall always satisfy {_say(formula)}"
 
 
-def _condition(trigger: Term) -> str:
+def _condition(trigger: t.Term) -> str:
     match trigger:
-        case History(operator=Past.ROSE, arguments=(inner,)) if inner == TRUE:
+        case t.History(operator=t.Past.ROSE, arguments=(inner,)) if inner == t.TRUE:
             return ""
-        case History(operator=Past.ROSE, arguments=(inner,)):
+        case t.History(operator=t.Past.ROSE, arguments=(inner,)):
             return f"upon {_say(inner)} "
         case _:  # whatever is so at a step
             return f"whenever {_say(trigger)} "
 
 
-def _response(response: History) -> str:
+def _response(response: t.History) -> str:
     wanted = _say(response.arguments[0])
     match response.operator:
-        case Past.NEXT:
+        case t.Past.NEXT:
             return f"at the next timepoint satisfy {wanted}"
-        case Past.WITHIN | Past.FOR:
+        case t.Past.WITHIN | t.Past.FOR:
             return f"{response.operator} {_duration(response.limit)} satisfy {wanted}"
-        case Past.UNTIL:
+        case t.Past.UNTIL:
             return f"until {_say(response.arguments[1])} satisfy {wanted}"
-        case Past.EVENTUALLY:
+        case t.Past.EVENTUALLY:
             return f"eventually satisfy {wanted}"
         case _:
             raise _Beyond(f"`{response.operator}`")
 
 
-def _duration(limit: Limit | None) -> str:
-    if limit is None or not isinstance(limit.amount, Literal) or isinstance(limit.amount.value, bool | str):
+def _duration(limit: t.Limit | None) -> str:
+    if limit is None or not isinstance(limit.amount, t.Literal) or isinstance(limit.amount.value, bool | str):
         raise _Beyond("a limit that is no number")
     if limit.steps:
         return f"{limit.amount.value} ticks"
@@ -130,61 +99,65 @@ def _duration(limit: Limit | None) -> str:
 _SIGNS = {"==": "="}
 
 
-def _say(term: Term) -> str:
+def _say(term: t.Term) -> str:
     """In parentheses where it has parts of its own."""
     match term:
-        case Literal(value=bool(value)):
+        case t.Literal(value=bool(value)):
             return "true" if value else "false"
-        case Literal(value=str()):
+        case t.Literal(value=str()):
             raise _Beyond("a text")
-        case Literal(value=value):
+        case t.Literal(value=value):
             return _number(Fraction(value))
-        case Variable(role=Role.INPUT | Role.OUTPUT, name=name):
+        case t.Variable(role=t.Role.INPUT | t.Role.OUTPUT, name=name):
             return _name(name)
-        case EnumValue(name=name):
+        case t.EnumValue(name=name):
             return _name(name)
-        case Widen(term=inner):
+        case t.Widen(term=inner):
             return _say(inner)
-        case Not(body=body):
+        case t.Not(body=body):
             return f"!{_say(body)}"
-        case And(items=items):
+        case t.And(items=items):
             return f"({' & '.join(map(_say, items))})"
-        case Or(items=items):
+        case t.Or(items=items):
             return f"({' | '.join(map(_say, items))})"
-        case Implies(left=left, right=right):
+        case t.Implies(left=left, right=right):
             return f"({_say(left)} => {_say(right)})"
-        case Iff(left=left, right=right):
+        case t.Iff(left=left, right=right):
             return f"({_say(left)} <=> {_say(right)})"
-        case Compare(operator=sign, left=left, right=right) if isinstance(left.sort, BoolSort):
+        case t.Compare(operator=sign, left=left, right=right) if isinstance(left.sort, BoolSort):
             return f"({_say(left)} <=> {_say(right)})" if sign == "==" else f"({_say(left)} xor {_say(right)})"
-        case Compare(operator=sign, left=left, right=right):
+        case t.Compare(operator=sign, left=left, right=right):
             return f"({_say(left)} {_SIGNS.get(sign, sign)} {_say(right)})"
-        case Arithmetic(operator="+" | "-" | "*" | "/" as sign, left=left, right=right):
+        case t.Arithmetic(operator="+" | "-" | "*" | "/" as sign, left=left, right=right):
             return f"({_say(left)} {sign} {_say(right)})"
-        case Negative(term=inner):
+        case t.Negative(term=inner):
             return f"(-{_say(inner)})"
-        case Operation(operator=Builtin.XOR, arguments=(left, right)):
+        case t.Operation(operator=t.Builtin.XOR, arguments=(left, right)):
             return f"({_say(left)} xor {_say(right)})"
-        case Operation(operator=Builtin.MOD, arguments=(left, right)):
+        case t.Operation(operator=t.Builtin.MOD, arguments=(left, right)):
             return f"({_say(left)} mod {_say(right)})"
-        case Operation(operator=Builtin.ABS | Builtin.MIN | Builtin.MAX | Builtin.DIV as operator, arguments=arguments):
+        case t.Operation(
+            operator=t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.DIV as operator, arguments=arguments
+        ):
             return f"{operator}({', '.join(map(_say, arguments))})"
-        case Operation(operator=operator):
+        case t.Operation(operator=operator):
             raise _Beyond(f"`{operator}`")
-        case History(operator=Past.PREVIOUS, arguments=(value, first)):
+        case t.History(operator=t.Past.PREVIOUS, arguments=(value, first)):
             return f"{_previous(term)}({_say(first)}, {_say(value)})"
-        case History(operator=Past.ROSE, arguments=(inner,)) if inner == TRUE:
+        case t.History(operator=t.Past.ROSE, arguments=(inner,)) if inner == t.TRUE:
             return FIRST
-        case History(operator=Past.HELD | Past.ONCE as operator, arguments=(inner,), limit=Limit(steps=True) as limit):
-            name = "persisted" if operator is Past.HELD else "occurred"
+        case t.History(
+            operator=t.Past.HELD | t.Past.ONCE as operator, arguments=(inner,), limit=t.Limit(steps=True) as limit
+        ):
+            name = "persisted" if operator is t.Past.HELD else "occurred"
             return f"{name}({_say(limit.amount)}, {_say(inner)})"
-        case History(operator=operator):
+        case t.History(operator=operator):
             raise _Beyond(f"`{operator}`")
         case _:
             raise _Beyond(f"a {type(term).__name__.lower()} ({term.sort})" if term.children else "this term")
 
 
-def _previous(term: History) -> str:
+def _previous(term: t.History) -> str:
     match term.sort:
         case BoolSort():
             return "preBool"

@@ -1,7 +1,6 @@
-"""A judge in a process of its own, whose word comes through a pipe that only it and we hold.
+"""A judge in a process of its own, which answers through a descriptor that no subject has.
 
-No file carries a verdict: a subject, or something that it left running, could write one. The judge's answer counts if
-it ended well and the pipe held its one line and nothing else.
+The answer counts if the judge ended well and wrote one line and nothing else.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,37 +18,23 @@ from avow.base.codec import Unreadable, from_json, from_text, line
 from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 from avow.base.records import dataclass
-from avow.base.tuning.running import CHANNEL_PATIENCE
 from avow.base.tuning.sizes import CHANNEL_KEPT
 
 T = TypeVar("T")
 
 
 class Channel:
-    """A pipe that is read while its other end, `theirs`, is written to: who writes more than a pipe holds would wait
-    for us, and we for its end."""
+    """An unnamed file for one answer. Its descriptor `theirs` is what a process inherits to write it."""
 
     def __init__(self) -> None:
-        self._ours, self.theirs = os.pipe()
-        self._parts: list[bytes] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - `close` closes it
+        self.theirs = self._file.fileno()
 
-    def _read(self) -> None:
-        size = 0
-        while part := os.read(self._ours, 1 << 16):
-            size += len(part)
-            if size <= CHANNEL_KEPT:
-                self._parts.append(part)
-
-    def close(self) -> bytes | None:
-        """What came, once who wrote has ended and `theirs` is closed; what is beyond all measure is left out. None
-        where somebody still holds the other end."""
-        self._reader.join(CHANNEL_PATIENCE)
-        if self._reader.is_alive():
-            return None
-        os.close(self._ours)
-        return b"".join(self._parts)
+    def close(self) -> bytes:
+        """What was written, up to a limit, once the writer has ended."""
+        with self._file:
+            self._file.seek(0)
+            return self._file.read(CHANNEL_KEPT)
 
 
 def ask(
@@ -75,9 +60,8 @@ def ask(
         )
     finally:
         process.end_orphans()
-        os.close(channel.theirs)
         said = channel.close()
-    if done.code != 0 or said is None or said.count(b"\n") != 1 or not said.endswith(b"\n"):
+    if done.code != 0 or said.count(b"\n") != 1 or not said.endswith(b"\n"):
         return done, None
     try:
         word = from_text(_Word, said)

@@ -49,26 +49,18 @@ def seals() -> bool:
     if sys.platform != "linux" or shutil.which("bwrap") is None:
         return False
     try:
-        command = [*_bubblewrap(()), "true"]
+        command = sealed(["true"])
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=20, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
     return done.returncode == 0
 
 
-def sealed(command: Sequence[str], shown: Sequence[Path], scratch: str, writable: Sequence[Path] = ()) -> list[str]:
-    """The command within a sandbox: nothing can be written but `scratch`, a folder of an otherwise empty ``/tmp``, in
-    which only the folders `shown` are seen; no network, no other processes. `writable` are folders of which nothing is
-    believed that stands in them afterwards."""
-    return [*_bubblewrap(shown, scratch, writable), *command]
-
-
-def _bubblewrap(shown: Sequence[Path], scratch: str = "/tmp", writable: Sequence[Path] = ()) -> list[str]:
+def sealed(command: Sequence[str], *writable: Path) -> list[str]:
+    """The command within a sandbox: it can write only into the folders `writable`, and has no network and no other
+    processes. All files can be read: an answer must not depend on what a sandbox hides."""
     options = ["--unshare-all", "--die-with-parent", "--new-session", "--ro-bind", "/", "/", "--dev", "/dev"]
-    options += ["--proc", "/proc", "--tmpfs", "/tmp", "--dir", scratch]
-    for folder in dict.fromkeys(shown):
-        if folder.is_relative_to("/tmp"):
-            options += ["--ro-bind", str(folder), str(folder)]
+    options += ["--proc", "/proc"]
     for folder in writable:
         options += ["--bind", str(folder), str(folder)]
-    return [shutil.which("bwrap") or "bwrap", *options, "--"]
+    return [shutil.which("bwrap") or "bwrap", *options, "--", *command]

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import site
 import stat
 import sys
@@ -21,13 +20,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from avow.base.files import digest_file, identity, sha256, text_or_nothing
+from avow.base.files import digest_file, identity, sha256
 from avow.base.module_path import absolute_only
-from avow.base.tools import program_digest
+from avow.base.process import HOME_PREFIX
 from avow.base.tuning.sizes import FOLDED
-from avow.base.verdict import Isolation
-from avow.isolation.level import Unavailable, available, wanted
-from avow.isolation.watching import way
 
 
 class Seen(StrEnum):
@@ -45,18 +41,11 @@ class Seen(StrEnum):
     """Looked at, not opened: besides its kind, its size and its mode."""
     KIND = "kind"
     """Whether it is there, whether it is a file, a folder or a link, and where a link points to."""
-    PLACE = "place"
-    """Which folder it runs in; the digest is of its absolute path."""
-    VARIABLE = "variable"
-    """One of the environment that is not always the same (`variables`); the digest is of its value."""
     MODULES = "modules"
     """Where modules are looked for from the start; the digest is of PYTHONPATH and of what adds to it (`_modules`)."""
-    TRACER = "tracer"
-    """Who traces system calls here; the digest is of the programs, or of why nothing does."""
-    SANDBOX = "sandbox"
-    """How subjects are kept here; the digest is of the level and of the program that seals them."""
     OUTSIDE = "outside"
-    """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
+    """Something whose content cannot be recorded: the network, another program, a device. The digest is empty. An
+    answer that rests on it is re-run in every run, never reused."""
 
 
 class Observed(NamedTuple):
@@ -69,19 +58,8 @@ class Observed(NamedTuple):
 
 def look(kind: Seen, path: str) -> str:
     """The digest as of now. A thing that has changed its kind has another digest."""
-    if kind is Seen.VARIABLE:
-        return sha256(variables().get(os.path.basename(path), ""))  # noqa: PTH119
-    if kind is Seen.PLACE:
-        return sha256(os.path.realpath(path))
     if kind is Seen.MODULES:
         return _modules()
-    if kind is Seen.TRACER:
-        from avow.isolation.tracing import remedy, traces  # not in a run with nothing to do: it runs strace
-
-        return sha256(program_digest(guards(kind)) if traces() else remedy())
-    if kind is Seen.SANDBOX:
-        level = _level()
-        return sha256(f"{level} {program_digest(guards(kind)) if level is Isolation.SEALED else ''}")
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
         match kind:
@@ -116,34 +94,6 @@ def _modules() -> str:
 
 
 _AT_START = ("sitecustomize", "usercustomize")
-_GUARDS = {Seen.TRACER: ("strace", "setpriv"), Seen.SANDBOX: ("bwrap",)}
-
-
-def guards(kind: Seen) -> tuple[str, ...]:
-    """Where the programs are that watch or keep a subject."""
-    return tuple(place for name in _GUARDS.get(kind, ()) if (place := shutil.which(name)) is not None)
-
-
-def _level() -> Isolation:
-    try:
-        return available()
-    except Unavailable:
-        return Isolation.NONE
-
-
-_GRANTS = (
-    "/proc/sys/kernel/yama/ptrace_scope",
-    "/proc/sys/kernel/unprivileged_userns_clone",
-    "/proc/sys/kernel/apparmor_restrict_unprivileged_userns",
-    "/proc/sys/user/max_user_namespaces",
-)
-
-
-def _granted() -> tuple[str, ...]:
-    """What this machine, or its container, lets a process do: whether these programs work hangs on it."""
-    lines = text_or_nothing(Path("/proc/self/status")).splitlines()
-    told = (line for line in lines if line.startswith(("Uid", "Cap", "NoNewPrivs", "Seccomp")))
-    return (*told, *(text_or_nothing(Path(name)) for name in _GRANTS))
 
 
 def _names(folder: str) -> list[str]:
@@ -158,9 +108,6 @@ def marks(observed: Observed) -> tuple[object, ...] | None:
     """What tells, without reading, that the bytes which a row stands for are as they were a moment ago; None where to
     look again costs no more."""
     try:
-        if observed.kind in _GUARDS:
-            places = guards(observed.kind)
-            return (*places, *(identity(os.stat(place), place) for place in places), wanted(), _granted())  # noqa: PTH116
         if observed.kind is Seen.READ:
             return identity(os.stat(observed.path), observed.path)  # noqa: PTH116
         if observed.kind is Seen.FOLDER:
@@ -212,11 +159,6 @@ def _missing(observed: Observed) -> Observed:
     return observed._replace(path=path)
 
 
-def variables() -> dict[str, str]:
-    """Those of a subject's environment that differ from machine to machine."""
-    return {"PATH": os.environ.get("PATH", os.defpath), "PYTHONPATH": absolute_only()}
-
-
 def _link(path: str) -> str:
     """Where a link points to; empty: it is none."""
     try:
@@ -230,7 +172,7 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
     found: dict[tuple[str, Seen], Observed] = {}
     for event, path in events:
         kind = _kind(event, path)
-        if kind is not None:
+        if kind is not None and os.sep + HOME_PREFIX not in path:  # the empty home that a tool got is no input
             found.setdefault((path, kind), Observed(kind, path, look(kind, path)))
     return tuple(found[key] for key in sorted(found))
 
@@ -238,15 +180,11 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
 def _kind(event: str, path: str) -> Seen | None:
     if event == "outside":
         return Seen.OUTSIDE
-    if event in ("place", "variable"):
-        return Seen(event)
     if _of_python(path):
         return None
     looked = event in ("state", "kind", "link")
     if f"{path}/".startswith("/proc/"):  # processes come and go
         return None if event in ("state", "kind") and _OF_EVERY_PROCESS.fullmatch(path) else Seen.OUTSIDE
-    if _by_process(path):
-        return Seen.OUTSIDE
     if f"{path}/".startswith("/sys/") and not looked:
         return Seen.OUTSIDE
     try:
@@ -268,12 +206,6 @@ _OF_EVERY_PROCESS = re.compile(r"/proc(/(thread-)?self(/(?!(cwd|root)$)\w+|/fd/\
 """What is there for every process. Where a link of it leads, and what lies beyond, is each one's own."""
 
 
-def _by_process(path: str) -> bool:
-    """Whether a link on the way leads through ``/proc/self``: whoever looks again comes to another place."""
-    place, links = way(path, whole=True)
-    return any(f"{one}/".startswith("/proc/") for one in (place, *links))
-
-
 _EMPTY = ("/dev/null", "/dev/zero", "/dev/full")
 
 _PYTHON = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")))
@@ -283,7 +215,7 @@ _INSTALLED = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib"
 def _of_python(path: str) -> bool:
     """Of the interpreter that runs us; its version and program stand for all of it."""
     if path.endswith("/__pycache__") or ("/__pycache__/" in path and path.endswith(".pyc")):
-        return True  # of installed packages only: a subject's own are never read
+        return True  # of a package: its source is recorded
     installed = (*_INSTALLED, *(f"{folder}/dist-packages" for folder in _PYTHON))
     return _within(path, _PYTHON) and not _within(path, installed)
 
@@ -292,20 +224,9 @@ def _within(path: str, folders: Iterable[str]) -> bool:
     return any(f"{path}{os.sep}".startswith(f"{folder}{os.sep}") for folder in folders)
 
 
-def untold(what: str) -> Observed:
-    """Of what read files while nothing traced: that they are not known."""
-    from avow.isolation.tracing import remedy
-
-    return Observed(Seen.OUTSIDE, f"what {what} reads, which nothing tells here ({remedy()})")
-
-
-_OF_THE_MACHINE = {Seen.TRACER: "strace", Seen.SANDBOX: "bwrap", Seen.MODULES: "module path"}
-
-
 def as_here(kind: Seen) -> Observed:
-    """Who traces, who keeps, or where modules are looked for: what is seen by another, or by nobody, what is kept
-    otherwise, and what is imported from elsewhere is asked again."""
-    return Observed(kind, _OF_THE_MACHINE[kind], look(kind, _OF_THE_MACHINE[kind]))
+    """Where modules are looked for: what is imported from elsewhere is asked again."""
+    return Observed(kind, "module path", look(kind, "module path"))
 
 
 def interpreter() -> Observed:

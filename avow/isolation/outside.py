@@ -1,8 +1,8 @@
 """Outside tools, run so that nothing undeclared enters their answers, or is told.
 
 A tool gets the variables that Avow gives it, an empty home, and the way to the system's programs and its own. What it
-opens, executes and looks for besides is recorded by `strace`, as of a subject. Where that does not run, what the tool
-reads is not known, and its answer is an undeclared input.
+opens, executes and looks for besides is recorded by `strace`. Where that does not run, what the tool reads is not
+known, and its answer is re-run each time.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pathlib import Path
 from avow.base import process
 from avow.base.process import Completed, ToolMissing
 from avow.base.tools import Tool, program_files, program_folders
-from avow.isolation.observed import Observed, Seen, as_here, folded, recorded, untold
-from avow.isolation.tracing import Trace, traces
+from avow.isolation.observed import Observed, folded, recorded
+from avow.isolation.tracing import Trace, remedy, traces
 
 _SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin", "/bin")
 
@@ -30,8 +30,6 @@ class Outside:
 
     tools: tuple[Tool, ...]
     _events: dict[tuple[str, str], None] = field(default_factory=dict)
-    _untraced: dict[str, None] = field(default_factory=dict)
-    """What ran while nothing traced."""
 
     def run(
         self,
@@ -47,13 +45,14 @@ class Outside:
         if program is None or not os.access(program, os.X_OK):
             raise ToolMissing(f"{command[0]}: not found, or not to be executed")
         trace = Trace() if traces() else None
-        with tempfile.TemporaryDirectory(prefix="avow-home-", ignore_cleanup_errors=True) as home:
+        with tempfile.TemporaryDirectory(prefix=process.HOME_PREFIX, ignore_cleanup_errors=True) as home:
             given = {**process.bare(home), "PATH": self._path(program), **(env or {})}
             whole = [program, *command[1:]]
             started = whole if trace is None else trace.around([*_with_its_tracer(), *whole])
             done = process.run(started, cwd=cwd, seconds=seconds, megabytes=megabytes, env=given)
             if trace is None:
-                self._untraced[os.path.basename(command[0])] = None  # noqa: PTH119
+                what = f"what {os.path.basename(command[0])} reads, which nothing records here ({remedy()})"  # noqa: PTH119
+                self._events["outside", what] = None
             else:
                 told = trace.read_all(program, cwd)
                 if told is None and done.code is not None:
@@ -63,7 +62,7 @@ class Outside:
         return Completed(tuple(command), done.code, done.stdout, done.stderr, done.seconds)
 
     def observed(self) -> tuple[Observed, ...]:
-        """What they looked at so far that is in no key, and who told it."""
+        """What they looked at so far that is in no key."""
         places = [place for tool in self.tools for place in tool.places]
         known = {str(file) for place in places for file in program_files(place)}
         within = tuple(f"{folder}{os.sep}" for place in places for folder in program_folders(place))
@@ -73,7 +72,7 @@ class Outside:
             return event == "outside" or (real not in known and not f"{real}{os.sep}".startswith(within))
 
         seen = recorded((event, path) for event, path in list(self._events) if told(event, path))
-        return folded((*seen, *map(untold, list(self._untraced)), as_here(Seen.TRACER)))
+        return folded(seen)
 
     def _path(self, program: str) -> str:
         places = (program, *(place for tool in self.tools for place in tool.places))

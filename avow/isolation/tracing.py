@@ -1,8 +1,5 @@
-"""What a subject's processes ask the system for, seen from outside by strace where it is installed.
-
-The audit hook sees what Python does. Whatever else runs (an extension module, a program that was started) opens its
-files unseen by it; a trace of the system calls tells. Without strace such a program is an undeclared input.
-"""
+"""What a foreign tool, or a compiled program under test, opens, executes and looks for: a trace of its system calls by
+strace. Without strace nobody knows, and what it answers is re-run each time."""
 
 from __future__ import annotations
 
@@ -10,27 +7,15 @@ import codecs
 import functools
 import os
 import re
-import secrets
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from avow.base.files import read_regular
 from avow.isolation.watching import way
 
-_SIGNALS = frozenset({"kill", "tkill", "pidfd_send_signal", "rt_sigqueueinfo"})
-_PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
-_NETWORK = frozenset({"socket", "connect"})
-_OF_SOCKETS = frozenset({"getsockopt", "setsockopt", "recvmsg", "recvmmsg"})
-"""What asks a socket, even one of a pair, for the user, the numbers of a process or the clock."""
-_MACHINE_CALLS = frozenset({"uname", "sysinfo"})
-"""What a program asks of the machine by a call. The clock is read without one (`_asks`)."""
-_TOLD = _SIGNALS | _PROBES | _NETWORK | _OF_SOCKETS | _MACHINE_CALLS
 _STEPS = frozenset({"clone", "clone3", "fork", "vfork", "fchdir"})
 """Calls that say in which folder a process is."""
 _OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
@@ -45,31 +30,10 @@ _CHANGES = frozenset(
 _LINKS = frozenset({"symlink", "symlinkat"})
 _BOTH = _LINKS | {"rename", "renameat", "renameat2", "link", "linkat"}
 """Calls that name two paths, and change both: what is linked to can be written by its new name."""
-_BY_HANDLE = frozenset({"fchmod", "fchown", "ftruncate", "fsetxattr", "fremovexattr", "utimensat"})
-"""Calls that change what a descriptor is of."""
 _WRITES = re.compile(rb"\bO_(?:WRONLY|RDWR|CREAT|TRUNC|APPEND)\b")
-
-_MACHINE = tuple(
-    f"{place}/"
-    for place in (
-        *(f"/proc/{name}" for name in ("cpuinfo", "meminfo", "filesystems", "mounts", "stat", "version", "sys")),
-        *(f"/proc/self/{name}" for name in ("maps", "status", "cgroup", "mountinfo", "mounts", "auxv", "fd")),
-        *("/sys/devices/system", "/sys/fs/cgroup", "/sys/kernel", "/etc/ld.so.cache", "/dev/tty"),
-    )
-)
-"""What libraries ask about the machine as they start; and the loader's index, since what it finds there is told."""
-
 
 INSTALL = "sudo apt install strace"
 """The one command that brings it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Traced:
-    """What a trace tells: (event, path) pairs as the audit hook's, and what no subject may do."""
-
-    events: tuple[tuple[str, str], ...]
-    faults: tuple[str, ...]
 
 
 @functools.cache
@@ -97,7 +61,7 @@ def remedy() -> str:
 
 
 def _strace(place: str) -> list[str]:
-    calls = ",".join(["%file", *sorted(_TOLD | _BY_HANDLE | _STEPS)])
+    calls = ",".join(["%file", "connect", *sorted(_STEPS)])
     program = shutil.which("strace") or "strace"
     return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
@@ -110,22 +74,13 @@ class Trace:
         handle = os.memfd_create("avow-trace")
         self._place = f"/proc/{os.getpid()}/fd/{handle}"
         self._file = os.fdopen(handle, "rb")
-        self.mark = f"/avow-{secrets.token_hex(8)}"
-        """The process looks at ``<mark>-begin`` and ``<mark>-end``: what it asks for in between is its subject's."""
 
     def around(self, command: Sequence[str]) -> list[str]:
         return [*_strace(self._place), *command]
 
-    def read(self, folder: Path, scratch: str) -> Traced | None:
-        """What was asked for by a process that began in `folder`; None where the trace has no end: then nobody knows.
-        Said once. What lies in `scratch` is the subject's own."""
-        with self._file as file:
-            lines = list(_whole(file.read().split(b"\n")))
-        return _read(lines, self.mark, str(folder), scratch)
-
     def read_all(self, program: str, folder: Path) -> tuple[tuple[str, str], ...] | None:
-        """As `read`, of a trusted tool, from the start of its program: what it asked for, but for what it made itself
-        and what the machine is (``/proc``, devices). Said once."""
+        """(event, path) pairs of what was asked for from the start of the program, which began in `folder`, but for
+        what it made itself and what the machine is (``/proc``, devices). None where the trace has no end. Read once."""
         with self._file as file:
             lines = list(_whole(file.read().split(b"\n")))
         begins = (k for k, (_, line) in enumerate(lines) if line.startswith(b"execve(") and _names(line, program))
@@ -172,7 +127,7 @@ class _Places:
             to = _text(step[1] or step[2])
             at = "" if to[:1] == os.sep else self.of(process)
             if at is not None:
-                self._now[process], _ = way(os.path.join(at, to))  # noqa: PTH118
+                self._now[process] = way(os.path.join(at, to))  # noqa: PTH118
 
 
 _STEP = re.compile(rb'(?:chdir\("((?:[^"\\]|\\.)+)"|fchdir\(\d+<((?:[^>\\]|\\.)*)>)\)\s+= 0')
@@ -203,7 +158,7 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
         if at is None and _text(text)[:1] != os.sep:
             events[_NOWHERE] = None
             continue
-        path, left = way(os.path.join(at or "", _text(text)), whole=_goes_into(call, rest))  # noqa: PTH118
+        path = way(os.path.join(at or "", _text(text)))  # noqa: PTH118
         well = b"= -1 " not in rest
         if call in _BOTH:
             old, new = _both(call, line, at or "")
@@ -227,7 +182,6 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
             if not own(name):
                 kind = "link" if call.startswith("readlink") else "state" if call in _LOOKS else "read"
                 events["kind" if kind == "read" and b"O_PATH" in rest and call not in _RUNS else kind, name] = None
-            events |= {("kind", place): None for place in left if not own(place)}
     return (*events, *_interpreters(events))
 
 
@@ -247,8 +201,6 @@ def _names(line: bytes, program: str) -> bool:
     return found is not None and found[3] is not None and _text(found[3]) == program
 
 
-_FAILED = b")"
-"""How the line of a call ends that failed: ``= -1 ENOENT (No such file or directory)``."""
 _CONNECTED = (b"= 0", b"(Operation now in progress)")
 _OF_THE_MACHINE = ("/proc/", "/sys/", "/dev/", "/etc/ld.so.cache/", "/etc/ld.so.preload/")
 
@@ -277,102 +229,16 @@ _STRING = rb'"((?:[^"\\]|\\.)*)"(?:\.\.\.)?'
 _CALL = re.compile(rb"(\w+)\((?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?(?:" + _STRING + rb")?(.*)", re.DOTALL)
 
 
-def _goes_into(call: str, rest: bytes) -> bool:
-    """Whether it may be a folder from which others are named."""
-    return call == "chdir" or b"O_DIRECTORY" in rest or b"O_PATH" in rest
-
-
 _PATH = re.compile(rb"(?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?" + _STRING)
 
 
 def _both(call: str, line: bytes, folder: str) -> list[str]:
     """The two paths of a call."""
     found = [(_text(base) if base else folder, _text(text)) for base, text in _PATH.findall(line)[:2]]
-    paths = [way(os.path.join(*pair))[0] for pair in found]  # noqa: PTH118
+    paths = [way(os.path.join(*pair)) for pair in found]  # noqa: PTH118
     if call in _LINKS and len(paths) == 2:
-        paths[0], _ = way(os.path.join(os.path.dirname(paths[1]), found[0][1]))  # noqa: PTH118, PTH120
+        paths[0] = way(os.path.join(os.path.dirname(paths[1]), found[0][1]))  # noqa: PTH118, PTH120
     return paths
-
-
-def _read(lines: Sequence[tuple[int, bytes]], mark: str, folder: str, scratch: str) -> Traced | None:
-    events: dict[tuple[str, str], None] = {}
-    faults: dict[str, None] = {}
-    begins = (process for process, line in lines if mark.encode() in line)
-    places = _Places(lines, next(begins, 0), folder)
-    host: int | None = None
-    ended = False
-    running: set[int] = set()
-    started: dict[str, None] = {}
-    """What started programs are made of, among what they read."""
-    ours: set[int] = set()
-    """Processes of the sandbox itself: they were there before the subject."""
-    for process, line in lines:
-        places.see(process, line)
-        if not line:
-            running.discard(process)
-        found = _CALL.match(line)
-        if found is None:
-            continue
-        if host is None:
-            ours.add(process)
-        elif not ended and process not in ours:
-            running.add(process)
-        call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
-        if text is not None and _text(text) == f"{mark}-begin" and host is None:
-            host = process
-            continue
-        if host is None:
-            continue
-        if text is not None and _text(text) == f"{mark}-end":
-            ended = ended or process == host
-            if running - {host}:
-                faults["left processes behind"] = None
-        if ended and process == host:
-            continue  # it looks whether something is left
-        if call in _SIGNALS:
-            faults["sends signals"] = None
-        elif call in _PROBES:
-            faults["looks at another process"] = None
-        elif call in _NETWORK:
-            if (call == "socket" and b"AF_UNIX" not in line) or (call == "connect" and rest.rstrip().endswith(b"= 0")):
-                events["outside", "the network"] = None
-        elif call in _OF_SOCKETS:
-            if process == host:
-                events["outside", "the network"] = None
-        elif call in _MACHINE_CALLS:
-            if process != host:  # the host's own: `senses`
-                events["outside", "the machine"] = None
-        elif call in _BOTH:
-            for path in _both(call, line, places.of(process) or ""):
-                if path != scratch and not path.startswith(scratch + os.sep):
-                    faults[f"writes {path}"] = None
-        elif text is None and call in _BY_HANDLE:
-            path = _text(base or b"")
-            if path != scratch and not path.startswith((scratch + os.sep, "/memfd:", "/dev/")):
-                faults[f"writes {path or 'a file'}"] = None
-        elif text is not None:
-            at = _text(base) if base is not None else places.of(process)
-            if at is None and text and _text(text)[:1] != os.sep:
-                events[_NOWHERE] = None
-                continue
-            path, left = way(os.path.join(at or "", _text(text)), whole=_goes_into(call, rest))  # noqa: PTH118
-            if path == scratch or path.startswith(scratch + os.sep):
-                continue
-            events |= {("kind", place): None for place in left if process != host}  # the host's own: the audit hook
-            if call in ("chdir", "fchdir"):
-                pass
-            elif call in _CHANGES or (call in _OPENS and _WRITES.search(rest)):
-                if not path.startswith(("/dev/null", "/dev/tty")):
-                    faults[f"writes {path}"] = None
-            elif (text or call == "execveat") and not f"{path}/".startswith(_MACHINE):
-                if call in _OPENS:
-                    events["read", path] = None
-                    if process != host and not rest.rstrip().endswith(_FAILED):
-                        started[path] = None
-                elif call in _LOOKS and process != host:  # the host's own: the audit hook
-                    events["state", path] = None
-    asked = (("outside", f"{what} ({os.path.basename(path)})") for path in started for what in _asks(path))  # noqa: PTH119
-    return Traced((*events, *_interpreters(events), *asked), tuple(faults)) if ended else None
 
 
 def _interpreters(events: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
@@ -389,68 +255,3 @@ def _text(quoted: bytes) -> str:
     """A string as strace writes it, as Python writes it."""
     raw, _ = codecs.escape_decode(quoted)
     return os.fsdecode(raw)
-
-
-# -- what machine code asks without a call of the system, by the names that it takes from libraries --------------------
-
-# The kernel hands the clock out without being asked, and so no trace tells who read it.
-
-_NAMES_TAKEN = {
-    "the clock": "clock_gettime gettimeofday time ftime timespec_get clock getrusage "
-    "_ZNSt6chrono3_V212system_clock3nowEv _ZNSt6chrono3_V212steady_clock3nowEv",
-    "random numbers": "getrandom getentropy arc4random arc4random_buf arc4random_uniform "
-    "_ZNSt13random_device9_M_getvalEv",
-}
-_ASKED = {name: what for what, names in _NAMES_TAKEN.items() for name in names.split()}
-_OF_THE_SYSTEM = (
-    "libc.so",
-    "libc-",
-    "ld-linux",
-    "ld-musl",
-    "libm.so",
-    "libpthread.so",
-    "libdl.so",
-    "librt.so",
-    "libstdc++.so",
-)
-"""Libraries that have such functions for others, and use none for themselves."""
-
-_SECTIONS = 0x28
-"""Where a file of 64 bits says where its table of sections is."""
-
-
-def _asks(path: str) -> tuple[str, ...]:
-    """What the program or library can ask for so; what it is, where it does not say which names it takes (a static
-    program). Nothing for what is no machine code of 64 bits, or is not there."""
-    file = Path(path)
-    if file.name.startswith(_OF_THE_SYSTEM):
-        return ()
-    try:
-        data = read_regular(file)
-    except OSError:
-        return ()
-    if data[:6] != b"\x7fELF\x02\x01":
-        return ("what only it knows",) if data[:4] == b"\x7fELF" else ()
-    try:
-        names = _taken(data)
-    except (struct.error, IndexError):
-        names = None
-    return ("what only it knows",) if names is None else tuple(sorted({_ASKED[n] for n in names if n in _ASKED}))
-
-
-def _taken(data: bytes) -> set[str] | None:
-    """The names that it takes from others; None where it has no list of them. Raises struct.error, IndexError."""
-    (table,) = struct.unpack_from("<Q", data, _SECTIONS)
-    size, count = struct.unpack_from("<HH", data, 0x3A)
-    sections = [struct.unpack_from("<IIQQQQII", data, table + k * size) for k in range(count)]
-    for _, kind, _, _, at, length, link, _ in sections:
-        if kind != 11:  # SHT_DYNSYM
-            continue
-        strings = sections[link][4]
-        found = set()
-        for place in range(at, at + length, 24):
-            name, _, _, section = struct.unpack_from("<IBBH", data, place)
-            if section == 0 and name:
-                found.add(data[strings + name : data.index(b"\0", strings + name)].decode("ascii", "replace"))
-        return found
-    return None

@@ -1,4 +1,5 @@
-"""The kernel: what decides that a claim about a composed system is proved. docs/kernel.md says what it does; read then
-calculus/proofs/kernel.dfy (the theorem), `statements`, `certificate`, `text`, `check`, `solvers`. Engines
-(`avow.calculus`) only *find*: no wrong hint makes a claim true. Of Avow only the language and base are used here.
+"""The kernel decides whether a claim about a composed system is proved (`docs/developers/kernel.md`).
+
+The theorem is `calculus/proofs/kernel.dfy`. The modules are `statements`, `certificate`, `text`, `check` and `solvers`.
+Engines (`avow.calculus`) only search: no wrong hint makes a claim true. The kernel imports only the language and base.
 """

@@ -6,22 +6,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from avow.base.records import dataclass
+from avow.language import terms as t
 from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort
-from avow.language.terms import (
-    Arithmetic,
-    Compare,
-    Conditional,
-    Iff,
-    Implies,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Term,
-    Widen,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +16,7 @@ class Bound:
     """A comparison with a constant, read with the constant on the right. Where it is a condition, or stands under `not`
     or `or`, the same may be said the other way (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
 
-    term: Compare
+    term: t.Compare
     sign: str
     number: Fraction
     turned: bool
@@ -38,40 +25,40 @@ class Bound:
         return self.sign in signs or (self.turned and OPPOSITE[self.sign] in signs)
 
 
-def bounds(formula: Term) -> Iterator[Bound]:
+def bounds(formula: t.Term) -> Iterator[Bound]:
     """Every comparison of order with a constant, in reading order."""
     stack = [(formula, False)]
     while stack:
         term, turned = stack.pop()
         match term:
-            case Compare(operator=sign, left=left, right=right) if sign in FLIPPED:
+            case t.Compare(operator=sign, left=left, right=right) if sign in FLIPPED:
                 if (number := constant(right)) is not None:
                     yield Bound(term, sign, number, turned)
                 elif (number := constant(left)) is not None:
                     yield Bound(term, FLIPPED[sign], number, turned)
-            case Implies(left=left, right=right):
+            case t.Implies(left=left, right=right):
                 stack += [(right, turned), (left, True)]
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
+            case t.Conditional(condition=condition, then=then, otherwise=otherwise):
                 stack += [(otherwise, turned), (then, turned), (condition, True)]
-            case Iff() | Or() | Not() | Operation(sort=BoolSort()):
+            case t.Iff() | t.Or() | t.Not() | t.Operation(sort=BoolSort()):
                 stack += [(part, True) for part in reversed(term.children)]
             case _:  # what holds of its parts is not turned round by anything else
                 stack += [(part, turned) for part in reversed(term.children)]
 
 
-def constant(term: Term) -> Fraction | None:
+def constant(term: t.Term) -> Fraction | None:
     """The number that a term without variables is; None for every other term."""
     match term:
-        case Literal(value=bool() | str()):
+        case t.Literal(value=bool() | str()):
             return None
-        case Literal(value=value):
+        case t.Literal(value=value):
             return Fraction(value)
-        case Widen(term=inner):
+        case t.Widen(term=inner):
             return constant(inner)
-        case Negative(term=inner):
+        case t.Negative(term=inner):
             number = constant(inner)
             return None if number is None else -number
-        case Arithmetic(operator=operator, left=left, right=right):
+        case t.Arithmetic(operator=operator, left=left, right=right):
             first = constant(left)
             second = constant(right) if first is not None else None
             if first is None or second is None or (operator == "/" and second == 0):

@@ -7,26 +7,13 @@ from fractions import Fraction
 
 from avow.base.optional import complete
 from avow.base.plain import count
+from avow.language import syntax
 from avow.language.check_terms import Terms
 from avow.language.conversions import WHOLE, common, joined, widen
 from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS
 from avow.language.printer import show_sort
 from avow.language.sorts import BOOL, NATURAL, REAL, FunctionSort, SetSort
 from avow.language.subterms import timed
-from avow.language.syntax import (
-    Connective,
-    Lasting,
-    Limited,
-    LimitSyntax,
-    Name,
-    Number,
-    PaceSyntax,
-    Quantification,
-    Quantity,
-    Sign,
-    TermSyntax,
-    unparenthesised,
-)
 from avow.language.terms import RESPONSES, Arithmetic, History, Limit, Literal, Past, Quantifier, Role, Term, Variable
 
 _ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
@@ -36,17 +23,17 @@ _PLACE = "a response stands as the whole right side of a clause's outermost `->`
 class Histories(Terms):
     """Records of the past, and responses."""
 
-    response: TermSyntax | None = None
+    response: syntax.TermSyntax | None = None
     """Where a response may stand."""
-    whole: TermSyntax | None = None
+    whole: syntax.TermSyntax | None = None
     """The clause."""
 
-    def clause(self, tree: TermSyntax) -> Term | None:
+    def clause(self, tree: syntax.TermSyntax) -> Term | None:
         """A clause's formula, which may speak of other steps and be a response."""
-        self.response, self.whole = _right_side(tree), unparenthesised(tree)
+        self.response, self.whole = _right_side(tree), syntax.unparenthesised(tree)
         return self.formula(tree)
 
-    def quantity(self, tree: Quantity) -> Term | None:
+    def quantity(self, tree: syntax.Quantity) -> Term | None:
         scale = _scale(tree.unit.text)
         if scale is None:
             hint = f"units of time are {', '.join((*UNITS, *LONG_UNITS))}; steps are counted in a limit only"
@@ -54,14 +41,18 @@ class Histories(Terms):
             return None
         return Literal(Fraction(tree.digits) * scale, REAL, self.span(tree))
 
-    def limited(self, tree: Limited) -> Term | None:
+    def limited(self, tree: syntax.Limited) -> Term | None:
         return self.history(tree, Past(tree.name.text), tree.arguments, tree.limit)
 
-    def lasting(self, tree: Lasting) -> Term | None:
+    def lasting(self, tree: syntax.Lasting) -> Term | None:
         return self.history(tree, Past(tree.word), (tree.left, tree.right), tree.limit)
 
     def history(
-        self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax], limit: LimitSyntax | None = None
+        self,
+        tree: syntax.TermSyntax,
+        operator: Past,
+        arguments: Sequence[syntax.TermSyntax],
+        limit: syntax.LimitSyntax | None = None,
     ) -> Term | None:
         if not self.scope.remembers:
             self.error("RCL322", f"`{operator}` speaks of other steps than this one, and there is one here only", tree)
@@ -87,13 +78,13 @@ class Histories(Terms):
         sort = NATURAL if operator is Past.COUNTED else BOOL
         return History(operator, made, sort, bound, self.span(tree))
 
-    def pace(self, tree: PaceSyntax) -> Term | None:
+    def pace(self, tree: syntax.PaceSyntax) -> Term | None:
         """A node's pace, which is a guarantee of its own."""
         told = " ".join(token.text for token in tree.words)
         relation = {"every": "==", "at most": "<="}.get(told)
         scale = _scale(tree.length.unit.text)
-        head = unparenthesised(tree.head)
-        if not isinstance(head, Name) or head.text != Past.STEPS or relation is None:
+        head = syntax.unparenthesised(tree.head)
+        if not isinstance(head, syntax.Name) or head.text != Past.STEPS or relation is None:
             hint = "write `steps(every 20 ms)` or `steps(at most 100 ms)`"
             self.error("RCL324", f"`{self.text(tree)}` says nothing of how far apart steps are", tree, hint=hint)
             return None
@@ -107,7 +98,7 @@ class Histories(Terms):
         amount = Literal(Fraction(tree.length.digits) * scale, REAL, self.span(tree.length))
         return History(Past.STEPS, (), BOOL, Limit(relation, amount, False), self.span(tree))
 
-    def _limits(self, tree: TermSyntax, operator: Past, limit: LimitSyntax | None) -> bool:
+    def _limits(self, tree: syntax.TermSyntax, operator: Past, limit: syntax.LimitSyntax | None) -> bool:
         """Whether it has a limit where it needs one, and one of its kind; reports it if not."""
         if limit is None:
             if operator not in _ALWAYS_LIMITED:
@@ -130,7 +121,9 @@ class Histories(Terms):
             return False
         return True
 
-    def _arguments(self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax]) -> tuple[Term, ...] | None:
+    def _arguments(
+        self, tree: syntax.TermSyntax, operator: Past, arguments: Sequence[syntax.TermSyntax]
+    ) -> tuple[Term, ...] | None:
         wanted = 2 if operator in (Past.PREVIOUS, Past.SINCE, Past.UNTIL) else 1
         if len(arguments) != wanted:
             self.terms(arguments)
@@ -141,8 +134,8 @@ class Histories(Terms):
             self.error("RCL305", message, tree, hint=hint)
             return None
         if operator is Past.COUNTED:
-            inner = unparenthesised(arguments[0])
-            if not isinstance(inner, Lasting) or inner.word != Past.SINCE or inner.limit is not None:
+            inner = syntax.unparenthesised(arguments[0])
+            if not isinstance(inner, syntax.Lasting) or inner.word != Past.SINCE or inner.limit is not None:
                 self.error("RCL323", "`counted` is of steps since another", tree, hint="write `counted(F since G)`")
                 return None
             arguments = (inner.left, inner.right)
@@ -173,20 +166,20 @@ class Histories(Terms):
             return None
         return tuple(same)
 
-    def _input(self, tree: TermSyntax, term: Term) -> tuple[Term, ...] | None:
+    def _input(self, tree: syntax.TermSyntax, term: Term) -> tuple[Term, ...] | None:
         if isinstance(term, Variable) and term.role is Role.INPUT:
             return (term,)
         hint = "write `arrived(in.scan)`, of an input of the node"
         self.error("RCL324", "what arrives is a message of an input", tree, hint=hint)
         return None
 
-    def limit(self, tree: LimitSyntax) -> Limit | None:
+    def limit(self, tree: syntax.LimitSyntax) -> Limit | None:
         """A limit, in steps or in seconds."""
         amount, unit = tree.amount, tree.unit.text if tree.unit is not None else ""
-        inner = unparenthesised(amount)
-        if isinstance(inner, Quantity) and inner.unit.text in STEPS and not unit:
+        inner = syntax.unparenthesised(amount)
+        if isinstance(inner, syntax.Quantity) and inner.unit.text in STEPS and not unit:
             unit = inner.unit.text
-            amount = Number(inner.start, inner.unit.start, 1, inner.digits)
+            amount = syntax.Number(inner.start, inner.unit.start, 1, inner.digits)
         if unit in STEPS:
             term = self.term(amount)
             if term is None:
@@ -198,15 +191,14 @@ class Histories(Terms):
             return Limit(tree.relation, term, True)
         if inner.start in self.reports.odd:
             return None  # reported by the lexer
-        if not unit and isinstance(inner, Number):
+        if not unit and isinstance(inner, syntax.Number):
             hint = f"write `[{inner.digits} steps]` or `[{inner.digits} s]`"
             self.error("RCL320", "a limit has a unit", tree, hint=hint)
             return None
         scale = _scale(unit) if unit else Fraction(1)
         if scale is None:
             hint = f"units are steps, {', '.join((*UNITS, *LONG_UNITS))}"
-            assert tree.unit is not None
-            self.error("RCL320", f"`{unit}` is no unit of time", tree.unit, hint=hint)
+            self.error("RCL320", f"`{unit}` is no unit of time", tree.unit or tree, hint=hint)
             return None
         term = self.term(amount)
         if term is None:
@@ -223,13 +215,13 @@ class Histories(Terms):
         return Limit(tree.relation, seconds, False)
 
 
-def _right_side(tree: TermSyntax) -> TermSyntax:
+def _right_side(tree: syntax.TermSyntax) -> syntax.TermSyntax:
     """The right side of a formula's outermost `->`, under universal quantifiers; the formula, where it has none."""
-    tree = unparenthesised(tree)
-    while isinstance(tree, Quantification) and tree.quantifier is Quantifier.FORALL:
-        tree = unparenthesised(tree.body)
-    if isinstance(tree, Connective) and tree.sign is Sign.IMPLIES:
-        return unparenthesised(tree.items[-1])
+    tree = syntax.unparenthesised(tree)
+    while isinstance(tree, syntax.Quantification) and tree.quantifier is Quantifier.FORALL:
+        tree = syntax.unparenthesised(tree.body)
+    if isinstance(tree, syntax.Connective) and tree.sign is syntax.Sign.IMPLIES:
+        return syntax.unparenthesised(tree.items[-1])
     return tree
 
 

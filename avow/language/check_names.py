@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from avow.base.diagnostics import Span
@@ -33,8 +33,6 @@ class Names(ABC):
         term = self.term(tree, BOOL)
         if term is None or term.sort == BOOL:
             return term
-        if self._at_least(tree):
-            return None
         shown = show_sort(term.sort)
         hint = "compare it with something: `… == …`"
         if isinstance(term, EnumValue | Construct):
@@ -43,14 +41,6 @@ class Names(ABC):
             hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
         self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)
         return None
-
-    def _at_least(self, tree: TermSyntax) -> bool:
-        """Whether a term stands beside `=>`, which has been reported: it may have been meant for at least."""
-        text = self.reports.source.text
-        return bool(self.reports.odd) and (
-            text[tree.end : tree.end + 20].lstrip().startswith("=>")
-            or text[max(tree.start - 20, 0) : tree.start].rstrip().endswith("=>")
-        )
 
     @abstractmethod
     def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
@@ -78,9 +68,9 @@ class Names(ABC):
     def span(self, tree: Syntax | Token) -> Span:
         return self.reports.source.span(tree.start, tree.end)
 
-    def places(self, trees: Sequence[TermSyntax]) -> Callable[[int, int], Span]:
-        """Of parts that stand one after another: the place from one of them to another."""
-        return lambda first, last: self.reports.source.span(trees[first].start, trees[last].end)
+    def between(self, first: TermSyntax, last: TermSyntax) -> Span:
+        """The place from the start of one part to the end of another."""
+        return self.reports.source.span(first.start, last.end)
 
     def text(self, tree: Syntax) -> str:
         text = " ".join(self.reports.source.text[tree.start : tree.end].split())
@@ -164,15 +154,13 @@ class Names(ABC):
         """Reports a name that nothing has; `text` where a text is wanted."""
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
-        hint = FOREIGN_NAMES.get(name) or did_you_mean(name, self.scope.known())
-        if text and hint is None:
+        hint = FOREIGN_NAMES.get(name.casefold()) or did_you_mean(name, self.scope.known())
+        if hint is None and text:
             hint = f'write texts in quotation marks: `"{name}"`'
-        if hint is None and self.scope.node is None and not self.scope.nodes and what == "name":
-            hint = f"`Name = {{{name}, …}};` declares it as an element"
-        if hint is None and name.endswith("'") and self.scope.taken(name.rstrip("'")) is not None:
-            hint = f"`{name}` is a name of its own: there is no value of `{name.rstrip(chr(39))}` at another step"
-        if hint is None and self.scope.node is not None and what == "name":
+        if hint is None and what == "name":
             hint = "declare it in the context, among the inputs or outputs, or in a quantifier: `exists(x in REAL | …)`"
+            if self.scope.node is None and not self.scope.nodes:
+                hint = f"`Name = {{{name}, …}};` declares it as an element"
         self.error("RCL201", f"the {what} `{name}` is not declared", tree, hint=hint)
 
     def element(self, name: str, tree: Syntax) -> Term | None:
@@ -198,24 +186,21 @@ class Names(ABC):
         scope = self.scope
         if scope.is_broken(name) or name in KEYWORDS:  # the latter is reported by the lexer
             return
-        words = {Role.INPUT: "input", Role.OUTPUT: "output"}
-        other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
         if scope.node is None:
-            self.error(
-                "RCL203", f"no node is meant here, so `{role}.{name}` has no meaning", tree, hint="write `node.port`"
-            )
+            message = f"no node is meant here, so `{role}.{name}` has no meaning"
+            self.error("RCL203", message, tree, hint="write `node.port`")
             return
-        hint: str | None = did_you_mean(name, scope.ports(role))
         if name in scope.ports(role):
-            self.error("RCL203", f"the {words[role]}s of a node have no place here: `{role}.{name}`", tree)
+            self.error("RCL203", f"the {role}puts of a node have no place here: `{role}.{name}`", tree)
             return
+        other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
+        environment = scope.environment
+        hint = did_you_mean(name, scope.ports(role))
         if name in scope.ports(other):
-            hint = f"it is an {words[other]}: write `{other}.{name}`"
-        elif scope.environment.sort(name) is not None or name in scope.environment.constants:
+            hint = f"it is an {other}put: write `{other}.{name}`"
+        elif environment.sort(name) is not None or name in environment.constants or name in environment.elements:
             hint = f"`{name}` is declared in the context: write `{name}` alone"
-        elif name in scope.environment.elements:
-            hint = f"`{name}` is an element of a type: write `{name}` alone"
-        self.error("RCL203", f"{scope.named} has no {words[role]} `{name}`", tree, hint=hint)
+        self.error("RCL203", f"{scope.named} has no {role}put `{name}`", tree, hint=hint)
 
     def field(self, record: Term | None, name: str, tree: Syntax) -> Term | None:
         """``p.x`` of a record."""
@@ -240,7 +225,7 @@ class Names(ABC):
         """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""
         scope = self.scope
         own = [f"{r}.{name}" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
-        word = {"in": "in", "input": "in", "out": "out", "output": "out"}.get(before.casefold())
+        word = {"in": "in", "input": "in", "out": "out", "output": "out"}.get(before.casefold().removesuffix("s"))
         message = f"`{before}.{name}` has no meaning inside a node"
         if word is not None:
             hint = f"write `{word}.{name}`"

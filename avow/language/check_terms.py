@@ -4,68 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.base.diagnostics import Span
 from avow.base.optional import complete
 from avow.base.plain import count
-from avow.language.chains import arithmetic
+from avow.language import sorts as s
+from avow.language import syntax
+from avow.language import terms as t
 from avow.language.check_names import Names
-from avow.language.conversions import NUMERIC, WHOLE, alike, common, convert, joined
+from avow.language.conversions import NUMERIC, WHOLE, alike, common, convert, joined, widen
 from avow.language.lexer import Token
 from avow.language.operators import OPERATORS, Mistyped, operation
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    REAL,
-    STRING,
-    EnumSort,
-    FunctionSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    TupleSort,
-)
-from avow.language.syntax import (
-    Application,
-    BuiltinName,
-    Calculation,
-    Comparison,
-    Minus,
-    Name,
-    Number,
-    RangeDisplay,
-    SequenceDisplay,
-    SetDisplay,
-    Syntax,
-    TermSyntax,
-    TupleDisplay,
-    unparenthesised,
-)
-from avow.language.terms import (
-    And,
-    Apply,
-    Arithmetic,
-    Builtin,
-    Compare,
-    Construct,
-    EnumValue,
-    In,
-    Index,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Past,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-)
 
-_BUILTINS = frozenset(Builtin)
+_BUILTINS = frozenset(t.Builtin)
 """Words that are operators directly before a parenthesis, unless the contract gives them another meaning."""
-_PAST = frozenset(Past) - {Past.SINCE, Past.UNTIL}
+_PAST = frozenset(t.Past) - {t.Past.SINCE, t.Past.UNTIL}
 _ORDERINGS = frozenset(("<", "<=", ">", ">="))
 _OPERATORS = {"EQ": "==", "NE": "!=", "LE": "<=", "GE": ">=", "LT": "<", "GT": ">"}
 
@@ -75,9 +28,9 @@ class Terms(Names):
 
     # --- applications ------------------------------------------------------------------------------------------------
 
-    def application(self, tree: Application) -> Term | None:
-        head, arguments = unparenthesised(tree.function), tree.arguments
-        if isinstance(head, Name):
+    def application(self, tree: syntax.Application) -> t.Term | None:
+        head, arguments = syntax.unparenthesised(tree.function), tree.arguments
+        if isinstance(head, syntax.Name):
             name = head.text
             if self.scope.taken(name) is None:
                 if name == "length":
@@ -85,9 +38,9 @@ class Terms(Names):
                 if name == "indices":
                     return self.indices(tree, arguments)
                 if name in _BUILTINS:
-                    return self.builtin_operation(tree, Builtin(name), arguments)
+                    return self.builtin_operation(tree, t.Builtin(name), arguments)
                 if name in _PAST:
-                    return self.history(tree, Past(name), arguments)
+                    return self.history(tree, t.Past(name), arguments)
                 if name not in self.scope.nodes:
                     self.undeclared(name, head, "function or constructor")
                     if name.casefold() not in ("forall", "exists", "exist"):  # whose variables are unknown
@@ -103,17 +56,15 @@ class Terms(Names):
             self.terms(arguments)
             return None
         match function.sort:
-            case FunctionSort(parameters=parameters, result=result):
+            case s.FunctionSort(parameters=parameters, result=result):
                 given = self.arguments(tree, arguments, parameters, self.text(head))
-                return None if given is None else Apply(function, given, result, self.span(tree))
-            case SequenceSort(item=item):
+                return None if given is None else t.Apply(function, given, result, self.span(tree))
+            case s.SequenceSort(item=item):
                 return self.index(tree, function, arguments, item)
         self.terms(arguments)
-        if self.reports.source.text[tree.function.end : tree.function.end + 1] == "[":
-            return None  # reported by the lexer
         message = f"`{self.text(head)}` is of type {show_sort(function.sort)}: it is no function and takes no arguments"
         hint = None
-        if isinstance(function.sort, TupleSort):
+        if isinstance(function.sort, s.TupleSort):
             hint = f"take a tuple apart by its items: `exists(a, b in REAL | {self.text(head)} == (a, b) and …)`"
         elif len(arguments) == 1:
             hint = f"compare it: `{self.text(head)} == {self.text(arguments[0])}`"
@@ -121,8 +72,8 @@ class Terms(Names):
         return None
 
     def arguments(
-        self, tree: Syntax, given: Sequence[TermSyntax], parameters: Sequence[Sort], name: str
-    ) -> tuple[Term, ...] | None:
+        self, tree: syntax.Syntax, given: Sequence[syntax.TermSyntax], parameters: Sequence[s.Sort], name: str
+    ) -> tuple[t.Term, ...] | None:
         if len(given) != len(parameters):
             self.terms(given)
             shown = ", ".join(show_sort(p) for p in parameters)
@@ -131,20 +82,22 @@ class Terms(Names):
             self.error("RCL305", message, tree, hint=f"its parameters are ({shown})" if parameters else None)
             return None
         pairs, what = zip(given, parameters, strict=True), f"this argument of `{name}`"
-        made: list[Term] | None = complete([self.wanted(each, sort, what) for each, sort in pairs])
+        made: list[t.Term] | None = complete([self.wanted(each, sort, what) for each, sort in pairs])
         return None if made is None else tuple(made)
 
-    def construct(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
+    def construct(self, tree: syntax.Syntax, name: str, arguments: Sequence[syntax.TermSyntax]) -> t.Term | None:
         sort = self.scope.environment.elements[name]
-        if isinstance(sort, EnumSort):
+        if isinstance(sort, s.EnumSort):
             self.terms(arguments)
             message = f"`{name}` is an element of {sort.name}: it is no function and takes no arguments"
             self.error("RCL304", message, tree)
             return None
         given = self.arguments(tree, arguments, sort.constructor(name).parameters, name)
-        return None if given is None else Construct(name, given, sort, self.span(tree))
+        return None if given is None else t.Construct(name, given, sort, self.span(tree))
 
-    def index(self, tree: Syntax, sequence: Term, arguments: Sequence[TermSyntax], item: Sort) -> Term | None:
+    def index(
+        self, tree: syntax.Syntax, sequence: t.Term, arguments: Sequence[syntax.TermSyntax], item: s.Sort
+    ) -> t.Term | None:
         made = self.terms(arguments)
         if len(made) != 1:
             self.error("RCL305", f"a sequence takes one position and is given {len(made) or 'none'}", tree)
@@ -156,33 +109,35 @@ class Terms(Names):
             message = f"a position in a sequence is a whole number, and this is of type {show_sort(index.sort)}"
             self.error("RCL303", message, arguments[0])
             return None
-        return Index(sequence, index, item, self.span(tree))
+        return t.Index(sequence, index, item, self.span(tree))
 
-    def length(self, tree: Syntax, arguments: Sequence[TermSyntax]) -> Term | None:
+    def length(self, tree: syntax.Syntax, arguments: Sequence[syntax.TermSyntax]) -> t.Term | None:
         made = self.terms(arguments)
         if len(made) != 1:
             self.error("RCL305", f"`length` takes one sequence and is given {len(made) or 'none'}", tree)
             return None
         if made[0] is None:
             return None
-        if not isinstance(made[0].sort, SequenceSort):
+        if not isinstance(made[0].sort, s.SequenceSort):
             message = f"`length` is of a sequence, and this is of type {show_sort(made[0].sort)}"
             self.error("RCL303", message, arguments[0])
             return None
-        return Length(made[0], NATURAL, self.span(tree))
+        return t.Length(made[0], s.NATURAL, self.span(tree))
 
-    def indices(self, tree: Application, arguments: Sequence[TermSyntax]) -> Term | None:
+    def indices(self, tree: syntax.Application, arguments: Sequence[syntax.TermSyntax]) -> t.Term | None:
         """``indices(s)`` is ``<0 upto length(s) - 1>``."""
         length = self.length(tree, arguments)
         if length is None:
             return None
         span = self.span(tree)
-        last = Arithmetic("-", length, Literal(1, NATURAL, span), INTEGER, span)
-        return SequenceRange(Literal(0, NATURAL, span), last, SequenceSort(NATURAL), span)
+        last = t.Arithmetic("-", length, t.Literal(1, s.NATURAL, span), s.INTEGER, span)
+        return t.SequenceRange(t.Literal(0, s.NATURAL, span), last, s.SequenceSort(s.NATURAL), span)
 
-    def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
+    def builtin_operation(
+        self, tree: syntax.Syntax, name: t.Builtin, arguments: Sequence[syntax.TermSyntax]
+    ) -> t.Term | None:
         formulas = OPERATORS[name].typing.takes_formulas
-        terms: list[Term] | None = complete([self.formula(a) if formulas else self.term(a) for a in arguments])
+        terms: list[t.Term] | None = complete([self.formula(a) if formulas else self.term(a) for a in arguments])
         if terms is None:
             return None
         found = operation(name, terms, self.span(tree))
@@ -195,40 +150,40 @@ class Terms(Names):
 
     # --- collections -------------------------------------------------------------------------------------------------
 
-    def tuple_of(self, tree: TupleDisplay, expected: Sort | None) -> Term | None:
-        wanted: Sequence[Sort | None] = [None] * len(tree.items)
-        if isinstance(expected, TupleSort) and len(expected.items) == len(tree.items):
+    def tuple_of(self, tree: syntax.TupleDisplay, expected: s.Sort | None) -> t.Term | None:
+        wanted: Sequence[s.Sort | None] = [None] * len(tree.items)
+        if isinstance(expected, s.TupleSort) and len(expected.items) == len(tree.items):
             wanted = expected.items
-        items: list[Term] | None = complete([self.term(t, w) for t, w in zip(tree.items, wanted, strict=True)])
+        items: list[t.Term] | None = complete([self.term(term, w) for term, w in zip(tree.items, wanted, strict=True)])
         if items is None:
             return None
-        return TupleTerm(tuple(items), TupleSort(tuple(i.sort for i in items)), self.span(tree))
+        return t.TupleTerm(tuple(items), s.TupleSort(tuple(i.sort for i in items)), self.span(tree))
 
-    def items(self, trees: Sequence[TermSyntax], what: str, expected: Sort | None) -> list[Term] | None:
-        items: list[Term] | None = complete([self.term(t, expected) for t in trees])
+    def items(self, trees: Sequence[syntax.TermSyntax], what: str, expected: s.Sort | None) -> list[t.Term] | None:
+        items: list[t.Term] | None = complete([self.term(term, expected) for term in trees])
         if items is None:
             return None
         unified = common(items)
         if unified is None:
-            wrong = [(t, i) for t, i in zip(trees, items, strict=True) if common([items[0], i]) is None]
+            wrong = [(term, i) for term, i in zip(trees, items, strict=True) if common([items[0], i]) is None]
             at, first = wrong[0] if wrong else (trees[-1], items[-1])
             message = f"the items of a {what} are of one type: this is {show_sort(first.sort)}, "
             self.error("RCL302", message + f"the first is {show_sort(items[0].sort)}", at)
         return unified
 
-    def sequence(self, tree: SequenceDisplay, expected: Sort | None) -> Term | None:
-        item = expected.item if isinstance(expected, SequenceSort) else None
+    def sequence(self, tree: syntax.SequenceDisplay, expected: s.Sort | None) -> t.Term | None:
+        item = expected.item if isinstance(expected, s.SequenceSort) else None
         if not tree.items:
             if item is None:
                 self.error("RCL306", "the type of `<>` cannot be told here", tree, hint="compare it with a sequence")
                 return None
-            return SequenceTerm((), SequenceSort(item), self.span(tree))
+            return t.SequenceTerm((), s.SequenceSort(item), self.span(tree))
         items = self.items(tree.items, "sequence", item)
         if items is None:
             return None
-        return SequenceTerm(tuple(items), SequenceSort(joined(items)), self.span(tree))
+        return t.SequenceTerm(tuple(items), s.SequenceSort(joined(items)), self.span(tree))
 
-    def range_of(self, tree: RangeDisplay) -> Term | None:
+    def range_of(self, tree: syntax.RangeDisplay) -> t.Term | None:
         low, high = self.term(tree.low), self.term(tree.high)
         if low is None or high is None:
             return None
@@ -237,101 +192,96 @@ class Terms(Names):
                 message = f"a range goes over whole numbers, and this is of type {show_sort(term.sort)}"
                 self.error("RCL303", message, part)
                 return None
-        sort = NATURAL if low.sort == NATURAL else INTEGER
-        return SequenceRange(low, high, SequenceSort(sort), self.span(tree))
+        sort = s.NATURAL if low.sort == s.NATURAL else s.INTEGER
+        return t.SequenceRange(low, high, s.SequenceSort(sort), self.span(tree))
 
-    def set_of(self, tree: SetDisplay, expected: Sort | None) -> Term | None:
-        item = expected.item if isinstance(expected, SetSort) else None
+    def set_of(self, tree: syntax.SetDisplay, expected: s.Sort | None) -> t.Term | None:
+        item = expected.item if isinstance(expected, s.SetSort) else None
         if not tree.items:
             if item is None:
                 self.error("RCL306", "the type of the empty set cannot be told here", tree)
                 return None
-            return SetTerm((), SetSort(item), self.span(tree))
+            return t.SetTerm((), s.SetSort(item), self.span(tree))
         items = self.items(tree.items, "set", item)
-        return None if items is None else SetTerm(tuple(items), SetSort(joined(items)), self.span(tree))
+        return None if items is None else t.SetTerm(tuple(items), s.SetSort(joined(items)), self.span(tree))
 
-    def collection(self, tree: TermSyntax, item: Sort | None) -> Term | None:
+    def collection(self, tree: syntax.TermSyntax, item: s.Sort | None) -> t.Term | None:
         """The right-hand side of ``in``, or a quantifier's domain that is no type: a set or a sequence."""
-        tree = unparenthesised(tree)
-        if isinstance(tree, Name) and self.scope.taken(tree.text) is not None:
+        tree = syntax.unparenthesised(tree)
+        if isinstance(tree, syntax.Name) and self.scope.taken(tree.text) is not None:
             sort = self.scope.environment.sort(tree.text)
-            if isinstance(sort, EnumSort) and tree.text not in self.scope.bound:
-                members = tuple(EnumValue(m, sort, self.span(tree)) for m in sort.members)
-                return SetTerm(members, SetSort(sort), self.span(tree))
+            if isinstance(sort, s.EnumSort) and tree.text not in self.scope.bound:
+                members = tuple(t.EnumValue(m, sort, self.span(tree)) for m in sort.members)
+                return t.SetTerm(members, s.SetSort(sort), self.span(tree))
             if sort is not None and self.scope.environment.constants.get(tree.text) is None:
                 self.not_a_set(tree, show_sort(sort))
                 return None
-        if isinstance(tree, BuiltinName):
+        if isinstance(tree, syntax.BuiltinName):
             self.not_a_set(tree, tree.text)
             return None
-        expected: Sort | None = None
+        expected: s.Sort | None = None
         if item is not None:
-            expected = SetSort(item) if isinstance(tree, SetDisplay) else SequenceSort(item)
+            expected = s.SetSort(item) if isinstance(tree, syntax.SetDisplay) else s.SequenceSort(item)
         made = self.term(tree, expected)
-        if made is None or isinstance(made.sort, SetSort | SequenceSort):
+        if made is None or isinstance(made.sort, s.SetSort | s.SequenceSort):
             return made
         message = f"`in` wants a set or a sequence, and this is of type {show_sort(made.sort)}"
-        hint = "write a set as `{a, b}`, a sequence as `<a, b>`"
-        if isinstance(made.sort, TupleSort):
-            hint += ", an interval as `low < x < high`"
-        elif isinstance(made.sort, EnumSort):
-            hint = f"this is one value of type {made.sort.name}; all of them are `{made.sort.name}`"
+        hint = "write a set as `{a, b}`, a sequence as `<a, b>`, an interval as `low < x < high`"
         self.error("RCL307", message, tree, hint=hint)
         return None
 
-    def not_a_set(self, tree: Syntax, shown: str) -> None:
+    def not_a_set(self, tree: syntax.Syntax, shown: str) -> None:
         hint = "what a variable ranges over is said in its quantifier: `forall(x in REAL | …)`"
         self.error("RCL307", f"the type {shown} is not a set of values that `in` can ask about", tree, hint=hint)
 
     # --- arithmetic --------------------------------------------------------------------------------------------------
 
-    def numeric(self, tree: TermSyntax, operator: str) -> Term | None:
+    def numeric(self, tree: syntax.TermSyntax, operator: str) -> t.Term | None:
         term = self.term(tree)
         if term is not None and not isinstance(term.sort, NUMERIC):
             self.error("RCL308", f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}", tree)
             return None
         return term
 
-    def arithmetic(self, tree: Calculation) -> Term | None:
+    def arithmetic(self, tree: syntax.Calculation) -> t.Term | None:
         trees = tree.operands
         operators = [token.text for token in tree.operators]
-        operands: list[Term] = []
+        operands: list[t.Term] = []
         for operand, operator in zip(trees, [operators[0], *operators], strict=True):
             term = self.numeric(operand, operator)
             if term is None:
                 continue
-            if operator == "/" and operand is not trees[0] and isinstance(term, Literal) and term.value == 0:
+            if operator == "/" and operand is not trees[0] and isinstance(term, t.Literal) and term.value == 0:
                 self.error("RCL309", "division by zero", operand)
                 continue
             operands.append(term)
         if len(operands) < len(trees):
             return None
-        made = arithmetic(operators, operands, self.places(trees))
-        if made is None:
-            message = f"a chain of {len(operators)} operators, with a `/` between most of them, is too long"
-            self.error("RCL110", message, tree.operators[0], hint="put parentheses around its parts")
-        return made
+        result = operands[0]
+        for operator, right, place in zip(operators, operands[1:], trees[1:], strict=True):
+            result = _combined(operator, result, right, self.between(trees[0], place))
+        return result
 
-    def negative(self, tree: Minus) -> Term | None:
-        if isinstance(tree.body, Number):
+    def negative(self, tree: syntax.Minus) -> t.Term | None:
+        if isinstance(tree.body, syntax.Number):
             return self.number(tree.body, self.span(tree), sign=-1)
         term = self.numeric(tree.body, "-")
         if term is None:
             return None
-        return Negative(term, REAL if term.sort == REAL else INTEGER, self.span(tree))
+        return t.Negative(term, s.REAL if term.sort == s.REAL else s.INTEGER, self.span(tree))
 
     # --- comparisons -------------------------------------------------------------------------------------------------
 
-    def comparison(self, tree: Comparison) -> Term | None:
+    def comparison(self, tree: syntax.Comparison) -> t.Term | None:
         operands, relations = tree.operands, tree.relations
         if len(relations) == 1 and relations[0].type in ("IN", "NOT_IN"):
             return self.membership(tree, operands[0], relations[0], operands[1])
         if not self.check_chain(relations):
             self.terms(operands)
             return None
-        made: list[Term | None] = [None] * len(operands)
+        made: list[t.Term | None] = [None] * len(operands)
         late = []
-        hint: Sort | None = None
+        hint: s.Sort | None = None
         for i, operand in enumerate(operands):
             if _is_open(operand):
                 late.append(i)
@@ -343,7 +293,7 @@ class Terms(Names):
                 made[i] = self.term(operands[i], hint)
             elif len(late) == len(operands):
                 made[i] = self.term(operands[i])
-        links: list[Term] = []
+        links: list[t.Term] = []
         for i, relation in enumerate(relations):
             left, right = made[i], made[i + 1]
             if left is None or right is None:
@@ -353,7 +303,7 @@ class Terms(Names):
                 links.append(link)
         if len(links) != len(relations):
             return None
-        return links[0] if len(links) == 1 else And(tuple(links), self.span(tree))
+        return links[0] if len(links) == 1 else t.And(tuple(links), self.span(tree))
 
     def check_chain(self, relations: Sequence[Token]) -> bool:
         texts = {_OPERATORS.get(r.type, "") for r in relations if r.type != "EQ"}
@@ -371,79 +321,94 @@ class Terms(Names):
         return False
 
     def compare(
-        self, tree: Comparison, relation: Token, left_tree: TermSyntax, left: Term, right_tree: TermSyntax, right: Term
-    ) -> Term | None:
+        self,
+        tree: syntax.Comparison,
+        relation: Token,
+        left_tree: syntax.TermSyntax,
+        left: t.Term,
+        right_tree: syntax.TermSyntax,
+        right: t.Term,
+    ) -> t.Term | None:
         operator = _OPERATORS[relation.type]
         if operator in _ORDERINGS:
-            wrong = [(t, x) for t, x in ((left_tree, left), (right_tree, right)) if not isinstance(x.sort, NUMERIC)]
+            wrong = [
+                (item, x) for item, x in ((left_tree, left), (right_tree, right)) if not isinstance(x.sort, NUMERIC)
+            ]
             for at, term in wrong:
                 self.error("RCL308", f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}", at)
             if wrong:
                 return None
-        if isinstance(left.sort, SetSort) or isinstance(right.sort, SetSort):
-            hint = "say what is in it: `forall(x in S | …)`" if operator == "==" else None
-            self.error("RCL302", f"sets are not compared by `{operator}`: they only stand after `in`", tree, hint=hint)
+        if isinstance(left.sort, s.SetSort) or isinstance(right.sort, s.SetSort):
+            message = f"sets are not compared by `{operator}`: they only stand after `in`"
+            self.error("RCL302", message, tree, hint="say what is in it: `forall(x in S | …)`")
             return None
         pair = common([left, right])
         if pair is None:
             shown = f"{show_sort(left.sort)} and {show_sort(right.sort)}"
             message = f"`{operator}` between different types: {shown}"
             hint = self.mismatch_hint(left_tree, left, right_tree, right)
-            if len(tree.relations) > 1:
-                hint = hint or "`a < b == c` says `a < b and b == c`; put parentheses if it should not"
             self.error("RCL302", message, tree, hint=hint)
             return None
-        if len(tree.relations) > 1 and left.sort == BOOL:
+        if len(tree.relations) > 1 and left.sort == s.BOOL:
             if relation is tree.relations[0]:
                 hint = "join comparisons by `and`, or use `<=>`"
                 self.error("RCL121", "truth values are not chained", relation, hint=hint)
             return None
-        span = (
-            self.span(tree) if len(tree.relations) == 1 else self.reports.source.span(left_tree.start, right_tree.end)
-        )
-        return Compare(operator, pair[0], pair[1], span)
+        return t.Compare(operator, pair[0], pair[1], self.between(left_tree, right_tree))
 
-    def mismatch_hint(self, left_tree: Syntax, left: Term, right_tree: Syntax, right: Term) -> str | None:
+    def mismatch_hint(
+        self, left_tree: syntax.Syntax, left: t.Term, right_tree: syntax.Syntax, right: t.Term
+    ) -> str | None:
         for tree, one, other in ((left_tree, left, right), (right_tree, right, left)):
-            if isinstance(one.sort, FunctionSort) and one.sort.result == other.sort:
+            if isinstance(one.sort, s.FunctionSort) and one.sort.result == other.sort:
                 return f"apply `{self.text(tree)}` to its {count(len(one.sort.parameters), 'argument')} first"
-            if isinstance(one.sort, EnumSort) and isinstance(other, Literal) and other.value in one.sort.members:
+            if isinstance(one.sort, s.EnumSort) and isinstance(other, t.Literal) and other.value in one.sort.members:
                 return f"write `{other.value}` without quotation marks"
-            if isinstance(one.sort, EnumSort) and (other.sort in (BOOL, STRING) or isinstance(other.sort, NUMERIC)):
+            if isinstance(one.sort, s.EnumSort) and other.sort in (s.BOOL, s.STRING, s.NATURAL):
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
         return None
 
-    def membership(self, tree: Syntax, item_tree: TermSyntax, relation: Token, of_tree: TermSyntax) -> Term | None:
+    def membership(
+        self, tree: syntax.Syntax, item_tree: syntax.TermSyntax, relation: Token, of_tree: syntax.TermSyntax
+    ) -> t.Term | None:
         item = self.term(item_tree)
         of = self.collection(of_tree, item.sort if item is not None else None)
         if item is None or of is None:
             return None
         of_sort = of.sort
-        assert isinstance(of_sort, SetSort | SequenceSort)
-        inside: In | None = None
+        assert isinstance(of_sort, s.SetSort | s.SequenceSort)
+        inside: t.In | None = None
         span = self.span(tree)
         if alike(item.sort, of_sort.item):
-            inside = In(item, of, span)
-        elif isinstance(of, SetTerm):
+            inside = t.In(item, of, span)
+        elif isinstance(of, t.SetTerm):
             pool = common([item, *of.items])
             if pool is not None:
-                inside = In(pool[0], SetTerm(tuple(pool[1:]), SetSort(joined(pool[1:])), of.span), span)
+                inside = t.In(pool[0], t.SetTerm(tuple(pool[1:]), s.SetSort(joined(pool[1:])), of.span), span)
         else:
             converted = convert(item, of_sort.item) or None
-            collected = convert(of, SequenceSort(item.sort))
+            collected = convert(of, s.SequenceSort(item.sort))
             if converted is not None:
-                inside = In(converted, of, span)
+                inside = t.In(converted, of, span)
             elif collected is not None:
-                inside = In(item, collected, span)
+                inside = t.In(item, collected, span)
         if inside is None:
             shown = f"{show_sort(item.sort)} in a collection of {show_sort(of_sort.item)}"
             self.error("RCL302", f"`{relation.text}` between different types: {shown}", tree)
             return None
-        return inside if relation.type == "IN" else Not(inside, span)
+        return inside if relation.type == "IN" else t.Not(inside, span)
 
 
-def _is_open(tree: TermSyntax) -> bool:
-    tree = unparenthesised(tree)
-    if isinstance(tree, TupleDisplay):
-        return any(_is_open(t) for t in tree.items)
-    return isinstance(tree, SequenceDisplay | SetDisplay) and not tree.items
+def _is_open(tree: syntax.TermSyntax) -> bool:
+    tree = syntax.unparenthesised(tree)
+    if isinstance(tree, syntax.TupleDisplay):
+        return any(_is_open(term) for term in tree.items)
+    return isinstance(tree, syntax.SequenceDisplay | syntax.SetDisplay) and not tree.items
+
+
+def _combined(operator: str, left: t.Term, right: t.Term, span: Span) -> t.Arithmetic:
+    """``left operator right``: REAL if a side is, or for `/`; a difference of naturals may be negative."""
+    if operator == "/" or s.REAL in (left.sort, right.sort):
+        return t.Arithmetic(operator, widen(left), widen(right), s.REAL, span)
+    natural = left.sort == s.NATURAL and right.sort == s.NATURAL and operator != "-"
+    return t.Arithmetic(operator, left, right, s.NATURAL if natural else s.INTEGER, span)

@@ -16,7 +16,7 @@ from avow.base.optional import complete
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 from avow.language import syntax
-from avow.language.chains import equivalence, implication
+from avow.language import terms as t
 from avow.language.check_history import Histories
 from avow.language.contract import Definition
 from avow.language.definitions import expand
@@ -28,29 +28,15 @@ from avow.language.scope import Defined
 from avow.language.sorts import BOOL, BUILTINS, REAL, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.subterms import subterms, term_extent
 from avow.language.syntax import Syntax, TermSyntax
-from avow.language.terms import (
-    And,
-    History,
-    Implies,
-    In,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 
 
 class Checker(Histories):
     """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
 
-    def term(self, tree: syntax.TermSyntax, expected: Sort | None = None) -> Term | None:
+    def term(self, tree: syntax.TermSyntax, expected: Sort | None = None) -> t.Term | None:
         match tree:
             case syntax.PortName(role=role, name=name):
-                return self.port(Role(role), name, tree)
+                return self.port(t.Role(role), name, tree)
             case syntax.Name():
                 return self.name(tree, expected)
             case syntax.FieldOf(body=body, name=name):
@@ -66,10 +52,10 @@ class Checker(Histories):
             case syntax.Number():
                 return self.number(tree, self.span(tree))
             case syntax.Truth(value=value):
-                return Literal(value, BOOL, self.span(tree))
+                return t.Literal(value, BOOL, self.span(tree))
             case syntax.Negation(body=negated):
                 formula = self.formula(negated)
-                return None if formula is None else Not(formula, self.span(tree))
+                return None if formula is None else t.Not(formula, self.span(tree))
             case syntax.Calculation():
                 return self.arithmetic(tree)
             case syntax.Minus():
@@ -106,24 +92,30 @@ class Checker(Histories):
 
     # --- connectives -------------------------------------------------------------------------------------------------
 
-    def connective(self, tree: syntax.Connective) -> Term | None:
-        made: list[Term] | None = complete([self.formula(t) for t in tree.items])
+    def connective(self, tree: syntax.Connective) -> t.Term | None:
+        made: list[t.Term] | None = complete([self.formula(term) for term in tree.items])
         if made is None:
             return None
         items = tuple(made)
         match tree.sign:
             case syntax.Sign.AND:
-                return And(items, self.span(tree))
+                return t.And(items, self.span(tree))
             case syntax.Sign.OR:
-                return Or(items, self.span(tree))
+                return t.Or(items, self.span(tree))
             case syntax.Sign.IMPLIES:
-                return implication(items, self.places(tree.items))
+                conclusion = items[-1]
+                for at in range(len(items) - 2, -1, -1):  # `a -> b -> c` is `a -> (b -> c)`
+                    conclusion = t.Implies(items[at], conclusion, self.between(tree.items[at], tree.items[-1]))
+                return conclusion
             case syntax.Sign.IFF:
-                return equivalence(items, self.places(tree.items))
+                result = items[0]
+                for part, place in zip(items[1:], tree.items[1:], strict=True):
+                    result = t.Iff(result, part, self.between(tree.items[0], place))
+                return result
             case _:
                 assert_never(tree.sign)
 
-    def if_then_else(self, tree: syntax.IfThenElse, expected: Sort | None) -> Term | None:
+    def if_then_else(self, tree: syntax.IfThenElse, expected: Sort | None) -> t.Term | None:
         condition = self.formula(tree.condition)
         then, otherwise = self.term(tree.then, expected), self.term(tree.otherwise, expected)
         if condition is None or then is None or otherwise is None:
@@ -131,23 +123,16 @@ class Checker(Histories):
         made = conditional(condition, then, otherwise, self.span(tree))
         if made is not None:
             return made
-        shown = show_sort(then.sort)
-        if isinstance(then.sort, FunctionSort | SetSort):
-            message = f"a branch of `if` is a value, and this is of type {shown}"
-            self.error(
-                "RCL302", message, tree.then, hint="apply the function, or say what is in the set, in each branch"
-            )
-        else:
-            message = f"the branches of `if` are of one type: this is {show_sort(otherwise.sort)}, the first is {shown}"
-            self.error("RCL302", message, tree.otherwise)
+        message = f"the branches of `if` are values of one type: {show_sort(then.sort)} and {show_sort(otherwise.sort)}"
+        self.error("RCL302", message, tree.otherwise)
         return None
 
     # --- quantifiers -------------------------------------------------------------------------------------------------
 
-    def quantified(self, tree: syntax.Quantification) -> Term | None:
+    def quantified(self, tree: syntax.Quantification) -> t.Term | None:
         quantifier = tree.quantifier
-        variables: list[Variable] = []
-        guards: list[Term] = []
+        variables: list[t.Variable] = []
+        guards: list[t.Term] = []
         before, broken_before = dict(self.scope.bound), set(self.scope.broken)
         sound = True
         for binder in tree.binders:
@@ -162,11 +147,11 @@ class Checker(Histories):
                 if found is None:
                     continue
                 sort, collection = found
-                variable = Variable(Role.BOUND, name.text, sort, self.span(name))
+                variable = t.Variable(t.Role.BOUND, name.text, sort, self.span(name))
                 variables.append(variable)
                 self.scope.bound[name.text] = variable
                 if collection is not None:
-                    guards.append(In(variable, collection, self.span(binder)))
+                    guards.append(t.In(variable, collection, self.span(binder)))
         body = self.formula(tree.body)
         self.scope.bound.clear()
         self.scope.bound.update(before)
@@ -175,11 +160,11 @@ class Checker(Histories):
         if body is None or not sound:
             return None
         span = self.span(tree)
-        if guards and quantifier is Quantifier.FORALL:
-            body = Implies(guards[0] if len(guards) == 1 else And(tuple(guards), span), body, span)
+        if guards and quantifier is t.Quantifier.FORALL:
+            body = t.Implies(guards[0] if len(guards) == 1 else t.And(tuple(guards), span), body, span)
         elif guards:
-            body = And((*guards, body), span)
-        return Quantified(quantifier, tuple(variables), body, span)
+            body = t.And((*guards, body), span)
+        return t.Quantified(quantifier, tuple(variables), body, span)
 
     def fresh(self, name: Token) -> bool:
         taken = self.scope.taken(name.text)
@@ -193,7 +178,7 @@ class Checker(Histories):
         self.error("RCL207", f"`{name.text}` is already {what}", name, hint=hint, notes=notes)
         return False
 
-    def domain(self, tree: syntax.TermSyntax) -> tuple[Sort, Term | None] | None:
+    def domain(self, tree: syntax.TermSyntax) -> tuple[Sort, t.Term | None] | None:
         """What a quantified variable ranges over: a sort, and the set or sequence of it where it is less than that."""
         tree = syntax.unparenthesised(tree)
         sort = self.type_in_term(tree)
@@ -212,12 +197,6 @@ class Checker(Histories):
                 hint = f"did you mean `{near}`?" if near else did_you_mean(name, known)
                 self.error("RCL208", f"the type or set `{name}` is not declared", tree, hint=hint)
             return None
-        if isinstance(tree, syntax.PortName) and self.scope.environment.sort(tree.name) is not None:
-            role, name = tree.role, tree.name
-            if name not in self.scope.ports(Role(role)):
-                message = f"`{name}` is declared in the context, not an {'input' if role == 'in' else 'output'}"
-                self.error("RCL203", message, tree, hint=f"write `{name}` alone")
-                return None
         collection = self.collection(tree, None)
         if collection is None:
             return None
@@ -233,7 +212,7 @@ class Checker(Histories):
             case syntax.Name(text=name):
                 return None if name in self.scope.bound else self.scope.environment.sort(name)
             case syntax.TupleDisplay(items=parts):
-                items = [self.type_in_term(t) for t in parts]
+                items = [self.type_in_term(term) for term in parts]
                 return TupleSort(tuple(i for i in items if i is not None)) if all(items) else None
             case syntax.SequenceDisplay(items=(only,)):
                 item = self.type_in_term(only)
@@ -243,7 +222,7 @@ class Checker(Histories):
 
     # --- local definitions, checked where they stand and written out where they are used -----------------------------
 
-    def defined(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
+    def defined(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> t.Term | None:
         entry, scope = self.scope.defined[name], self.scope
         if scope.bare and (name in scope.inputs or name in scope.outputs):
             role = "in" if name in scope.inputs else "out"
@@ -255,7 +234,7 @@ class Checker(Histories):
         given = self.arguments(tree, arguments, [p.sort for p in entry.parameters], name)
         if definition is None or given is None:
             return None
-        if not self.scope.remembers and any(isinstance(part, History) for part in subterms(definition.body)):
+        if not self.scope.remembers and any(isinstance(part, t.History) for part in subterms(definition.body)):
             self.error("RCL322", f"`{name}` speaks of other steps than this one, and there is one here only", tree)
             return None
         return expand(definition, given, self.span(tree), lambda other: self.scope.taken(other) is not None)

@@ -6,11 +6,14 @@ from dataclasses import field
 from enum import StrEnum
 from typing import Any
 
-from avow.base.diagnostics import Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.language.sorts import Sort
-from avow.language.terms import History, Limit, Past, Role, Term, Variable
+from avow.language.terms import TRUE, History, Limit, Past, Role, Term, Variable
+
+TO_WRITE = "to_write"
+"""What a draft calls the guarantee that a person has yet to write."""
 
 
 class ClauseKind(StrEnum):
@@ -34,6 +37,11 @@ class Clause:
     sentence_span: Span | None = field(default=None, compare=False, repr=False)
     written: Term | None = field(default=None, compare=False, repr=False)
     """The formula without that, where it was read from a file: for what is said of the text."""
+
+    @property
+    def unwritten(self) -> bool:
+        """Whether it is a draft's placeholder: a guarantee `to_write` that says TRUE."""
+        return self.kind is ClauseKind.GUARANTEE and self.name == TO_WRITE and self.formula == TRUE
 
     @property
     def pace(self) -> Limit | None:
@@ -68,6 +76,14 @@ class Topic:
 
 
 @dataclass(frozen=True, slots=True)
+class Partial:
+    """A contract in another notation, and what of it is left out."""
+
+    text: str
+    missing: tuple[Diagnostic, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Definition:
     """``define hot(i : NATURAL) = in.temp(i) > 80``. The parameters are bound variables of the body, in which other
     definitions are written out."""
@@ -97,6 +113,11 @@ class Node:
     @property
     def clauses(self) -> tuple[Clause, ...]:
         return self.assumptions + self.guarantees
+
+    @property
+    def unwritten(self) -> bool:
+        """Whether some of what it guarantees is still to be written, so that nothing is said of what it leaves open."""
+        return any(clause.unwritten for clause in self.guarantees)
 
     def clause(self, name: str) -> Clause:
         """The clause of that name. Raises KeyError."""

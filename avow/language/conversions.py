@@ -7,94 +7,84 @@ from dataclasses import replace
 from fractions import Fraction
 
 from avow.base.optional import complete
-from avow.language.sorts import (
-    INTEGER,
-    NATURAL,
-    REAL,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    SequenceSort,
-    Sort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.language.terms import Conditional, Literal, SequenceTerm, Term, TupleTerm, Widen
 
-WHOLE = (IntegerSort, NaturalSort)
-NUMERIC = (IntegerSort, NaturalSort, RealSort)
+WHOLE = (s.IntegerSort, s.NaturalSort)
+NUMERIC = (s.IntegerSort, s.NaturalSort, s.RealSort)
 
 
-def alike(left: Sort, right: Sort) -> bool:
+def alike(left: s.Sort, right: s.Sort) -> bool:
     """Whether the sorts are one for a comparison: equal, NATURAL and INTEGER counting as one."""
     return left == right or (isinstance(left, WHOLE) and isinstance(right, WHOLE)) or _in_parts(left, right, alike)
 
 
-def fits(sort: Sort, wanted: Sort) -> bool:
+def fits(sort: s.Sort, wanted: s.Sort) -> bool:
     """Whether every value of `sort` is one of `wanted` as it stands."""
-    return sort == wanted or (sort == NATURAL and wanted == INTEGER) or _in_parts(sort, wanted, fits)
+    return sort == wanted or (sort == s.NATURAL and wanted == s.INTEGER) or _in_parts(sort, wanted, fits)
 
 
-def _in_parts(left: Sort, right: Sort, same: Callable[[Sort, Sort], bool]) -> bool:
+def _in_parts(left: s.Sort, right: s.Sort, same: Callable[[s.Sort, s.Sort], bool]) -> bool:
     """Whether two tuples or sequences are of a kind, and their items are the `same`."""
     match left, right:
-        case TupleSort(items=a), TupleSort(items=b):
+        case s.TupleSort(items=a), s.TupleSort(items=b):
             return left.labels == right.labels and len(a) == len(b) and all(map(same, a, b))
-        case SequenceSort(item=a_), SequenceSort(item=b_):
+        case s.SequenceSort(item=a_), s.SequenceSort(item=b_):
             return same(a_, b_)
     return False
 
 
 def widen(term: Term) -> Term:
     """A whole-numbered term as a REAL."""
-    if term.sort == REAL:
+    if term.sort == s.REAL:
         return term
     if isinstance(term, Literal) and not isinstance(term.value, bool | str):
-        return Literal(Fraction(term.value), REAL, term.span)
-    return Widen(term, REAL, term.span)
+        return Literal(Fraction(term.value), s.REAL, term.span)
+    return Widen(term, s.REAL, term.span)
 
 
-def convert(term: Term, wanted: Sort) -> Term | None:
+def convert(term: Term, wanted: s.Sort) -> Term | None:
     """The term as one of sort `wanted`; None where that cannot be."""
     if fits(term.sort, wanted):
         return term
-    if wanted == REAL and isinstance(term.sort, WHOLE):
+    if wanted == s.REAL and isinstance(term.sort, WHOLE):
         return widen(term)
     match term, wanted:
-        case TupleTerm(items=items), TupleSort(items=sorts) if _as_record(term.sort, wanted):
+        case TupleTerm(items=items), s.TupleSort(items=sorts) if _as_record(term.sort, wanted):
             made: list[Term] | None = complete(map(convert, items, sorts))
             if made is not None:
-                return replace(term, items=tuple(made), sort=TupleSort(tuple(m.sort for m in made), wanted.labels))
+                return replace(term, items=tuple(made), sort=s.TupleSort(tuple(m.sort for m in made), wanted.labels))
         case Conditional(then=then, otherwise=otherwise), _:
             one, other = convert(then, wanted), convert(otherwise, wanted)
             if one is not None and other is not None:
                 return replace(term, then=one, otherwise=other, sort=joined([one, other]))
-        case SequenceTerm(items=items), SequenceSort(item=item):
+        case SequenceTerm(items=items), s.SequenceSort(item=item):
             made = complete(convert(i, item) for i in items)
             if made is not None:
-                return replace(term, items=tuple(made), sort=SequenceSort(joined(made) if made else item))
+                return replace(term, items=tuple(made), sort=s.SequenceSort(joined(made) if made else item))
     return None
 
 
-def _as_record(sort: Sort, wanted: Sort) -> bool:
+def _as_record(sort: s.Sort, wanted: s.Sort) -> bool:
     """Whether a tuple that is written down may stand for one of that sort: a record's items stand in their order."""
-    if not isinstance(sort, TupleSort) or not isinstance(wanted, TupleSort):
+    if not isinstance(sort, s.TupleSort) or not isinstance(wanted, s.TupleSort):
         return False
     return len(sort.items) == len(wanted.items) and sort.labels in ((), wanted.labels)
 
 
-def widest(left: Sort, right: Sort) -> Sort | None:
+def widest(left: s.Sort, right: s.Sort) -> s.Sort | None:
     """The sort in which both have a place, if there is one."""
     if left == right:
         return left
     if isinstance(left, NUMERIC) and isinstance(right, NUMERIC):
-        return REAL if REAL in (left, right) else INTEGER
+        return s.REAL if s.REAL in (left, right) else s.INTEGER
     match left, right:
-        case TupleSort(items=a), TupleSort(items=b) if _as_record(left, right) or _as_record(right, left):
-            items: list[Sort] | None = complete(map(widest, a, b))
-            return None if items is None else TupleSort(tuple(items), left.labels or right.labels)
-        case SequenceSort(item=a_), SequenceSort(item=b_):
+        case s.TupleSort(items=a), s.TupleSort(items=b) if _as_record(left, right) or _as_record(right, left):
+            items: list[s.Sort] | None = complete(map(widest, a, b))
+            return None if items is None else s.TupleSort(tuple(items), left.labels or right.labels)
+        case s.SequenceSort(item=a_), s.SequenceSort(item=b_):
             item = widest(a_, b_)
-            return None if item is None else SequenceSort(item)
+            return None if item is None else s.SequenceSort(item)
     return None
 
 
@@ -108,7 +98,7 @@ def common(terms: list[Term]) -> list[Term] | None:
     return complete(t if alike(t.sort, target) else convert(t, target) for t in terms)
 
 
-def joined(terms: list[Term]) -> Sort:
+def joined(terms: list[Term]) -> s.Sort:
     """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative, also
     within tuples and sequences. Every one of them is a value of it: a variable that ranges over them has this sort."""
     found = _widest(terms)
@@ -116,9 +106,9 @@ def joined(terms: list[Term]) -> Sort:
     return found
 
 
-def _widest(terms: list[Term]) -> Sort | None:
+def _widest(terms: list[Term]) -> s.Sort | None:
     """The sort in which each of them has a place, if there is one."""
-    found: Sort | None = terms[0].sort
+    found: s.Sort | None = terms[0].sort
     for term in terms:
         found = None if found is None else widest(found, term.sort)
     return found

@@ -14,24 +14,13 @@ from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
 from avow.base.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
+from avow.language import sorts as s
 from avow.language import syntax
 from avow.language.checker import Checker
-from avow.language.flat import flat
+from avow.language.flat import flat_text
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.scope import Defined, Environment, Scope
-from avow.language.sorts import (
-    BUILTINS,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    TupleSort,
-)
 from avow.language.source import Reports, Source
 from avow.language.subterms import sort_extent, subterms, term_extent
 from avow.language.terms import EnumValue, Quantified, Role, SetTerm, Variable
@@ -207,7 +196,9 @@ class Declarations:
                 return
             environment.types[name] = sort
             span = declared.reports.source.span(value.start, value.end)
-            environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
+            environment.constants[name] = SetTerm(
+                tuple(EnumValue(m, sort) for m in sort.members), s.SetSort(sort), span
+            )
             return
         if isinstance(value, syntax.SetDisplay):
             self.half_known(value, fresh, declared.reports)
@@ -255,15 +246,15 @@ class Declarations:
 
     # --- types -------------------------------------------------------------------------------------------------------
 
-    def type_of(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> Sort | None:
+    def type_of(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> s.Sort | None:
         """The sort that a type denotes; `name` is what a new set of names is to be called."""
         match tree:
             case syntax.BuiltinType(text=text):
-                return BUILTINS.get(text, BUILTINS["REAL"])
+                return s.BUILTINS.get(text, s.BUILTINS["REAL"])
             case syntax.NamedType():
                 return self.named(tree, reports)
             case syntax.UnspecifiedType():
-                return OpaqueSort(self.free_name(name))
+                return s.OpaqueSort(self.free_name(name))
             case syntax.SetType(elements=elements):
                 return self.set_of(elements, reports, name)
             case syntax.TupleType(items=(only,)):
@@ -274,7 +265,7 @@ class Declarations:
                 return self.record(fields, reports, name)
             case syntax.SequenceType(item=of):
                 item = self.type_of(of, reports, f"{name}_item")
-                return None if item is None else SequenceSort(item)
+                return None if item is None else s.SequenceSort(item)
             case syntax.ProductType():
                 return _tuple_sort(self.factors(tree, reports, name))
             case syntax.FunctionType():
@@ -282,7 +273,7 @@ class Declarations:
             case _:
                 assert_never(tree)
 
-    def record(self, fields: Sequence[syntax.PortDeclaration], reports: Reports, name: str) -> Sort | None:
+    def record(self, fields: Sequence[syntax.PortDeclaration], reports: Reports, name: str) -> s.Sort | None:
         sound, seen = True, dict[str, Span]()
         for part in fields:
             label = part.name
@@ -293,16 +284,16 @@ class Declarations:
             seen[label.text] = reports.source.span(label.start, label.end)
         items = [self.type_of(part.type, reports, f"{name}_{part.name.text}") for part in fields]
         for part, item in zip(fields, items, strict=True):
-            if isinstance(item, FunctionSort):
+            if isinstance(item, s.FunctionSort):
                 message = "a field is a value, not a function"
                 reports.error("RCL310", message, part.type.start, part.type.end, hint="make it an input of its own")
                 sound = False
         kept = tuple(i for i in items if i is not None)
         declared = self.declared.get(name)
         own = name if declared is not None and declared.state == "open" else ""
-        return TupleSort(kept, tuple(seen), own) if sound and len(kept) == len(items) else None
+        return s.TupleSort(kept, tuple(seen), own) if sound and len(kept) == len(items) else None
 
-    def named(self, tree: syntax.NamedType, reports: Reports) -> Sort | None:
+    def named(self, tree: syntax.NamedType, reports: Reports) -> s.Sort | None:
         name = tree.text
         environment = self.environment
         other = self.declared.get(name)
@@ -323,12 +314,12 @@ class Declarations:
             reports.error("RCL208", message, tree.start, tree.end)
         else:
             near = FOREIGN_TYPES.get(name.casefold())
-            hint = f"did you mean `{near}`?" if near else did_you_mean(name, (*self.declared, *BUILTINS))
+            hint = f"did you mean `{near}`?" if near else did_you_mean(name, (*self.declared, *s.BUILTINS))
             hint = hint or f"declare it in the context: `{name} : …;`, or check this file with the one that declares it"
             reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
         return None
 
-    def factors(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> list[Sort | None]:
+    def factors(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> list[s.Sort | None]:
         """The sorts of a product, or of a function's parameters."""
         if not isinstance(tree, syntax.ProductType):
             return [self.type_of(tree, reports, name)]
@@ -343,29 +334,29 @@ class Declarations:
             return [None]
         return [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.factors)]
 
-    def function(self, tree: syntax.FunctionType, reports: Reports, name: str) -> Sort | None:
+    def function(self, tree: syntax.FunctionType, reports: Reports, name: str) -> s.Sort | None:
         parameters = self.factors(tree.parameters, reports, name)
         result = self.type_of(tree.result, reports, f"{name}_result")
         if result is None or None in parameters:
             return None
-        return FunctionSort(tuple(p for p in parameters if p is not None), result)
+        return s.FunctionSort(tuple(p for p in parameters if p is not None), result)
 
-    def set_of(self, elements: Sequence[syntax.Element], reports: Reports, name: str) -> Sort | None:
+    def set_of(self, elements: Sequence[syntax.Element], reports: Reports, name: str) -> s.Sort | None:
         if not any(e.parameters for e in elements):
             return self.enumeration(name, [e.name for e in elements], reports)
-        constructors: list[Constructor] = []
+        constructors: list[s.Constructor] = []
         sound = True
         for element in elements:
             sorts = [self.type_of(t, reports, f"{name}_{element.name.text}") for t in element.parameters]
             sound = sound and None not in sorts
-            constructors.append(Constructor(element.name.text, tuple(s for s in sorts if s is not None)))
-        sort = DataSort(self.free_name(name), tuple(constructors))
+            constructors.append(s.Constructor(element.name.text, tuple(part for part in sorts if part is not None)))
+        sort = s.DataSort(self.free_name(name), tuple(constructors))
         return self.introduce(sort, [e.name for e in elements], reports) if sound else None
 
-    def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> EnumSort | None:
-        sort = EnumSort(self.free_name(name), tuple(m.text for m in members))
+    def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> s.EnumSort | None:
+        sort = s.EnumSort(self.free_name(name), tuple(m.text for m in members))
         found = self.introduce(sort, members, reports)
-        return found if isinstance(found, EnumSort) else None
+        return found if isinstance(found, s.EnumSort) else None
 
     def free_name(self, name: str) -> str:
         """`name` itself for the declaration being elaborated; a set written in place gets one that nothing else has."""
@@ -378,7 +369,7 @@ class Declarations:
             free = f"{name}{number}"
         return free
 
-    def introduce(self, sort: EnumSort | DataSort, names: Sequence[Token], reports: Reports) -> Sort | None:
+    def introduce(self, sort: s.EnumSort | s.DataSort, names: Sequence[Token], reports: Reports) -> s.Sort | None:
         """The sort, its elements made known; or the sort that an equal set was before."""
         environment = self.environment
         if sort.name not in self.declared:
@@ -410,21 +401,22 @@ class Declarations:
         return sort
 
 
-def _tuple_sort(items: Sequence[Sort | None]) -> Sort | None:
-    return None if None in items else TupleSort(tuple(i for i in items if i is not None))
+def _tuple_sort(items: Sequence[s.Sort | None]) -> s.Sort | None:
+    return None if None in items else s.TupleSort(tuple(i for i in items if i is not None))
 
 
-def _same_set(known: Sort, new: EnumSort | DataSort) -> bool:
+def _same_set(known: s.Sort, new: s.EnumSort | s.DataSort) -> bool:
     match known, new:
-        case EnumSort(members=a), EnumSort(members=b):
+        case s.EnumSort(members=a), s.EnumSort(members=b):
             return a == b
-        case DataSort(constructors=c), DataSort(constructors=d):
+        case s.DataSort(constructors=c), s.DataSort(constructors=d):
             return c == d
     return False
 
 
 def _same_text(one: _Declared, other: _Declared) -> bool:
-    return flat(one.tree) == flat(other.tree)
+    texts = (flat_text(each.reports.source.text[each.tree.start : each.tree.end]) for each in (one, other))
+    return len(set(texts)) == 1
 
 
 def _names(tree: syntax.Syntax) -> set[str]:

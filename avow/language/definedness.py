@@ -14,155 +14,121 @@ from itertools import combinations
 from typing import assert_never
 
 from avow.base.tuning.bounds import GUARDS
+from avow.language import terms as t
 from avow.language.bounds import constant
 from avow.language.operators import OPPOSITE
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    FALSE,
-    RESPONSES,
-    TRUE,
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Builtin,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Item,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Past,
-    Quantified,
-    Quantifier,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
-Facts = tuple[Term, ...]
-_ZERO = Literal(0, NATURAL)
+Facts = tuple[t.Term, ...]
+_ZERO = t.Literal(0, NATURAL)
 
 
-def with_value(claim: Term) -> Term:
+def with_value(claim: t.Term) -> t.Term:
     """The claim, and that it has a value. The same of what it gives is that again."""
-    if any(isinstance(part, History) for part in subterms(claim)):
+    if any(isinstance(part, t.History) for part in subterms(claim)):
         claim = _at_their_steps(claim)
         if any(map(_is_response, subterms(claim))):
             return _responding(claim)
     needed = _needed(claim)
-    if needed == TRUE or demanded(claim) is not claim:
+    if needed == t.TRUE or demanded(claim) is not claim:
         return claim
-    return And((*_parts(needed), *_parts(claim)), claim.span)
+    return t.And((*_parts(needed), *_parts(claim)), claim.span)
 
 
-def _at_their_steps(term: Term) -> Term:
+def _at_their_steps(term: t.Term) -> t.Term:
     """What speaks of other steps has its conditions at those: a formula without a value was not so there."""
     parts = tuple(map(_at_their_steps, term.children))
-    if isinstance(term, History):
+    if isinstance(term, t.History):
         parts = tuple(with_value(part) if part.sort == BOOL else part for part in parts)
     return term if parts == term.children else term.rebuild(parts)
 
 
-def _responding(claim: Term) -> Term:
+def _responding(claim: t.Term) -> t.Term:
     """A response stays where it stands: a condition of it that has no value did not come about."""
     match claim:
-        case Implies(left=left, right=right):
-            return Implies(with_value(left), _responding(right), claim.span)
-        case Quantified(body=body):
+        case t.Implies(left=left, right=right):
+            return t.Implies(with_value(left), _responding(right), claim.span)
+        case t.Quantified(body=body):
             return claim.rebuild((_responding(body),))
     return claim
 
 
-def _is_response(term: Term) -> bool:
-    return isinstance(term, History) and term.operator in RESPONSES
+def _is_response(term: t.Term) -> bool:
+    return isinstance(term, t.History) and term.operator in t.RESPONSES
 
 
-def demanded(claim: Term) -> Term:
+def demanded(claim: t.Term) -> t.Term:
     """What a claim demands beside that it has a value: the converse of `with_value`."""
     parts = _parts(claim) if _is_partial(claim) else ()
     for k in range(1, len(parts)):
-        rest = And(parts[k:], claim.span) if k + 1 < len(parts) else parts[k]
+        rest = t.And(parts[k:], claim.span) if k + 1 < len(parts) else parts[k]
         if parts[:k] == _parts(_needed(rest)):
             return rest
     return claim
 
 
-def unless_without_value(claim: Term) -> Term:
+def unless_without_value(claim: t.Term) -> t.Term:
     """The claim, or that it has no value: what is meant where it stands under a `not`."""
     needed = _needed(claim)
-    return claim if needed == TRUE else Implies(needed, claim, claim.span)
+    return claim if needed == t.TRUE else t.Implies(needed, claim, claim.span)
 
 
-def _needed(claim: Term) -> Term:
-    return defined(claim) if _is_partial(claim) else TRUE
+def _needed(claim: t.Term) -> t.Term:
+    return defined(claim) if _is_partial(claim) else t.TRUE
 
 
-def _is_partial(term: Term) -> bool:
+def _is_partial(term: t.Term) -> bool:
     return any(map(may_lack_value, subterms(term)))
 
 
-def may_lack_value(term: Term) -> bool:
+def may_lack_value(term: t.Term) -> bool:
     """Whether it may have no value although its parts have one."""
     match term:
-        case Arithmetic(operator=sign):
+        case t.Arithmetic(operator=sign):
             return sign == "/"
-        case Index():
+        case t.Index():
             return True
         case (
-            Variable() | Literal() | Compare() | And() | Or() | Not() | Implies() | Apply() | EnumValue() | Quantified()
-            | Widen() | History() | In() | Item() | Construct() | TupleTerm() | SequenceTerm() | SequenceRange()
-            | SetTerm() | Length() | Negative() | Iff() | Conditional()
+            t.Variable() | t.Literal() | t.Compare() | t.And() | t.Or() | t.Not() | t.Implies() | t.Apply()
+            | t.EnumValue() | t.Quantified() | t.Widen() | t.History() | t.In() | t.Item() | t.Construct()
+            | t.TupleTerm() | t.SequenceTerm() | t.SequenceRange() | t.SetTerm() | t.Length() | t.Negative() | t.Iff()
+            | t.Conditional()
         ):  # fmt: skip
             return False
-        case Operation(operator=operator):
+        case t.Operation(operator=operator):
             match operator:
-                case Builtin.XOR | Builtin.ABS | Builtin.MIN | Builtin.MAX | Builtin.MOD | Builtin.DIV:
+                case t.Builtin.XOR | t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.MOD | t.Builtin.DIV:
                     return False  # of `mod` and `div` the divisor is a positive number that is written down
                 case _:
                     assert_never(operator)
-        case Argument():
+        case t.Argument():
             raise AssertionError("it is put for a variable only where a formula's conditions are written out already")
         case _:
             assert_never(term)
 
 
-def defined(term: Term, sequences: Collection[Variable] | None = None, facts: Facts = ()) -> Term:
+def defined(term: t.Term, sequences: Collection[t.Variable] | None = None, facts: Facts = ()) -> t.Term:
     """A condition under which it does not matter to a formula what lies outside any partial operation; with
     `sequences`, outside these. `facts` hold where it is asked."""
     match term:
-        case Not(body=body):
+        case t.Not(body=body):
             found = defined(body, sequences, facts)
-        case And(items=items):
+        case t.And(items=items):
             found = _in_turn(items, items, sequences, facts)
-        case Or(items=items):
+        case t.Or(items=items):
             found = _in_turn(items, tuple(map(_denial, items)), sequences, facts)
-        case Implies(left=left, right=right):
+        case t.Implies(left=left, right=right):
             found = _in_turn((left, right), (left, _denial(right)), sequences, facts)
-        case Iff(left=left, right=right):
+        case t.Iff(left=left, right=right):
             found = _all((defined(left, sequences, facts), defined(right, sequences, facts)))
-        case Quantified(variables=variables, body=body):
+        case t.Quantified(variables=variables, body=body):
             inner = defined(body, sequences, facts)
-            found = inner if inner == TRUE else Quantified(Quantifier.FORALL, variables, inner, term.span)
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            found = inner if inner == t.TRUE else t.Quantified(t.Quantifier.FORALL, variables, inner, term.span)
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise):
             branches = ((condition, then), (_denial(condition), otherwise))
             needed = [(guard, defined(part, sequences, (*facts, *_parts(guard)))) for guard, part in branches]
-            safe = (Implies(guard, inner, term.span) for guard, inner in needed if inner != TRUE)
+            safe = (t.Implies(guard, inner, term.span) for guard, inner in needed if inner != t.TRUE)
             found = _all((defined(condition, sequences, facts), *safe))
         case _:  # no connective: all of it matters
             found = _all(_risks(term, sequences, facts))
@@ -170,92 +136,92 @@ def defined(term: Term, sequences: Collection[Variable] | None = None, facts: Fa
 
 
 def _in_turn(
-    items: Sequence[Term], guards: Sequence[Term], sequences: Collection[Variable] | None, facts: Facts
-) -> Term:
+    items: Sequence[t.Term], guards: Sequence[t.Term], sequences: Collection[t.Variable] | None, facts: Facts
+) -> t.Term:
     """Each of the items matters only where the guards of those hold that always have a value, and of those before."""
     partial = [_is_partial(item) for item in items]
     safe = [guard for guard, doubtful in zip(guards, partial, strict=True) if not doubtful]
-    found, asked = list[Term](), list[Term]()
+    found, asked = list[t.Term](), list[t.Term]()
     for item, guard, doubtful in zip(items, guards, partial, strict=True):
         if doubtful:
             inner = defined(item, sequences, (*facts, *_parts(_all((*safe, *asked)))))
             asked += _parts(inner)  # what is asked once may be taken for granted further on
-            if inner != TRUE:
-                found.append(Implies(_all(safe), inner, item.span) if safe else inner)
+            if inner != t.TRUE:
+                found.append(t.Implies(_all(safe), inner, item.span) if safe else inner)
             safe.append(guard)
     return _all(found)
 
 
-def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> Iterator[Term]:
+def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts) -> Iterator[t.Term]:
     """What an atom needs to be defined; of a formula within it, what that formula needs."""
     match atom:
-        case Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
-            asked = [Compare("<=", _ZERO, index, atom.span)] if index.sort != NATURAL else []
-            asked.append(Compare("<", index, Length(sequence, NATURAL), atom.span))
+        case t.Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
+            asked = [t.Compare("<=", _ZERO, index, atom.span)] if index.sort != NATURAL else []
+            asked.append(t.Compare("<", index, t.Length(sequence, NATURAL), atom.span))
             yield from (each for each in asked if not _follows(each, facts))
-        case Arithmetic(operator="/", right=right) if sequences is None:
-            asked = [Compare(sign, right, Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
+        case t.Arithmetic(operator="/", right=right) if sequences is None:
+            asked = [t.Compare(sign, right, t.Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
             if not any(_follows(each, facts) for each in asked):
                 yield asked[0]
-        case History(operator=Past.PREVIOUS | Past.CHANGED) if atom.arguments[0].sort != BOOL:
+        case t.History(operator=t.Past.PREVIOUS | t.Past.CHANGED) if atom.arguments[0].sort != BOOL:
             yield from _risks_before(atom, sequences, facts)
             return
         case _:  # has a value where its parts have one
             assert sequences is not None or not may_lack_value(atom), f"no condition of a {type(atom).__name__}"
     for part in atom.children:
-        if isinstance(atom, History) and part.sort == BOOL:
+        if isinstance(atom, t.History) and part.sort == BOOL:
             continue  # its own conditions stand in it
-        if part.sort == BOOL or isinstance(part, Conditional):
+        if part.sort == BOOL or isinstance(part, t.Conditional):
             yield from _parts(defined(part, sequences, facts))
         else:
             yield from _risks(part, sequences, facts)
 
 
-def _risks_before(atom: History, sequences: Collection[Variable] | None, facts: Facts) -> Iterator[Term]:
+def _risks_before(atom: t.History, sequences: Collection[t.Variable] | None, facts: Facts) -> Iterator[t.Term]:
     """What a value of the step before needs: that it was one there. What holds now says nothing of that step."""
     value, *initial = atom.arguments
     if not initial:  # `changed` compares it with the value of now
         yield from _parts(defined(value, sequences, facts))
     before = defined(value, sequences)
-    first = defined(initial[0], sequences) if initial else TRUE
-    if (before, first) != (TRUE, TRUE):
-        yield History(Past.PREVIOUS, (before, first), BOOL, None, atom.span)
+    first = defined(initial[0], sequences) if initial else t.TRUE
+    if (before, first) != (t.TRUE, t.TRUE):
+        yield t.History(t.Past.PREVIOUS, (before, first), BOOL, None, atom.span)
 
 
-def _parts(term: Term) -> tuple[Term, ...]:
-    return term.items if isinstance(term, And) else () if term == TRUE else (term,)
+def _parts(term: t.Term) -> tuple[t.Term, ...]:
+    return term.items if isinstance(term, t.And) else () if term == t.TRUE else (term,)
 
 
-def _all(terms: Iterable[Term]) -> Term:
+def _all(terms: Iterable[t.Term]) -> t.Term:
     parts = tuple(dict.fromkeys(part for term in terms for part in _parts(term)))
-    return TRUE if not parts else parts[0] if len(parts) == 1 else And(parts, parts[0].span)
+    return t.TRUE if not parts else parts[0] if len(parts) == 1 else t.And(parts, parts[0].span)
 
 
-def _denial(term: Term) -> Term:
+def _denial(term: t.Term) -> t.Term:
     match term:
-        case Not(body=body):
+        case t.Not(body=body):
             return body
-        case Or(items=items):
+        case t.Or(items=items):
             return _all(map(_denial, items))
-        case Implies(left=left, right=right):
+        case t.Implies(left=left, right=right):
             return _all((left, _denial(right)))
-        case Compare(operator=sign, left=left, right=right):
-            return Compare(OPPOSITE[sign], left, right, term.span)
-        case Literal(value=bool() as value):
-            return FALSE if value else TRUE
-    return Not(term, term.span)
+        case t.Compare(operator=sign, left=left, right=right):
+            return t.Compare(OPPOSITE[sign], left, right, term.span)
+        case t.Literal(value=bool() as value):
+            return t.FALSE if value else t.TRUE
+    return t.Not(term, term.span)
 
 
 # -- what plainly follows from guards: sums of numbers that are compared -----------------------------------------------
 
-_Sum = dict[Term, Fraction]
-_ONE = Literal(1, INTEGER)
+_Sum = dict[t.Term, Fraction]
+_ONE = t.Literal(1, INTEGER)
 """Its coefficient is the constant of a sum."""
 
 
-def _follows(goal: Compare, facts: Facts) -> bool:
+def _follows(goal: t.Compare, facts: Facts) -> bool:
     """Whether one or two of the facts plainly give the goal, by adding them up."""
-    facts = tuple(_denial(fact.body) if isinstance(fact, Not) else fact for fact in facts)
+    facts = tuple(_denial(fact.body) if isinstance(fact, t.Not) else fact for fact in facts)
     if goal in facts:
         return True
     if goal.operator == "!=":
@@ -272,50 +238,50 @@ def _at_most_zero(rest: _Sum) -> bool:
     return all(n <= 0 if term in signed or term.sort == NATURAL else n == 0 for term, n in rest.items())
 
 
-def _below(fact: Term) -> list[_Sum]:
+def _below(fact: t.Term) -> list[_Sum]:
     """Sums that are at most zero where a comparison holds."""
     match fact:
-        case Compare(operator="<" | "<=" as sign, left=left, right=right):
+        case t.Compare(operator="<" | "<=" as sign, left=left, right=right):
             return [_added(_sum(left), _times(_sum(right), -1), _strict(sign, left, right))]
-        case Compare(operator=">" | ">=" as sign, left=left, right=right):
-            return _below(Compare("<" if sign == ">" else "<=", right, left))
-        case Compare(operator="==", left=left, right=right) if left.sort in (INTEGER, NATURAL, REAL):
-            return [*_below(Compare("<=", left, right)), *_below(Compare("<=", right, left))]
-        case Compare(operator="!=", left=left, right=right):
+        case t.Compare(operator=">" | ">=" as sign, left=left, right=right):
+            return _below(t.Compare("<" if sign == ">" else "<=", right, left))
+        case t.Compare(operator="==", left=left, right=right) if left.sort in (INTEGER, NATURAL, REAL):
+            return [*_below(t.Compare("<=", left, right)), *_below(t.Compare("<=", right, left))]
+        case t.Compare(operator="!=", left=left, right=right):
             for one, other in ((left, right), (right, left)):
-                if one.sort == NATURAL and isinstance(other, Literal) and other.value == 0:
-                    return _below(Compare("<", other, one))
-                if isinstance(other, SequenceTerm) and not other.items:
-                    return _below(Compare("<", _ZERO, Length(one, NATURAL)))
-        case In(item=item, collection=SequenceRange(low=low, high=high)):
-            return [*_below(Compare("<=", low, item)), *_below(Compare("<=", item, high))]
+                if one.sort == NATURAL and isinstance(other, t.Literal) and other.value == 0:
+                    return _below(t.Compare("<", other, one))
+                if isinstance(other, t.SequenceTerm) and not other.items:
+                    return _below(t.Compare("<", _ZERO, t.Length(one, NATURAL)))
+        case t.In(item=item, collection=t.SequenceRange(low=low, high=high)):
+            return [*_below(t.Compare("<=", low, item)), *_below(t.Compare("<=", item, high))]
     return []
 
 
-_TINY = Literal(0, REAL)
+_TINY = t.Literal(0, REAL)
 """As a summand, some positive number: by it one side of a strict comparison of reals is smaller than the other."""
 
 
-def _strict(sign: str, left: Term, right: Term) -> _Sum:
+def _strict(sign: str, left: t.Term, right: t.Term) -> _Sum:
     if sign == "<=":
         return {}
     whole = all(part.sort in (INTEGER, NATURAL) for part in (left, right))
     return {_ONE: Fraction(1)} if whole else {_TINY: Fraction(1)}
 
 
-def _sum(term: Term) -> _Sum:
+def _sum(term: t.Term) -> _Sum:
     match term:
-        case Widen(term=inner):
+        case t.Widen(term=inner):
             return _sum(inner)
-        case Negative(term=inner):
+        case t.Negative(term=inner):
             return _times(_sum(inner), -1)
-        case Arithmetic(operator="+", left=left, right=right):
+        case t.Arithmetic(operator="+", left=left, right=right):
             return _added(_sum(left), _sum(right))
-        case Arithmetic(operator="-", left=left, right=right):
+        case t.Arithmetic(operator="-", left=left, right=right):
             return _added(_sum(left), _times(_sum(right), -1))
-        case Literal(value=int() | Fraction() as value) if not isinstance(value, bool):
+        case t.Literal(value=int() | Fraction() as value) if not isinstance(value, bool):
             return {_ONE: Fraction(value)}
-        case Length(sequence=SequenceTerm(items=items)):
+        case t.Length(sequence=t.SequenceTerm(items=items)):
             return {_ONE: Fraction(len(items))}
     return {term: Fraction(1)}
 

@@ -1,121 +1,83 @@
-"""A piece of surface syntax as text on one line."""
+"""Tokens as text on one line, in the canonical spacing: every number and name as it was written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import assert_never
+from collections.abc import Sequence
 
-from avow.language import syntax
+from avow.language.lexer import Token, tokens
+from avow.language.source import Reports, Source
 
-
-def flat(tree: syntax.Syntax) -> str:
-    """The tree on one line, in the canonical spacing; every parenthesis, number and name as it was written."""
-    match tree:
-        case syntax.Connective(sign=sign, items=items):
-            return f" {sign} ".join(map(flat, items))
-        case syntax.Negation(body=body):
-            return f"not {flat(body)}"
-        case syntax.Comparison(operands=operands, relations=signs):
-            return _between(operands, ("!in" if sign.type == "NOT_IN" else sign.text for sign in signs))
-        case syntax.Calculation(operands=operands, operators=signs):
-            return _between(operands, (sign.text for sign in signs))
-        case syntax.Minus(body=body):
-            inner = flat(body)
-            return f"- {inner}" if inner.startswith("-") else f"-{inner}"
-        case syntax.Application(function=function, arguments=arguments):
-            return f"{flat(function)}({_listed(arguments)})"
-        case (
-            syntax.Name(text=text)
-            | syntax.BuiltinName(text=text)
-            | syntax.Text(text=text)
-            | syntax.NamedType(text=text)
-            | syntax.BuiltinType(text=text)
-        ):
-            return text
-        case syntax.Number(digits=digits):
-            return digits
-        case syntax.Truth(value=value):
-            return "TRUE" if value else "FALSE"
-        case syntax.PortName(role=role, name=name):
-            return f"{role}.{name}"
-        case syntax.NodePort(node=node, role=said, name=name):
-            return f"{node}.{name}" if said is None else f"{node}.{said}.{name}"
-        case syntax.FieldOf(body=body, name=token):
-            return f"{flat(body)}.{token.text}"
-        case syntax.RecordType(fields=parts):
-            return f"[{_listed(parts)}]"
-        case syntax.Parentheses(body=body):
-            return f"({flat(body)})"
-        case syntax.TupleDisplay(items=parts) | syntax.TupleType(items=parts):
-            return f"({_listed(parts)})"
-        case syntax.SetDisplay(items=parts) | syntax.SetType(elements=parts):
-            return f"{{{_listed(parts)}}}"
-        case syntax.UnspecifiedType():
-            return "{}"
-        case syntax.SequenceDisplay(items=items):
-            return f"<{_listed(items)}>"
-        case syntax.RangeDisplay(low=low, high=high):
-            return f"<{flat(low)} upto {flat(high)}>"
-        case syntax.Quantification():
-            return f"{quantifier_head(tree)} {flat(tree.body)})"
-        case syntax.IfThenElse(condition=condition, then=then, otherwise=otherwise):
-            return f"if {flat(condition)} then {flat(then)} else {flat(otherwise)}"
-        case syntax.Quantity(digits=digits, unit=unit):
-            return f"{digits} {unit.text}"
-        case syntax.LimitSyntax(relation=relation, amount=amount, unit=named):
-            inside = (relation, flat(amount), named.text if named is not None else "")
-            return f"[{' '.join(part for part in inside if part)}]"
-        case syntax.Limited(name=token, limit=limit, arguments=arguments):
-            return f"{token.text}{flat(limit)}({_listed(arguments)})"
-        case syntax.PaceSyntax(head=head, words=before, length=length):
-            return f"{flat(head)}({' '.join(word.text for word in before)} {flat(length)})"
-        case syntax.Lasting(word=word, left=one, limit=bound, right=other):
-            return f"{flat(one)} {word}{'' if bound is None else flat(bound)} {flat(other)}"
-        case syntax.Binder(names=names, domain=domain):
-            return f"{', '.join(name.text for name in names)} in {flat(domain)}"
-        case syntax.FunctionType(parameters=left, result=right):
-            return f"{flat(left)} --> {flat(right)}"
-        case syntax.ProductType(factors=factors, signs=signs):
-            return _between(factors, (sign.text for sign in signs))
-        case syntax.SequenceType(item=item):
-            return f"<{flat(item)}>"
-        case syntax.Element(name=token, parameters=sorts):
-            return f"{token.text}({_listed(sorts)})" if sorts else token.text
-        case syntax.TypeDeclaration() | syntax.PortDeclaration():
-            return f"{tree.name.text} : {flat(tree.type)}"
-        case syntax.ConstantDeclaration():
-            return f"{tree.name.text} = {flat(tree.value)}"
-        case syntax.Define():
-            return f"{definition_head(tree)} {flat(tree.body)}"
-        case syntax.PortList(items=parts) | syntax.TopicList(items=parts):
-            return _listed(parts)
-        case syntax.RosType(names=names):
-            return "/".join(name.text for name in names)
-        case syntax.TopicDeclaration(type=type_, name=token, role=said, port=port):
-            whole = f"{flat(type_)} {token.text}"
-            if port is None:
-                return whole
-            return f"{whole} matches({port.text if said is None else f'{said}.{port.text}'})"
-        case _:
-            assert_never(tree)
+_OPERANDS = frozenset((
+    *("NAME", "NUMBER", "UNIT", "STRING", "BUILTIN", "TRUE", "FALSE", "EMPTY_SEQUENCE"),
+    *("RPAR", "RBRACE", "RSQUARE", "CLOSING"),
+))  # fmt: skip
+"""With which an operand ends."""
+_APPLIED = _OPERANDS | {"FORALL", "EXISTS", "UNIQUE", "MATCHES", "SINCE"}
+"""What stands before the parenthesis, or a limit's bracket, of something applied."""
+_OPENS = frozenset(("LPAR", "LBRACE", "LSQUARE", "OPENING", "SIGN", "DOT"))
+"""After which there is no space."""
+_CLOSES = frozenset(("RPAR", "RBRACE", "RSQUARE", "CLOSING", "LIMIT", "COMMA", "DOT", "APPLIED"))
+"""Before which there is none."""
+TEXTS = {"NOT_IN": "!in", "EMPTY_SEQUENCE": "<>", "SEMICOLON": "|"}
 
 
-def definition_head(tree: syntax.Define) -> str:
-    """``define hot(i : NATURAL) =``."""
-    return f"define {tree.name.text}{f'({_listed(tree.parameters)})' if tree.parameters else ''} ="
+def flat(found: Sequence[Token]) -> str:
+    """The tokens of one declaration, type or formula on a line."""
+    out, before = "", ""
+    for kind, text in _told_apart(without_doubled(found)):
+        glued = before in _OPENS or kind in _CLOSES or not before
+        if before == "SIGN" and kind == "SIGN":
+            glued = False  # `--` would begin a comment
+        out += text if glued else f" {text}"
+        before = "LPAR" if kind == "APPLIED" else kind
+    return out
 
 
-def quantifier_head(tree: syntax.Quantification) -> str:
-    """``forall(x in REAL |``."""
-    return f"{tree.quantifier}({_listed(tree.binders)} |"
+def flat_text(text: str) -> str:
+    """As `flat`, of a piece of text that has been read."""
+    return flat(tokens(Reports(Source("", text))))
 
 
-def _listed(trees: Iterable[syntax.Syntax]) -> str:
-    return ", ".join(map(flat, trees))
+def without_doubled(found: Sequence[Token]) -> list[Token]:
+    """The tokens without parentheses that directly enclose parentheses and apply to nothing."""
+    partners: dict[int, int] = {}
+    stack: list[int] = []
+    for at, token in enumerate(found):
+        if token.type == "LPAR":
+            stack.append(at)
+        elif token.type == "RPAR" and stack:
+            partners[stack.pop()] = at
+    doubled: set[int] = set()
+    for first, last in partners.items():
+        applied = first > 0 and found[first - 1].type in _APPLIED
+        if not applied and partners.get(first + 1) == last - 1:
+            doubled |= {first, last}
+    return [token for at, token in enumerate(found) if at not in doubled]
 
 
-def _between(trees: Sequence[syntax.Syntax], signs: Iterable[str]) -> str:
-    text = flat(trees[0])
-    for sign, tree in zip(signs, trees[1:], strict=True):
-        text += f" {sign} {flat(tree)}"
-    return text
+def _told_apart(found: Sequence[Token]) -> list[tuple[str, str]]:
+    """The kind and text of each token, where a sign has several uses by its use: `OPENING` and `CLOSING` of a sequence,
+    a `SIGN` before a number, brackets of what is `APPLIED`, the end of the `LIMIT` of `since`."""
+    out: list[tuple[str, str]] = []
+    open_: list[str] = []
+    before = ""
+    for token in found:
+        kind, text = token.type, TEXTS.get(token.type, token.text)
+        is_operand = before in _OPERANDS
+        if kind == "NAME" and text == "x" and is_operand:
+            kind = "TIMES"  # between types
+        elif kind == "LT" and not is_operand:
+            kind = "OPENING"
+        elif kind == "GT" and open_[-1:] == ["OPENING"]:
+            kind = "CLOSING"
+        elif kind == "MINUS" and not is_operand:
+            kind = "SIGN"
+        elif kind in ("LPAR", "LSQUARE") and before in _APPLIED:
+            kind = "APPLIED"
+        if kind in ("LPAR", "LBRACE", "LSQUARE", "OPENING", "APPLIED"):
+            open_.append("LIMIT" if before == "SINCE" else kind)
+        elif kind in ("RPAR", "RBRACE", "RSQUARE", "CLOSING") and open_ and open_.pop() == "LIMIT":
+            kind = "LIMIT"
+        out.append((kind, text))
+        before = kind
+    return out

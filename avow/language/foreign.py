@@ -1,7 +1,7 @@
-"""What other notations write (mathematics, programming languages, other specification languages), and what RCL does.
+"""Signs and words of other notations (mathematics, programming languages), each with what RCL has for it.
 
-A foreign sign is an error that says what to write. Where it can mean one thing only, it is read as that thing, so that
-nothing else is reported because of it.
+A foreign sign is an error whose hint says what to write. Where it can mean one thing only, it is read as that thing, so
+that nothing else is reported because of it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ def _hint(hint: str, *signs: str) -> dict[str, Foreign]:
     return dict.fromkeys(signs, Foreign(hint))
 
 
-_COLLECTIONS = "write sets as `{a, b}` and sequences as `<a, b>`"
 _QUANTIFIER = "write `{0}(x in S | …)`"
-_SET_OPERATORS = "RCL has no operators on sets: write `x in A and x in B`, `forall(x in A | x in B)`"
+_QUOTES = 'write texts as `"…"`, and the elements of types without quotation marks'
+_ONE_STEP = "properties of whole runs stand in the plan; `previous`, `once` and their like speak of earlier steps"
 
 SIGNS: dict[str, Foreign] = {
     **_as("IFF", "<=>", "<->", "<==>", "↔", "⇔", "⟺", "⟷", "≡"),
@@ -36,8 +36,7 @@ SIGNS: dict[str, Foreign] = {
     **_as("IMPLIES", "->", "→", "⟶", hint="write `->`; in the type of a function `-->`"),
     **_as("AND", "and", "&&", "&", "∧", "/\\"),
     **_as("OR", "or", "||", "∨", "\\/"),
-    **_as("NOT", "not", "!", "¬"),
-    **_as("NOT", "not", "~", hint="write `not`"),
+    **_as("NOT", "not", "!", "¬", "~"),
     **_as("EQ", "==", "===", "≔"),
     **_as("EQ", "==", ":=", hint="write `==` for equality, `=` for a constant"),
     **_as("NE", "!=", "/=", "=/=", "!==", "~=", "≠"),
@@ -50,11 +49,11 @@ SIGNS: dict[str, Foreign] = {
     **_as("EXISTS", "exists", "∃", hint=_QUANTIFIER.format("exists")),
     **_as("TRUE", "TRUE", "⊤"),
     **_as("FALSE", "FALSE", "⊥"),
-    **_as("STAR", "*", "·", "⋅", "•", "∗", hint="write `*`; after the variables of a quantifier `|`"),
+    **_as("STAR", "*", "·", "⋅", "•", "∗"),
     **_as("STAR", "*", "^", "**", hint="RCL has no powers: write `x * x`"),
-    **_as("STAR", "*", "%", hint="RCL has no remainder"),
+    **_as("STAR", "*", "%", hint="write `mod(a, 3)`"),
     **_as("SLASH", "/", "÷", "∕"),
-    **_as("MINUS", "-", "−", "–", "—", hint="write the plain minus `-`"),
+    **_as("MINUS", "-", "−", "–", "—"),
     **_as("NAME", "x", "×", hint="write `x` between types, `*` between numbers"),
     **_as("BAR", "|", "∣", "❘"),
     **_as("BUILTIN", "REAL", "ℝ"),
@@ -64,65 +63,23 @@ SIGNS: dict[str, Foreign] = {
     **_as("LT", "<", "⟨", "〈", hint="write sequences as `<a, b>`"),
     **_as("GT", ">", "⟩", "〉", hint="write sequences as `<a, b>`"),
     **_as("UPTO", "upto", "...", "..", "…", hint="write a range as `<a upto b>`"),
-    **_hint(
-        "RCL has no inverse functions: say which values are meant, `exists(x in REAL | f(x) == y and …)`", "^-1", "⁻¹"
-    ),
-    **_hint("write `REAL`: reals are exact", "ℚ"),
-    **_hint(_SET_OPERATORS, "∪", "∩", "⊆", "⊂", "⊇", "∖"),
-    **_hint("the empty set is written `{}`", "∅"),
-    **_hint("RCL has no powers: write `x * x`", "²", "³"),
-    **_hint("RCL has no roots: say what its square is", "√"),
-    **_hint("write `if c then a else b`", "?"),
     **_as("SLASH", "/", "::", hint="write `package/Type` (a ROS type), `in.v`, or `|` after a quantifier's variables"),
+    **_hint("RCL has no inverse functions: write `exists(x in REAL | f(x) == y and …)`", "^-1", "⁻¹"),
+    **_hint("write `x in A and x in B`, `forall(x in A | x in B)`", "∪", "∩", "⊆", "⊂", "⊇", "∖"),
+    **_hint("write the empty set as `{}`", "∅"),
+    **_hint("RCL has no powers: write `x * x`", "²", "³"),
+    **_hint("write `if c then a else b`", "?"),
     **_hint("write operators as words: `in`, `and`, `or`, `not`, `forall`, `exists`", "\\"),
-    **_hint("the length of a sequence is written `length(s)`; a comment begins with `//`", "#"),
-    **_hint('write texts as `"…"`, and the elements of types without quotation marks', "'", "`"),
-    **_hint("RCL speaks of one step: there is no earlier or later value", "@"),
-    **_hint("a contract speaks of one step; properties of whole runs stand in the plan", "□", "◇", "◊", "◯"),
-    **_hint('write the straight quotation mark `"`', "“", "”", "„"),
-    **_hint("write the straight quote `'`", "’", "′", "‘"),
+    **_hint("write the length of a sequence as `length(s)`; a comment begins with `//`", "#"),
+    **_hint(_QUOTES, "'", "`", "“", "”", "„", "’", "′", "‘"),
+    **_hint(_ONE_STEP, "@", "□", "◇", "◊", "◯"),
 }
 """Signs, by what they look like."""
-
-_COMMANDS = {
-    **dict.fromkeys(("forall", "A"), "∀"),
-    **dict.fromkeys(("exists", "E"), "∃"),
-    **dict.fromkeys(("in", "isin"), "∈"),
-    "notin": "∉",
-    **dict.fromkeys(("land", "wedge", "and"), "∧"),
-    **dict.fromkeys(("lor", "vee", "or"), "∨"),
-    **dict.fromkeys(("lnot", "neg", "not"), "¬"),
-    **dict.fromkeys(("Rightarrow", "implies", "Longrightarrow"), "⇒"),
-    **dict.fromkeys(("to", "rightarrow", "longrightarrow"), "→"),
-    **dict.fromkeys(("iff", "Leftrightarrow", "leftrightarrow", "equiv"), "⇔"),
-    **dict.fromkeys(("le", "leq", "leqslant"), "≤"),
-    **dict.fromkeys(("ge", "geq", "geqslant"), "≥"),
-    **dict.fromkeys(("ne", "neq"), "≠"),
-    **dict.fromkeys(("times", "X"), "×"),
-    "cdot": "·",
-    **dict.fromkeys(("mid", "vert"), "∣"),
-    **dict.fromkeys(("top", "true"), "⊤"),
-    **dict.fromkeys(("bot", "false"), "⊥"),
-    **dict.fromkeys(("cup", "union", "cap", "intersect", "subseteq", "subset", "setminus"), "∪"),
-    **dict.fromkeys(("emptyset", "varnothing"), "∅"),
-    **dict.fromkeys(("ldots", "dots"), "…"),
-}
-"""LaTeX's and TLA+'s words after a backslash, by the sign that they stand for."""
 
 
 def foreign(sign: str) -> Foreign:
     """What is known of a sign that the lexer took for foreign."""
-    if sign in SIGNS:
-        return SIGNS[sign]
-    if sign.startswith("\\"):
-        return SIGNS[_COMMANDS.get(sign[1:], "\\")]
-    return Foreign(_COLLECTIONS)
-
-
-def wide(sign: str) -> str | None:
-    """The plain ASCII sign that a full-width one (of an East Asian keyboard) stands for."""
-    plain = {"。": ".", "、": ","}.get(sign) or unicodedata.normalize("NFKC", sign)
-    return plain if "\uff01" <= sign <= "\uff5e" or sign in "。、" else None
+    return SIGNS.get(sign, SIGNS["\\"])
 
 
 def invisible(character: str) -> str | None:
@@ -132,62 +89,52 @@ def invisible(character: str) -> str | None:
     return f"U+{ord(character):04X} ({unicodedata.name(character, 'without a name').lower()})"
 
 
-FIELDS = "give the variable the type of the field that is meant; the plan says which field of the message it is"
-_ONE_STEP = "a contract speaks of one step; properties of whole runs stand in the plan"
-_CONDITIONAL = "write `if c then a else b`"
-_ARITHMETIC = "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers: compare them"
+FIELDS = "give the variable the type of that field; the plan says which field of the message it is"
+_ARITHMETIC = "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers"
+_CONNECTIVES = "write `a and b`, `a or b`, `not a`, `a -> b`, `a <=> b`, `xor(a, b)`"
 
 FOREIGN_NAMES = {
-    **dict.fromkeys(("true", "True"), "write `TRUE`"),
-    **dict.fromkeys(("false", "False"), "write `FALSE`"),
-    **dict.fromkeys(("EmptySet", "emptyset"), "the empty set is written `{}`"),
-    **dict.fromkeys(("always", "globally", "eventually", "finally", "next", "until", "once"), _ONE_STEP),
-    **dict.fromkeys(("historically", "previously", "since", "G", "F", "X", "old", "pre", "post"), _ONE_STEP),
-    **dict.fromkeys(("prev", "previous", "last"), _ONE_STEP),
-    **dict.fromkeys(("Abs", "ABS", "magnitude"), "write `abs(r)`"),
-    **dict.fromkeys(("fabs", "sqrt", "sin", "cos", "tan", "atan2", "pow", "exp", "log", "floor", "ceil"), _ARITHMETIC),
+    **{word: f"write `{word.upper()}`" for word in ("true", "false")},
+    **dict.fromkeys(("always", "globally", "finally", "previously", "old", "pre", "prev", "last"), _ONE_STEP),
+    **dict.fromkeys(("fabs", "magnitude"), "write `abs(r)`"),
+    **dict.fromkeys(("sqrt", "sin", "cos", "tan", "atan2", "pow", "exp", "log", "floor", "ceil"), _ARITHMETIC),
     **dict.fromkeys(("round", "norm", "hypot", "dist", "distance"), _ARITHMETIC),
-    **{word: f"write `{word.lower()[:3]}(a, b)`" for word in ("Min", "MIN", "minimum", "Max", "MAX", "maximum")},
-    **dict.fromkeys(("modulo", "remainder", "rem", "quotient"), "write `mod(n, 3)` and `div(n, 3)`"),
-    **dict.fromkeys(("len", "size", "count", "card"), "the length of a sequence is written `length(s)`"),
-    **dict.fromkeys(("range", "Range", "seq"), "write a range as `<a upto b>`, both ends included"),
-    **dict.fromkeys(("And", "Or", "Not", "Implies", "Iff", "Xor"), "write `a and b`, `a or b`, `not a`, `a -> b`"),
-    **dict.fromkeys(("ForAll", "Forall", "forAll"), _QUANTIFIER.format("forall")),
-    **dict.fromkeys(("Exists", "exist"), _QUANTIFIER.format("exists")),
-    "_": "where any value will do, say that there is one: `exists(x in REAL | c == f(x))`",
-    **dict.fromkeys(("ite", "cond", "If", "IF"), _CONDITIONAL),
-    **{word: f"directly before a parenthesis it is an operator: `{word}(a, b)`" for word in ("xor", "mod", "div")},
-    **{word: f"directly before a parenthesis it is an operator: `{word}(…)`" for word in ("abs", "min", "max")},
-    **dict.fromkeys(("None", "null", "nullptr", "NULL", "nil", "NaN", "nan"), "every variable has a value of its type"),
-    **dict.fromkeys(("inf", "Inf", "INFINITY", "infinity"), "a REAL is finite"),
+    **{word: f"write `{word[:3]}(a, b)`" for word in ("minimum", "maximum", "modulo")},
+    **dict.fromkeys(("remainder", "rem", "quotient"), "write `mod(n, 3)` and `div(n, 3)`"),
+    **dict.fromkeys(("len", "size", "count", "card"), "write the length of a sequence as `length(s)`"),
+    **dict.fromkeys(("range", "seq"), "write a range as `<a upto b>`, both ends included"),
+    **dict.fromkeys(("and", "or", "not", "implies", "iff"), _CONNECTIVES),
+    **{word: _QUANTIFIER.format(word) for word in ("forall", "exists")},
+    "_": "write `exists(x in REAL | c == f(x))` where any value will do",
+    **dict.fromkeys(("ite", "cond", "if"), "write `if c then a else b`"),
+    **{word: f"`{word}` is an operator only before a parenthesis: `{word}(a, b)`" for word in ("xor", "mod", "div")},
+    **{word: f"`{word}` is an operator only before a parenthesis: `{word}(…)`" for word in ("abs", "min", "max")},
+    **dict.fromkeys(("none", "null", "nullptr", "nil", "nan"), "every variable has a value of its type"),
+    **dict.fromkeys(("inf", "infinity"), "a REAL is finite"),
 }
-"""Names that other languages give to values and functions, with what to write."""
+"""Names that other languages give to values and functions, in small letters, with what to write."""
 
 OPERATORS = {
-    **dict.fromkeys(("true", "True"), "write `TRUE`"),
-    **dict.fromkeys(("false", "False"), "write `FALSE`"),
-    **dict.fromkeys(("implies", "THEN", "IMPLIES", "Implies"), "write `->`"),
-    **dict.fromkeys(("iff", "IFF", "equiv"), "write `<=>`"),
-    **{w: f"write `{w.lower()}`" for w in ("AND", "OR", "NOT", "IN", "FORALL", "EXISTS", "And", "Or", "Not")},
-    "is": "write `==` (or `!=`, `<`, `<=`, `>`, `>=`)",
-    **dict.fromkeys(("equals", "eq"), "write `==`"),
-    **dict.fromkeys(("xor", "XOR", "Xor"), "write `xor(a, b)` for: either a or b"),
+    **dict.fromkeys(("implies", "then"), "write `->`"),
+    **dict.fromkeys(("iff", "equiv"), "write `<=>`"),
+    **{word: f"write `{word}`" for word in ("and", "or", "not", "in", "forall", "exists")},
+    **dict.fromkeys(("is", "equals", "eq"), "write `==` (or `!=`, `<`, `<=`, `>`, `>=`)"),
+    **dict.fromkeys(("less", "greater", "more", "bigger", "smaller"), "write `<`, `<=`, `>` or `>=`"),
+    "xor": "write `xor(a, b)`",
     **dict.fromkeys(("mod", "rem", "modulo"), "write `mod(a, 3)`"),
     "div": "write `div(a, 3)`",
     "unless": "write `not B -> A` for: A unless B",
     "between": "write `low <= x <= high`",
     "to": "write a range as `<a upto b>`, both ends included",
     **dict.fromkeys(("notin", "nin"), "write `!in`"),
-    **dict.fromkeys(("such", "st", "where", "with", "suchthat"), "write `|` between the variables and the formula"),
-    "for": "write `forall(x in S | …)` or `exists(x in S | …)`",
+    **dict.fromkeys(("such", "st", "where", "with"), "write `|` between the variables and the formula"),
+    **dict.fromkeys(("for", "all"), "write `forall(x in S | …)` or `exists(x in S | …)`"),
     **dict.fromkeys(("contains", "has", "includes"), "write `x in S`"),
-    **dict.fromkeys(("less", "greater", "more", "bigger", "smaller"), "write `<`, `<=`, `>` or `>=`"),
-    **dict.fromkeys(("otherwise", "ELSE", "elif", "IF", "If"), _CONDITIONAL),
+    **dict.fromkeys(("otherwise", "elif"), "write `if c then a else b`"),
     **dict.fromkeys(("if", "when", "whenever"), "write `A -> B` for: if A then B, `A <=> B` for: A if and only if B"),
-    "let": "RCL has no `let`: write the term itself, or `forall(x in REAL | x == … -> …)`",
-    "as": "RCL converts whole numbers to reals by itself, and nothing else",
+    "length": "write `length(s)`",
 }
-"""Words that stand where an operator should, with what to write."""
+"""Words that stand where an operator should, in small letters, with what to write."""
 
 FOREIGN_TYPES = {
     **dict.fromkeys(("string", "str", "text"), "STRING"),

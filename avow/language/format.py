@@ -7,42 +7,23 @@ are spelled out, and a quantifier's `;` becomes `|`. A part with a comment insid
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, zip_longest
 from typing import assert_never
 
-from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.language.flat import definition_head, flat, quantifier_head
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.language import syntax
+from avow.language.flat import TEXTS, flat, without_doubled
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text, unless_torn
 from avow.language.outline import read
 from avow.language.source import Reports, Source, in_order
-from avow.language.syntax import (
-    Connective,
-    ConstantDeclaration,
-    Declaration,
-    Define,
-    FileSyntax,
-    IfThenElse,
-    Lasting,
-    Limited,
-    Negation,
-    NodeSyntax,
-    Parentheses,
-    PortList,
-    Quantification,
-    SetDisplay,
-    SetType,
-    Sign,
-    Syntax,
-    TermSyntax,
-    TopicList,
-    TypeDeclaration,
-    children,
-)
+from avow.language.syntax import FileSyntax
 
 WIDTH = 120
 _STEP = 2
+_SHORT = {"A": "assume", "G": "guarantee"}
 
 
 def format_text(text: str, file: str) -> str:
@@ -69,73 +50,55 @@ class _Read:
         if errors:
             raise Rejected(*errors)
 
-    def says(self) -> list[tuple[object, Span]]:
-        """Everything that the file says, part by part, whatever its layout; and where each part stands."""
-        found: list[tuple[object, Span]] = []
-        parts: list[Syntax | NodeSyntax] = [*self.syntax.declarations, *self.syntax.nodes]
-        for part in sorted(parts, key=lambda part: part.start):
-            if not isinstance(part, NodeSyntax):
-                found.append((_shape(part), self.source.span(part.start, part.end)))
-                continue
-            listings = (part.inputs, part.outputs, part.topics)
-            span = self.source.span(part.name.start, part.name.end)
-            found.append(((part.name.text, *map(_shape, (*listings, *part.definitions))), span))
-            for clause in part.clauses:
-                said = (clause.kind, *map(_shape, (clause.name, clause.sentence, clause.formula)))
-                found.append((said, self.source.span(clause.start, clause.end)))
-        end = len(self.source.text)
-        found.append(([c.text.split() for c in self.comments], self.source.span(end, end)))
-        return found
+    def words(self) -> Iterator[tuple[str, Token]]:
+        """What the file says, whatever its layout: its tokens without doubled parentheses, and then its comments."""
+        for token, after in pairwise((*without_doubled(self.stream), Token("$END", "", 0, 0))):
+            is_section = token.type == "NAME" and after.type in ("LPAR", "NAME", "STRING")
+            word = _SHORT.get(token.text, token.text) if is_section else TEXTS.get(token.type, token.text)
+            yield word, token
+        for comment in self.comments:
+            yield " ".join(comment.text.split()), comment
 
 
 def _must_say_the_same(before: _Read, after: str) -> None:
     """Raises `Rejected` where the text does not read back as what it was made from."""
     try:
-        again = _Read(after, before.source.file).says()
+        again = [word for word, _ in _Read(after, before.source.file).words()]
     except Rejected:
         again = []
-    for number, (said, span) in enumerate(before.says()):
-        if number >= len(again) or again[number][0] != said:
+    for (word, token), other in zip_longest(before.words(), again, fillvalue=("", Token("", "", 0, 0))):
+        if word != other:
             message = "in the canonical layout, this would not read back as the same contract; the file stays as it is"
-            raise Rejected(
-                Diagnostic("RCL007", message, span, hint="this is a defect of Avow: please tell its authors")
-            )
-
-
-def _shape(part: object) -> object:
-    """A piece of syntax without its places. Only the dataclasses' own fields are looked at, not the printer's idea of
-    them: what the printer forgets is seen here."""
-    if isinstance(part, Token):
-        return part.type if part.type in ("NOT_IN", "EMPTY_SEQUENCE") else part.text
-    if isinstance(part, tuple):
-        return tuple(map(_shape, part))
-    if dataclasses.is_dataclass(part):
-        own = (f.name for f in dataclasses.fields(part) if f.name not in ("start", "end", "depth"))
-        return (type(part).__name__, *(_shape(getattr(part, name)) for name in own))
-    return part
+            hint = "this is a defect of Avow: please report it"
+            raise Rejected(Diagnostic("RCL007", message, before.source.span(token.start, token.end), hint=hint))
 
 
 class _Layout:
     """Writes the file from left to right: each part in canonical form, after the comments that precede it."""
 
-    def __init__(self, source: Source, stream: Sequence[Token], comments: Sequence[Token], syntax: FileSyntax) -> None:
+    def __init__(self, source: Source, stream: Sequence[Token], comments: Sequence[Token], tree: FileSyntax) -> None:
         self.text = source.text
         self.stream = stream
+        self.starts = [token.start for token in stream]
         self.comments = comments
         self.next_comment = 0
         self.at = 0
         self.lines: list[str] = []
-        self.declarations: dict[int, Declaration] = {tree.start: tree for tree in syntax.declarations}
-        self.listings: dict[int, PortList | TopicList] = {}
-        self.formulas: dict[int, TermSyntax] = {}
-        for node in syntax.nodes:
-            self.declarations |= {tree.start: tree for tree in node.definitions}
-            for tree in (node.inputs, node.outputs, node.topics):
-                if tree is not None:
-                    self.listings[tree.start] = tree
-            for clause in node.clauses:
-                if clause.formula is not None:
-                    self.formulas[clause.formula.start] = clause.formula
+        self.declarations: dict[int, syntax.Declaration] = {tree.start: tree for tree in tree.declarations}
+        self.topics: dict[int, syntax.TopicList] = {}
+        self.formulas: dict[int, syntax.TermSyntax] = {}
+        for node in tree.nodes:
+            self.declarations |= {part.start: part for part in node.definitions}
+            if node.topics is not None:
+                self.topics[node.topics.start] = node.topics
+            self.formulas |= {c.formula.start: c.formula for c in node.clauses if c.formula is not None}
+
+    def flat(self, start: int, end: int) -> str:
+        """What stands between two offsets, on one line."""
+        return flat(self.stream[bisect_left(self.starts, start) : bisect_left(self.starts, end)])
+
+    def whole(self, tree: syntax.Syntax) -> str:
+        return self.flat(tree.start, tree.end)
 
     def kind(self) -> str:
         return self.stream[self.at].type if self.at < len(self.stream) else "$END"
@@ -231,123 +194,128 @@ class _Layout:
         self.lines.append(" " * _STEP + kept[0])
         self.lines.extend(kept[1:])
 
-    def declaration(self, tree: Declaration) -> list[str]:
+    def declaration(self, tree: syntax.Declaration) -> list[str]:
         match tree:
-            case TypeDeclaration(type=type_):
-                head = f"{tree.name.text} : "
-                lines = _broken_set(type_, _STEP + len(head), WIDTH - 1) or [flat(type_)]
-            case ConstantDeclaration(value=value):
-                head = f"{tree.name.text} = "
-                lines = _broken_set(value, _STEP + len(head), WIDTH - 1) or _lay(value, _STEP + 2, WIDTH - 1)
-            case Define(body=body):
-                head = f"{definition_head(tree)} "
-                fits = _STEP + len(head) + len(flat(body)) < WIDTH
-                lines = [flat(body)] if fits else ["", *_lay(body, _STEP + 2, WIDTH - 1)]
-                lines[1:2] = [" " * (_STEP + 2) + line for line in lines[1:2]]
-                head = head if fits else head.rstrip()
+            case syntax.TypeDeclaration(type=body) | syntax.ConstantDeclaration(value=body):
+                head = f"{self.flat(tree.start, body.start)} "
+                lines = self.broken_set(body, _STEP + len(head), WIDTH - 1) or self.laid(body, _STEP + 2, WIDTH - 1)
+            case syntax.Define(body=body):
+                head = f"{self.flat(tree.start, body.start)} "
+                lines = [self.whole(body)]
+                if _STEP + len(head) + len(lines[0]) >= WIDTH:
+                    head = head.rstrip()
+                    lines = ["", *self.laid(body, _STEP + 2, WIDTH - 1)]
+                    lines[1] = " " * (_STEP + 2) + lines[1]
             case _:
                 assert_never(tree)
         return [head + lines[0], *lines[1:-1], lines[-1] + ";"] if len(lines) > 1 else [head + lines[0] + ";"]
 
     def section(self, own: Sequence[Token]) -> list[str]:
         if own[0].text == "steps":
-            return [flat(self.formulas[own[0].start])]
-        keyword = {"A": "assume", "G": "guarantee"}.get(own[0].text, own[0].text)
-        head = keyword
-        at = 1
-        while own[at].type != "LPAR":
-            head += " " + own[at].text
-            at += 1
-        if at + 1 >= len(own) - 1:
+            return [flat(own)]
+        keyword = _SHORT.get(own[0].text, own[0].text)
+        at = next(k for k, token in enumerate(own) if token.type == "LPAR")
+        head = " ".join([keyword, *(token.text for token in own[1:at])])
+        inside = own[at + 1 : -1]
+        if not inside:
             return [head + "()"]
-        start = own[at + 1].start
         if keyword in ("inputs", "outputs", "topics"):
-            items = [flat(part) for part in self.listings[start].items]
+            topics = self.topics.get(inside[0].start)
+            items = _ports(inside) if topics is None or keyword != "topics" else [_topic(tree) for tree in topics.items]
             line = f"{head}( {', '.join(items)} )"
-            if _STEP + len(line) <= WIDTH:
+            if len(items) == 1 or _STEP + len(line) <= WIDTH:
                 return [line]
             pad = " " * (_STEP + len(head) + 2)
-            return [f"{head}( {items[0]}," if len(items) > 1 else f"{head}( {items[0]} )"] + [
-                f"{pad}{item}{' )' if i == len(items) - 1 else ','}" for i, item in enumerate(items) if i
-            ]
-        tree = self.formulas[start]
-        line = f"{head}( {flat(tree)} )"
+            return [f"{head}( {items[0]},", *(f"{pad}{item}," for item in items[1:-1]), f"{pad}{items[-1]} )"]
+        tree = self.formulas[inside[0].start]
+        line = f"{head}( {flat(inside)} )"
         if own[at - 1].type != "STRING" and _STEP + len(line) <= WIDTH:
             return [line]
-        lines = _lay(tree, 2 * _STEP + 2, WIDTH - 2)
-        pad = " " * (2 * _STEP)
-        if len(lines) == 1:
-            return [head, f"{pad}( {lines[0]} )"]
-        return [head, f"{pad}( {lines[0]}", *lines[1:-1], f"{lines[-1]} )"]
+        lines = self.laid(tree, 2 * _STEP + 2, WIDTH - 2)
+        return [head, *_enclosed(f"{' ' * (2 * _STEP)}( ", lines, " )")]
 
+    # --- trees to lines ----------------------------------------------------------------------------------------------
 
-# --- trees to lines --------------------------------------------------------------------------------------------------
-
-
-def _lay(tree: TermSyntax, indent: int, width: int) -> list[str]:
-    """The lines of a formula that begins at column `indent`; all but the first carry their indentation."""
-    line = flat(tree)
-    if indent + len(line) <= width:
-        return [line]
-    match tree:
-        case Parentheses(body=inner):
-            return _enclosed("(", _lay(inner, indent + 1, width - 1), ")")
-        case Connective(sign=Sign.AND | Sign.OR, items=items):
-            sign = f"{tree.sign} "
-            lines = _lay(items[0], indent, width)
-            for part in items[1:]:
-                more = _lay(part, indent + len(sign), width)
-                lines += [" " * indent + sign + more[0], *more[1:]]
-            return lines
-        case Connective(items=items):
-            sign = f" {tree.sign}"
-            lines = _lay(items[0], indent, width - len(sign))
-            for i, part in enumerate(items[1:], 2):
-                lines[-1] += sign
-                last = i == len(items)
-                deeper = indent + (_STEP if last else 0)
-                more = _lay(part, deeper, width - (0 if last else len(sign)))
-                lines += [" " * deeper + more[0], *more[1:]]
-            return lines
-        case Lasting(word=word, left=one, limit=bound, right=other):
-            sign = f"{word}{'' if bound is None else flat(bound)} "
-            more = _lay(other, indent + len(sign), width)
-            return [*_lay(one, indent, width), " " * indent + sign + more[0], *more[1:]]
-        case Limited(arguments=(inner,)):
-            head = f"{tree.name.text}{flat(tree.limit)}("
-            return _enclosed(head, _lay(inner, indent + len(head), width - 1), ")")
-        case Negation(body=inner):
-            return _enclosed("not ", _lay(inner, indent + 4, width), "")
-        case Quantification(body=inner):
-            body = _enclosed(" " * (indent + _STEP), _lay(inner, indent + _STEP, width - 1), ")")
-            return [quantifier_head(tree), *body]
-        case IfThenElse(condition=condition, then=then, otherwise=otherwise):
-            pad = " " * indent
-            lines = _enclosed("if ", _lay(condition, indent + 3, width), "")
-            lines += _enclosed(f"{pad}then ", _lay(then, indent + 5, width), "")
-            return [*lines, *_enclosed(f"{pad}else ", _lay(otherwise, indent + 5, width), "")]
-        case _:  # a term, which stays on its line
+    def laid(self, tree: syntax.Syntax, indent: int, width: int) -> list[str]:
+        """The lines of a formula that begins at column `indent`; all but the first carry their indentation."""
+        line = self.whole(tree)
+        if indent + len(line) <= width:
             return [line]
+        match tree:
+            case syntax.Parentheses(body=inner):
+                return _enclosed("(", self.laid(inner, indent + 1, width - 1), ")")
+            case syntax.Connective(sign=syntax.Sign.AND | syntax.Sign.OR, items=items):
+                sign = f"{tree.sign} "
+                lines = self.laid(items[0], indent, width)
+                for part in items[1:]:
+                    lines += _enclosed(" " * indent + sign, self.laid(part, indent + len(sign), width), "")
+                return lines
+            case syntax.Connective(items=items):
+                sign = f" {tree.sign}"
+                lines = self.laid(items[0], indent, width - len(sign))
+                for part in items[1:]:
+                    lines[-1] += sign
+                    last = part is items[-1]
+                    deeper = indent + (_STEP if last else 0)
+                    more = self.laid(part, deeper, width - (0 if last else len(sign)))
+                    lines += _enclosed(" " * deeper, more, "")
+                return lines
+            case syntax.Lasting(left=one, right=other):
+                sign = f"{self.flat(one.end, other.start)} "
+                more = self.laid(other, indent + len(sign), width)
+                return [*self.laid(one, indent, width), *_enclosed(" " * indent + sign, more, "")]
+            case syntax.Limited(arguments=(inner,)):
+                head = self.flat(tree.start, inner.start)
+                return _enclosed(head, self.laid(inner, indent + len(head), width - 1), ")")
+            case syntax.Negation(body=inner):
+                return _enclosed("not ", self.laid(inner, indent + 4, width), "")
+            case syntax.Quantification(body=inner):
+                body = _enclosed(" " * (indent + _STEP), self.laid(inner, indent + _STEP, width - 1), ")")
+                return [self.flat(tree.start, inner.start), *body]
+            case syntax.IfThenElse(condition=condition, then=then, otherwise=otherwise):
+                pad = " " * indent
+                lines = _enclosed("if ", self.laid(condition, indent + 3, width), "")
+                lines += _enclosed(f"{pad}then ", self.laid(then, indent + 5, width), "")
+                return [*lines, *_enclosed(f"{pad}else ", self.laid(otherwise, indent + 5, width), "")]
+            case _:  # a term or type, which stays on its line
+                return [line]
+
+    def broken_set(self, tree: syntax.Syntax, indent: int, width: int) -> list[str] | None:
+        """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
+        if not isinstance(tree, syntax.SetType | syntax.SetDisplay) or indent + len(self.whole(tree)) <= width:
+            return None
+        lines = ["{"]
+        pad = " " * (_STEP + _STEP)
+        row = ""
+        items = [self.whole(part) for part in syntax.children(tree)]
+        for i, item in enumerate(items):
+            piece = item + ("," if i < len(items) - 1 else "")
+            if row and len(pad) + len(row) + 1 + len(piece) > width:
+                lines.append(pad + row)
+                row = ""
+            row = f"{row} {piece}".strip()
+        return [*lines, pad + row, " " * _STEP + "}"]
+
+
+def _ports(found: Sequence[Token]) -> list[str]:
+    """The declarations of a list of ports, each with the names that share its type."""
+    items, depth, begin, typed = list[str](), 0, 0, False
+    for at, token in enumerate(found):
+        depth += (token.type in ("LPAR", "LBRACE", "LSQUARE")) - (token.type in ("RPAR", "RBRACE", "RSQUARE"))
+        typed = typed or token.type == "COLON"
+        if token.type == "COMMA" and depth == 0 and typed:
+            items.append(flat(found[begin:at]))
+            begin, typed = at + 1, False
+    return [*items, flat(found[begin:])]
+
+
+def _topic(tree: syntax.TopicDeclaration) -> str:
+    line = f"{'/'.join(name.text for name in tree.type.names)} {tree.name.text}"
+    role = f"{tree.role}." if tree.role is not None else ""
+    return line if tree.port is None else f"{line} matches({role}{tree.port.text})"
 
 
 def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
     lines[0] = before + lines[0]
     lines[-1] += after
     return lines
-
-
-def _broken_set(tree: Syntax, indent: int, width: int) -> list[str] | None:
-    """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
-    if not isinstance(tree, SetType | SetDisplay) or indent + len(flat(tree)) <= width:
-        return None
-    lines = ["{"]
-    pad = " " * (_STEP + _STEP)
-    row = ""
-    items = [flat(part) for part in children(tree)]
-    for i, item in enumerate(items):
-        piece = item + ("," if i < len(items) - 1 else "")
-        if row and len(pad) + len(row) + 1 + len(piece) > width:
-            lines.append(pad + row)
-            row = ""
-        row = f"{row} {piece}".strip()
-    return [*lines, pad + row, " " * _STEP + "}"]

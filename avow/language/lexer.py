@@ -9,7 +9,7 @@ import re
 from typing import NamedTuple
 
 from avow.base.tuning.sizes import DIGITS, TOKENS
-from avow.language.foreign import FOREIGN_TYPES, SIGNS, foreign, invisible, wide
+from avow.language.foreign import SIGNS, foreign, invisible
 from avow.language.source import Reports
 
 
@@ -73,7 +73,7 @@ _SYMBOLS = "|".join(re.escape(s) for s in sorted(SYMBOLS, key=len, reverse=True)
 _PATTERN = re.compile(
     r"(?P<space>[ \t\r\n\f]+)"
     r"|(?P<unique>exists!(?!=))"
-    r"|(?P<name>[A-Za-z_][A-Za-z0-9_']*)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_']*(?!\w))"
     r"|(?P<comment>//[^\n]*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/)"
     r"|(?P<open_comment>/\*)"
     r"|(?P<not_in>!\s*in(?![A-Za-z0-9_']))"
@@ -89,13 +89,15 @@ _PATTERN = re.compile(
     r"|(?P<number>[0-9]+(?:\.[0-9]+)?)(?P<tail>(?:[A-Za-z0-9_']|\.(?!\.))*)"
     r'|(?P<string>"(?:[^"\\\n]|\\[^\n])*")'
     r'|(?P<open_string>"[^\n]*)'
-    r"|(?P<word>[^\W\d_][\w']*)"
+    r"|(?P<word>[^\W\d][\w']*)"
     r"|(?P<junk>.)",
     re.DOTALL,
 )
 _RECORD = re.compile(r"\s*[A-Za-z_][A-Za-z0-9_']*\s*(?:,\s*[A-Za-z_][A-Za-z0-9_']*\s*)*:(?!=)")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
+_PLAIN = {"ne": "NE", "not_in": "NOT_IN", "empty": "EMPTY_SEQUENCE", "string": "STRING"}
+"""Groups of the pattern that are a token as they stand."""
 
 
 def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]:
@@ -108,9 +110,8 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
     match_at = _PATTERN.match
     while at < end and not reports.full:
         match = match_at(text, at)
-        if match is None:  # pragma: no cover - the last alternative takes any character
-            break
-        kind, start, at = match.lastgroup, at, match.end()
+        assert match is not None, "the last alternative takes any character"
+        kind, start, at = str(match.lastgroup), at, match.end()
         if kind == "space":
             continue
         piece = match.group()
@@ -118,31 +119,25 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
             word = KEYWORDS.get(piece, "NAME")
             if piece in _UNITS and found and found[-1].type == "NUMBER":
                 word = "UNIT"
-            append(other.section(piece, word, start, at) if word in _STRUCTURE else Token(word, piece, start, at))
+            append(Token(other.section(piece, word, start, at) if word in _STRUCTURE else word, piece, start, at))
         elif piece == "<" and found and found[-1].type == "LSQUARE":
             append(Token("YOUNGER", piece, start, at))
         elif kind in ("symbol", "arrow"):
             append(Token(SYMBOLS[piece], piece, start, at))
-        elif kind == "ne":
-            append(Token("NE", piece, start, at))
-        elif kind == "not_in":
-            append(Token("NOT_IN", piece, start, at))
-        elif kind == "empty":
-            append(Token("EMPTY_SEQUENCE", piece, start, at))
+        elif kind in _PLAIN:
+            append(Token(_PLAIN[kind], piece, start, at))
+            if kind == "string":
+                _check_escapes(reports, piece, start)
         elif kind == "comment":
             if comments is not None:
                 comments.append(Token("COMMENT", piece, start, at))
         elif kind in ("number", "tail"):
             append(_number(reports, match, start, at))
-        elif kind == "string":
-            _check_escapes(reports, piece, start)
-            append(Token("STRING", piece, start, at))
         elif kind == "open_comment":
             reports.error("RCL103", "this comment is never closed", start, at, hint="close it with `*/`")
             break
         else:
-            at = other.read(str(kind), piece, start, at)
-    other.finish()
+            at = other.read(kind, piece, start, at)
     if len(found) > TOKENS:
         last = found[TOKENS]
         reports.error("RCL003", f"the text has more than {TOKENS:,} words and signs", last.start, last.end)
@@ -152,24 +147,29 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
 
 _STRUCTURE = frozenset(("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "DEFINE", "ASSUME", "GUARANTEE"))
 _SECTIONS = _STRUCTURE - {"MATCHES"}
-_WITHIN = frozenset(("LPAR", "COMMA", "DOT", "EQ", "NE", "LE", "GE", "LT", "GT", "IN", "NOT_IN", "PLUS", "MINUS"))
-_CONNECTIVES = frozenset(("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"))
+_OPERAND_FOLLOWS = frozenset((
+    *("LPAR", "COMMA", "DOT", "EQ", "NE", "LE", "GE", "LT", "GT", "IN", "NOT_IN", "PLUS", "MINUS"),
+    *("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"),
+))  # fmt: skip
 _GOES_ON = re.compile(r"\s*(?:[.:,)=<>!+*/|&-]|(?:in|and|or)\b)")
-_ARRAY = re.compile(r"\]|\s*(?:REAL|INTEGER|NATURAL|BOOL|STRING)\b")
+_PORT = re.compile(r"\.[A-Za-z_]")
 _PRIVATE = re.compile(r"~/?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
 """A topic's name in its node's own namespace."""
-_PORT = re.compile(r"\.[A-Za-z_]")
+_QUOTED = 'write texts as `"…"`, and the elements of types without quotation marks'
+_BRACKET = (
+    "write sets as `{a, b}`, sequences and their types as `<a, b>` and `<REAL>`, the item of a sequence as `s(i)`, "
+    "intervals as `0 <= r <= 9`"
+)
 
 
 class _Other:
-    """What is no token of RCL: said once, and read as what it must mean, or left out."""
+    """Reports what is no token of RCL once, and reads it as what it must mean, or leaves it out."""
 
     def __init__(self, reports: Reports, found: list[Token]) -> None:
         self.reports = reports
         self.found = found
-        self.square: list[tuple[str, str]] = []
-        self.junk = (-1, -1)
-        self.unseen: dict[str, tuple[int, int]] = {}
+        self.square = 0
+        """How many square brackets of limits and records are open."""
 
     def read(self, kind: str, piece: str, start: int, end: int) -> int:
         """Reads one piece of the text; the offset where reading goes on."""
@@ -179,23 +179,25 @@ class _Other:
         if kind == "square":
             self.bracket(piece, start, end)
         elif kind == "quoted":
-            hint = 'write texts as `"…"`, and the elements of types without quotation marks'
-            reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
+            reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=_QUOTED)
             self.stand_in(("STRING", piece), start, end)
         elif kind == "point":
             reports.error("RCL105", f"`{_short(piece)}` is no number", start, end, hint=f"write `0{_short(piece)}`")
-            self.found.append(Token("NUMBER", "1", start, end))
+            self.stand_in(("NUMBER", "1"), start, end)
         elif kind == "word":
-            self.word(piece, start, end)
+            message = f"the name `{_short(piece)}` is not made of the letters A-Z and a-z"
+            hint = "names are made of the letters A-Z and a-z, digits, `_` and primes"
+            reports.error("RCL107", message, start, end, hint=hint)
+            self.stand_in(("NAME", piece), start, end)
         elif kind == "old_comment":
             reports.error("RCL102", "`--` does not begin a comment", start, start + 2, hint="write `// …`")
-            reports.torn.append(start)
+            reports.torn.append(start)  # it may have been a double minus
         elif kind == "open_string":
             reports.error("RCL104", "this string is not closed on its line", start, end, hint='close it with `"`')
             reports.torn.append(start)
             self.found.append(Token("STRING", piece, start, end))
         else:
-            self.other(piece, start, end)
+            return self.junk(start, end)
         return end
 
     def stand_in(self, token: tuple[str, str], start: int, end: int) -> None:
@@ -203,20 +205,16 @@ class _Other:
         self.found.append(Token(*token, start, end))
 
     def sign(self, piece: str, start: int, end: int) -> int:
-        reports = self.reports
-        if piece == "#" and not reports.source.text[reports.source.text.rfind("\n", 0, start) + 1 : start].strip():
+        reports, text = self.reports, self.reports.source.text
+        if piece == "#" and not text[text.rfind("\n", 0, start) + 1 : start].strip():
             reports.error("RCL102", "`#` does not begin a comment", start, end, hint="write `// …`")
-            line_end = reports.source.text.find("\n", start)
-            return line_end if line_end >= 0 else len(reports.source.text)
-        if piece == "~" and (private := _PRIVATE.match(reports.source.text, start)) and self.among_topics():
+            line_end = text.find("\n", start)
+            return line_end if line_end >= 0 else len(text)
+        if piece == "~" and (private := _PRIVATE.match(text, start)) and self.among_topics():
             self.found.append(Token("NAME", private.group(), start, private.end()))
             return private.end()
         hint, token = foreign(piece)
-        if piece == "::" and len(self.found) > 1 and self.found[-2].start in reports.odd:
-            self.found.append(Token("SLASH", "/", start, end))  # `std_msgs::msg::Bool` is one mistake
-            return end
-        if token is None or token[0] != "UPTO" or not self.square:  # `[0..9]` is one mistake
-            reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
+        reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
         if token is None or piece == "::":  # which may stand for several things
             reports.torn.append(start)
         if token is not None:
@@ -228,138 +226,63 @@ class _Other:
         return next((t.type for t in reversed(self.found) if t.type in _SECTIONS), "") == "TOPICS"
 
     def bracket(self, piece: str, start: int, end: int) -> None:
-        """A square bracket: of an item (`s[0]`), an array type (`REAL[]`), an interval, or a collection."""
-        reports, text = self.reports, self.reports.source.text
+        """A square bracket of a limit (``once[5 steps]``) or of a record type; an error anywhere else."""
+        text = self.reports.source.text
         last = self.found[-1] if self.found else Token("", "", -1, -1)
-        limits = last.type == "SINCE" or (last.type == "NAME" and last.text in LIMITED)
-        if piece == "[" and limits and not text[last.end : start].strip():
-            self.square.append(("RSQUARE", "]"))
-            self.found.append(Token("LSQUARE", "[", start, end))
-            return
-        if piece == "]" and self.square:
-            kind, sign = self.square.pop()
-            if kind == "RSQUARE":
-                self.found.append(Token(kind, sign, start, end))
-            elif kind:
-                self.stand_in((kind, sign), start, end)
-            return
-        if piece == "[" and _RECORD.match(text, end):
-            self.square.append(("RSQUARE", "]"))
-            self.found.append(Token("LSQUARE", "[", start, end))
-            return
-        hint, opening, closing = "write sets as `{a, b}` and sequences as `<a, b>`", "", ("", "")
-        before = self.found[-1] if self.found and piece == "[" else Token("", "", -1, -1)
-        if before.type == "BUILTIN" or before.text in FOREIGN_TYPES or _ARRAY.match(text, end):
-            hint = "a type of sequences is written `<REAL>`; a topic has the type of its message, `package/Type`"
-        elif before.type in ("NAME", "RPAR") and before.end == start:
-            hint = "the item of a sequence at position i is written `s(i)`"
-            opening, closing = "(", ("RPAR", ")")
-        elif before.type in ("IN", "NOT_IN"):
-            hint = "write a set as `{a, b}`, whole numbers as `<0 upto 9>`, an interval of reals as `0 <= r <= 9`"
-        reports.error("RCL101", f"`{piece}` is not RCL", start, end, hint=hint)
-        if opening:
-            self.stand_in(("LPAR", opening), start, end)
-        else:
-            reports.torn.append(start)
-        if piece == "[":
-            self.square.append(closing)
+        limit = (last.type == "SINCE" or last.text in LIMITED) and not text[last.end : start].strip()
+        if piece == "[" and (limit or _RECORD.match(text, end)):
+            self.square += 1
+            self.found.append(Token("LSQUARE", piece, start, end))
+        elif piece == "]" and self.square:
+            self.square -= 1
+            self.found.append(Token("RSQUARE", piece, start, end))
+        elif piece == "[" or not self.reports.torn:  # the partner of one that was reported is not
+            self.reports.error("RCL101", f"`{piece}` is not RCL", start, end, hint=_BRACKET)
+            self.reports.torn.append(start)
 
-    def section(self, word: str, kind: str, start: int, end: int) -> Token:
-        """A keyword that begins a clause or section; or one that someone took for a name, or for `in`."""
-        reports, text = self.reports, self.reports.source.text
-        before = self.found[-1].type if self.found else ""
-        if before == "SLASH" and self.found[-1].end == start and self.among_topics():
-            return Token("NAME", word, start, end)  # a segment of a topic's name
-        if kind in ("INPUTS", "OUTPUTS") and before != "RPAR" and _PORT.match(text, end):
-            meant = "in" if kind == "INPUTS" else "out"
-            reports.error("RCL101", f"`{word}.` is not RCL", start, end, hint=f"write `{meant}.`")
-            return Token(meant.upper(), meant, start, end)
-        if (before in _WITHIN or before in _CONNECTIVES) and _GOES_ON.match(text, end):
+    def section(self, word: str, kind: str, start: int, end: int) -> str:
+        """The token type of a keyword that begins a clause or section, or that someone took for a name."""
+        reports = self.reports
+        before = self.found[-1] if self.found else Token("", "", -1, -1)
+        if before.type == "SLASH" and before.end == start and self.among_topics():
+            return "NAME"  # a segment of a topic's name
+        if kind in ("INPUTS", "OUTPUTS") and _PORT.match(reports.source.text, end):
+            return "NAME"  # `inputs.r`, which has no meaning
+        if before.type in _OPERAND_FOLLOWS and _GOES_ON.match(reports.source.text, end):
             message = f"`{word}` is a keyword and cannot be a name"
             reports.error("RCL120", message, start, end, hint=f"choose another, such as `{word}_`")
             reports.odd.add(start)
-            return Token("NAME", word, start, end)
-        return Token(kind, word, start, end)
+            return "NAME"
+        return kind
 
-    def word(self, piece: str, start: int, end: int) -> None:
-        """A name with letters that names do not have: read as one all the same."""
-        if self.found and self.found[-1].end == start and self.found[-1].text[:1].isalpha():
-            before = self.found.pop()
-            piece, start = before.text + piece, before.start
-        message = f"the name `{_short(piece)}` is not made of the letters A-Z and a-z"
-        hint = "names are made of the letters A-Z and a-z, digits, `_` and primes"
-        self.reports.error("RCL107", message, start, end, hint=hint)
-        self.stand_in(("NAME", piece), start, end)
-
-    def other(self, character: str, start: int, end: int) -> None:
-        """A character that has no place: a full-width sign, one that nobody sees, or any other."""
-        plain = wide(character)
-        if plain is not None and plain in SYMBOLS:
-            hint = f"write the plain sign `{plain}`"
-            self.reports.error("RCL101", f"`{character}` is not RCL", start, end, hint=hint)
-            self.stand_in((SYMBOLS[plain], plain), start, end)
-            return
-        if invisible(character) is not None:
-            first, count = self.unseen.get(character, (start, 0))
-            self.unseen[character] = (first, count + 1)
-            if not character.isspace():  # it may split a name in two
-                self.reports.torn.append(start)
-            return
+    def junk(self, start: int, end: int) -> int:
+        """Characters that have no place, up to the next that has one."""
+        text = self.reports.source.text
         self.reports.torn.append(start)
-        begun, ended = self.junk
-        if ended != start:
-            self.finish_junk()
-            begun = start
-        self.junk = (begun, end)
-
-    def finish_junk(self) -> None:
-        start, end = self.junk
-        if start < 0:
-            return
-        piece = self.reports.source.text[start:end]
+        while end < len(text) and (match := _PATTERN.match(text, end)) and match.lastgroup == "junk":
+            end += 1
+        piece = text[start:end]
+        unseen = invisible(piece[0])
         what = "character" if len(piece) == 1 else "characters"
-        verb = "has" if len(piece) == 1 else "have"
-        message = f"the {what} {_visible(_short(piece))} {verb} no place in RCL"
-        self.reports.error("RCL107", message, start, end)
-        self.junk = (-1, -1)
-
-    def finish(self) -> None:
-        self.finish_junk()
-        for character, (start, count) in self.unseen.items():
-            often = f", {count} times" if count > 1 else ""
-            message = f"the invisible character {invisible(character)} has no place in RCL{often}"
-            hint = "replace it by a plain space" if character.isspace() else "delete it"
-            self.reports.error("RCL107", message, start, start + 1, hint=f"{hint}: it may come from a copied text")
+        shown = unseen or (f"`{_short(piece)}`" if piece.isprintable() else ascii(_short(piece)))
+        hint = "delete it: it may come from a copied text" if unseen else None
+        self.reports.error("RCL107", f"no place in RCL for the {what} {shown}", start, end, hint=hint)
+        return end
 
 
 def _number(reports: Reports, match: re.Match[str], start: int, end: int) -> Token:
     number, tail = match.group("number"), match.group("tail")
-    if tail:
-        message = f"`{_short(number + tail)}` is neither a number nor a name"
-        reports.error("RCL105", message, start, end, hint=_about_tail(number, tail))
-        reports.odd.add(start)
-        return Token("NUMBER", "1", start, end)
-    if len(number) > DIGITS:
-        message = f"this number has {len(number)} digits; {DIGITS} is the most"
-        reports.error("RCL105", message, start, end)
-        return Token("NUMBER", "1", start, end)
-    return Token("NUMBER", number, start, end)
-
-
-def _about_tail(number: str, tail: str) -> str:
-    if tail.startswith("."):
-        return "a decimal has digits after its one point"
-    if re.fullmatch(r"[eE][0-9]*", tail):
-        return "write the number out: RCL has no exponents"
-    if re.fullmatch(r"[fFdDlLuU]+", tail):
-        return f"write `{_short(number)}`: numbers have no endings"
-    if number == "0" and re.fullmatch(r"[xXbBoO][0-9A-Fa-f_]+", tail):
-        return "write the number in decimal"
-    if tail in UNITS or tail in LONG_UNITS:
-        return f"write `{_short(number)} {tail}`"
-    if re.fullmatch(r"[0-9_']+", tail):
-        return f"write `{_short(number + re.sub('[^0-9]', '', tail))}`"
-    return "names begin with a letter, and numbers have no units"
+    if not tail and len(number) <= DIGITS:
+        return Token("NUMBER", number, start, end)
+    message = f"`{_short(number + tail)}` is neither a number nor a name"
+    hint = "write numbers as `12` or `0.25`, without exponent or ending; names begin with a letter"
+    if not tail:
+        message, hint = f"this number has {len(number)} digits; {DIGITS} is the most", "round it"
+    elif tail in _UNITS:
+        hint = f"write `{_short(number)} {tail}`"
+    reports.error("RCL105", message, start, end, hint=hint)
+    reports.odd.add(start)
+    return Token("NUMBER", "1", start, end)
 
 
 def _check_escapes(reports: Reports, piece: str, start: int) -> None:
@@ -385,9 +308,3 @@ def quote(value: str) -> str:
 
 def _short(text: str) -> str:
     return text if len(text) <= 24 else text[:21] + "…"
-
-
-def _visible(text: str) -> str:
-    if text.isprintable():
-        return f"`{text}`"
-    return ascii(text)

@@ -7,12 +7,14 @@ line; on a line of its own, for the declaration, node or part of a node that fol
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import permutations
 
 from avow.base.codes import CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.base.persons import distance
 from avow.base.records import dataclass
+from avow.base.suggestions import distance
+from avow.language import terms as t
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.lexer import Token
@@ -23,27 +25,6 @@ from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.subterms import subterms
 from avow.language.syntax import Define, FileSyntax, Name, NodePort, NodeSyntax, Syntax, walk
-from avow.language.terms import (
-    TRUE,
-    And,
-    Arithmetic,
-    Compare,
-    Conditional,
-    EnumValue,
-    History,
-    Implies,
-    In,
-    Index,
-    Literal,
-    Or,
-    Past,
-    Quantified,
-    Quantifier,
-    Role,
-    SetTerm,
-    Term,
-    Variable,
-)
 
 _ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")
 _CODE = re.compile(r"[A-Za-z]+[0-9]+")
@@ -94,11 +75,15 @@ def of_all(contract: Contract, files: Sequence[LintedFile], of_nodes: Iterable[f
 
 
 def tell(found: Iterable[Diagnostic], files: Sequence[LintedFile], off: frozenset[str]) -> None:
-    """Report what is not switched off, and what the files' comments do not allow."""
+    """Report what is not switched off, by its code or its whole message, and what the files' comments do not allow."""
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
     for diagnostic in (*found, *(unknown for file in files for unknown in _no_lints(file))):
-        if diagnostic.code in off or diagnostic.span is None or diagnostic.span.file not in by_name:
+        if (
+            {diagnostic.code, diagnostic.message} & off
+            or diagnostic.span is None
+            or diagnostic.span.file not in by_name
+        ):
             continue
         line = diagnostic.span.line
         if any(diagnostic.code in codes and a <= line <= b for codes, a, b in allowances[diagnostic.span.file]):
@@ -214,19 +199,20 @@ def _spoken(tree: Syntax) -> set[str]:
 
 
 def _about_node(node: Node) -> Iterator[Diagnostic]:
+    written = not node.unwritten
     in_clauses = {v for clause in node.clauses for v in _variables(clause.formula)}
     in_guarantees = {v for clause in node.guarantees for v in _variables(clause.formula)}
-    for port in node.inputs:
-        if (Role.INPUT, port.name) not in in_clauses:
+    for port in node.inputs if written else ():
+        if (t.Role.INPUT, port.name) not in in_clauses:
             message = f"no clause of `{node.name}` speaks of its input `{port.name}`"
             yield _warning("RCL402", message, port.span, "remove it, or say what the node does with it")
-    for port in node.outputs:
-        if (Role.OUTPUT, port.name) not in in_guarantees:
+    for port in node.outputs if written else ():
+        if (t.Role.OUTPUT, port.name) not in in_guarantees:
             message = f"no guarantee of `{node.name}` speaks of its output `{port.name}`: it may be anything"
             yield _warning("RCL403", message, port.span, "add a guarantee about it, or remove it")
-    matched = {(t.port.role, t.port.name) for t in node.topics if t.port is not None}
+    matched = {(topic.port.role, topic.port.name) for topic in node.topics if topic.port is not None}
     ports = (*node.inputs, *node.outputs)
-    for topic in node.topics:
+    for topic in node.topics if written else ():
         if topic.port is None:
             near = next((p for p in ports if p.name == topic.name), None)
             hint = f"write `{topic.name} matches({near.role}.{near.name})`" if near is not None else None
@@ -235,12 +221,12 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
     silent = [p for p in ports if (p.role, p.name) not in matched]
     if node.topics:
         for port in silent:
-            message = f"no topic of `{node.name}` carries `{port.role}.{port.name}`"
+            message = uncarried(node.name, f"{port.role}.{port.name}")
             yield _warning("RCL405", message, port.span, "list its topic, with `matches(…)`")
     elif silent:
         names = ", ".join(f"`{p.role}.{p.name}`" for p in silent[:6]) + (", …" if len(silent) > 6 else "")
         yield _warning("RCL405", f"`{node.name}` has no topics: nothing carries {names}", silent[0].span)
-    carriers: dict[tuple[Role, str], str] = {}
+    carriers: dict[tuple[t.Role, str], str] = {}
     for topic in node.topics:
         if topic.port is None:
             continue
@@ -249,10 +235,10 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
             message = f"two topics carry `{topic.port.role}.{topic.port.name}`: `{first}` and `{topic.name}`"
             yield _warning("RCL411", message, topic.span, "monitors read it from the first, unless the plan says which")
     for clause in node.assumptions:
-        if clause.formula != TRUE and _always(clause.formula):
+        if clause.formula != t.TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"
             yield _warning("RCL408", message, clause.formula.span, "leave it out, or say what was meant")
-        spoken = sorted(name for role, name in _variables(_now(clause.formula)) if role is Role.OUTPUT)
+        spoken = sorted(name for role, name in _variables(_now(clause.formula)) if role is t.Role.OUTPUT)
         if spoken:
             message = f"the assumption `{clause.name}` speaks of the node's own output `{spoken[0]}`"
             yield _warning("RCL416", message, clause.formula.span, "assume of inputs, guarantee of outputs")
@@ -271,6 +257,11 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         for mismatch in mismatches(clause, elements):
             yield _warning(mismatch.code, mismatch.message, clause.sentence_span, mismatch.hint)
     yield from _looked_up(node)
+
+
+def uncarried(node: str, port: str) -> str:
+    """What RCL405 says of a variable."""
+    return f"no topic of `{node}` carries `{port}`"
 
 
 def _looked_up(node: Node) -> Iterator[Diagnostic]:
@@ -292,75 +283,59 @@ def _looked_up(node: Node) -> Iterator[Diagnostic]:
         )
 
 
-def _variables(term: Term, *roles: Role) -> set[tuple[Role, str]]:
-    return {(t.role, t.name) for t in subterms(term) if isinstance(t, Variable) and t.role in (roles or Role)}
+def _variables(term: t.Term, *roles: t.Role) -> set[tuple[t.Role, str]]:
+    return {
+        (item.role, item.name)
+        for item in subterms(term)
+        if isinstance(item, t.Variable) and item.role in (roles or t.Role)
+    }
 
 
-def _now(term: Term) -> Term:
+def _now(term: t.Term) -> t.Term:
     """The term without the values before: what it says of this step."""
-    if isinstance(term, History) and term.operator is Past.PREVIOUS:
+    if isinstance(term, t.History) and term.operator is t.Past.PREVIOUS:
         return _now(term.arguments[1])
     parts = tuple(map(_now, term.children))
     return term.rebuild(parts) if parts else term
 
 
-def _unused(term: Term) -> Iterator[Variable]:
+def _unused(term: t.Term) -> Iterator[t.Variable]:
     for part in subterms(term):
-        if isinstance(part, Quantified):
-            used = {name for role, name in _variables(part.body) if role is Role.BOUND}
+        if isinstance(part, t.Quantified):
+            used = {name for role, name in _variables(part.body) if role is t.Role.BOUND}
             yield from (v for v in part.variables if v.name not in used)
 
 
-def _calculated(term: Term) -> Iterator[Term]:
+def _calculated(term: t.Term) -> Iterator[t.Term]:
     """The positions of elements that are calculated from quantified ones."""
     for part in subterms(term):
-        if isinstance(part, Index) and isinstance(part.index, Arithmetic) and _variables(part.index, Role.BOUND):
+        if isinstance(part, t.Index) and isinstance(part.index, t.Arithmetic) and _variables(part.index, t.Role.BOUND):
             yield part.index
 
 
-def _always(term: Term) -> bool:
+def _always(term: t.Term) -> bool:
     """Whether the sorts alone make the formula true; False where that is not plain."""
     match term:
-        case Literal(value=True):
+        case t.Literal(value=True):
             return True
-        case In(item=item, collection=SetTerm(items=items)):
+        case t.In(item=item, collection=t.SetTerm(items=items)):
             if items and item in items:
                 return True
             sort = item.sort
-            names = {i.name for i in items if isinstance(i, EnumValue)}
+            names = {i.name for i in items if isinstance(i, t.EnumValue)}
             return isinstance(sort, EnumSort) and names >= set(sort.members)
-        case Compare(operator="==" | "<=" | ">=", left=left, right=right) if left == right:
+        case t.Compare(operator="==" | "<=" | ">=", left=left, right=right) if left == right:
             return True
-        case Compare(operator=">=", left=left, right=Literal(value=value)) if value == 0:
+        case t.Compare(operator=">=", left=left, right=t.Literal(value=value)) if value == 0:
             return isinstance(left.sort, NaturalSort)
-        case Compare(operator="<=", left=Literal(value=value), right=right) if value == 0:
+        case t.Compare(operator="<=", left=t.Literal(value=value), right=right) if value == 0:
             return isinstance(right.sort, NaturalSort)
-        case And(items=items):
+        case t.And(items=items):
             return all(map(_always, items))
-        case Or(items=items):
-            return any(map(_always, items)) or _covers(items)
-        case Implies(right=right):
-            return _always(right)
-        case Quantified(quantifier=Quantifier.FORALL, body=body):
+        case t.Or(items=items):
+            return any(map(_always, items))
+        case t.Implies(right=body) | t.Quantified(quantifier=t.Quantifier.FORALL, body=body):
             return _always(body)
-        case Conditional(then=then, otherwise=otherwise):
-            return _always(then) and _always(otherwise)
-    return False
-
-
-def _covers(items: Sequence[Term]) -> bool:
-    """``s == red or s == orange or s == green``, all values of the type; or ``b or not b`` written as comparisons."""
-    seen: dict[Term, set[str]] = {}
-    for item in items:
-        match item:
-            case Compare(operator="==", left=left, right=EnumValue(name=name, sort=sort)):
-                seen.setdefault(left, set()).add(name)
-                if seen[left] >= set(sort.members):
-                    return True
-            case Compare(operator="==", left=left, right=Literal(value=bool() as value)):
-                seen.setdefault(left, set()).add(str(value))
-                if len(seen[left]) == 2:
-                    return True
     return False
 
 
@@ -368,43 +343,26 @@ def _covers(items: Sequence[Term]) -> bool:
 
 
 def _spellings(contract: Contract) -> Iterator[Diagnostic]:
-    packages: dict[str, Span | None] = {}
-    types: dict[str, Span | None] = {}
-    topics: dict[str, Span | None] = {}
-    ports: dict[str, Span | None] = {}
-    together: set[frozenset[str]] = set()
+    """Names of one kind that look like one name, unless one node uses both: then they are different things."""
+    places: dict[str, dict[str, Span | None]] = {what: {} for what in ("package", "message type", "topic", "variable")}
+    together: set[tuple[str, str]] = set()
     for node in contract.nodes:
         for topic in node.topics:
             package, slash, name = topic.ros_type.partition("/")
-            if slash:
-                packages.setdefault(package, topic.span)
-                types.setdefault(name, topic.span)
-            topics.setdefault(topic.name, topic.span)
-        here = (*node.inputs, *node.outputs)
-        for port in here:
-            ports.setdefault(port.name, port.span)
-        together.update(frozenset((p.name, q.name)) for p in here[:200] for q in here[:200] if p.name != q.name)
-        names = [t.name for t in node.topics][:200]
-        together.update(frozenset((a, b)) for a in names for b in names if a != b)
-    for what, table, apart in (
-        ("package", packages, set[frozenset[str]]()),
-        ("message type", types, set[frozenset[str]]()),
-        ("topic", topics, together),
-        ("variable", ports, together),
-    ):
-        yield from _alike(what, table, apart)
-
-
-def _alike(what: str, table: Mapping[str, Span | None], apart: Iterable[frozenset[str]]) -> Iterator[Diagnostic]:
-    """Names of one kind that look like one name; `apart` are pairs that one node uses side by side, so that they are
-    different things."""
-    distinct = set(apart)
-    for earlier, later in similar(list(table)):
-        if frozenset((earlier, later)) in distinct:
-            continue
-        message = f"the {what}s `{earlier}` and `{later}` differ in a letter or two"
-        note = (f"`{earlier}` is here", table[earlier])
-        yield _warning("RCL406", message, table[later], "if one thing is meant, write it one way", note)
+            for what, written in (("package", package), ("message type", name)) if slash else ():
+                places[what].setdefault(written, topic.span)
+            places["topic"].setdefault(topic.name, topic.span)
+        ports = (*node.inputs, *node.outputs)
+        for port in ports:
+            places["variable"].setdefault(port.name, port.span)
+        together.update(permutations([port.name for port in ports][:200], 2))
+        together.update(permutations([topic.name for topic in node.topics][:200], 2))
+    for what, table in places.items():
+        for earlier, later in similar(list(table)):
+            if what in ("package", "message type") or (earlier, later) not in together:
+                message = f"the {what}s `{earlier}` and `{later}` differ in a letter or two"
+                note = (f"`{earlier}` is here", table[earlier])
+                yield _warning("RCL406", message, table[later], "if one thing is meant, write it one way", note)
 
 
 _DIGITS = re.compile(r"[0-9]+|'+$")

@@ -108,13 +108,10 @@ def decode(data: bytes, file: str) -> Source | Diagnostic:
         line = data.count(b"\n", 0, error.start) + 1
         begin = data.rfind(b"\n", 0, error.start) + 1
         column = len(data[begin : error.start].decode("utf-8", "replace")) + 1
-        hint = "save the file as UTF-8"
         if b"\0" in data and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
             return Diagnostic("RCL005", "the file holds NUL characters: it is not a text", start)
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            hint = "this looks like UTF-16: save the file as UTF-8"
         message = f"the file is not UTF-8: the byte 0x{data[error.start]:02X} cannot stand here"
-        return Diagnostic("RCL004", message, Span(file, line, column, line, column + 1), hint=hint)
+        return Diagnostic("RCL004", message, Span(file, line, column, line, column + 1), hint="save the file as UTF-8")
     return clean_text(text, file)
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 from avow.base.diagnostics import Span
 from avow.base.suggestions import did_you_mean
-from avow.base.tuning.sizes import CONTRACT_PARTS, NESTING
+from avow.base.tuning.sizes import CLAUSE_PARTS, NESTING
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
 from avow.language.definedness import with_value
-from avow.language.flat import flat
+from avow.language.flat import flat_text
 from avow.language.lexer import Token, unquote
 from avow.language.printer import show_type
 from avow.language.scope import Defined, Scope
@@ -47,7 +47,8 @@ def check_ports(
             if sort is None or not declarations.is_small(name.text, sort_extent(sort), name, reports):
                 node.broken.add(name.text)
                 continue
-            type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else flat(part.type)
+            written = flat_text(reports.source.text[part.type.start : part.type.end])
+            type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else written
             ports[name.text] = Port(role, name.text, sort, type_name, reports.source.span(name.start, name.end))
         found.append(ports)
     return found[0], found[1]
@@ -142,21 +143,16 @@ def _clause(
 def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:
     """Whether the formula with its constants written out can still be worked with. Without constants it is as large and
     as deep as it is written, which the parser has seen to."""
-    environment = scope.environment
-    if not environment.constants and not scope.defined:
+    if not scope.environment.constants and not scope.defined:
         return True
     size, depth = term_extent(formula)
-    before = environment.written_out
-    environment.written_out += size
-    hint = "use fewer or smaller constants"
-    if environment.written_out > CONTRACT_PARTS >= before:
-        message = f"up to here, the formulas have more than {CONTRACT_PARTS:,} parts once constants are written out"
-        reports.error("RCL110", message, place.start, place.end, hint=hint)
-    elif depth > 2 * NESTING:
-        message = f"with its constants written out, this is nested {depth} levels deep; {2 * NESTING} is the most"
-        reports.error("RCL110", message, place.start, place.end, hint=hint)
-        return False
-    return environment.written_out <= CONTRACT_PARTS
+    if size <= CLAUSE_PARTS and depth <= 2 * NESTING:
+        return True
+    what = f"{size:,} parts" if size > CLAUSE_PARTS else f"{depth} levels"
+    most = f"{CLAUSE_PARTS:,} parts and {2 * NESTING} levels are the most"
+    message = f"with its constants written out, this has {what}; {most}"
+    reports.error("RCL110", message, place.start, place.end, hint="use fewer or smaller constants")
+    return False
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:
@@ -172,7 +168,9 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
         port = _matched(tree.role, tree.port, scope, reports) if tree.port is not None else None
         if tree.port is not None and port is None:
             continue
-        topic = Topic(flat(tree.type), name.text, port, reports.source.span(tree.start, tree.end))
+        topic = Topic(
+            "/".join(part.text for part in tree.type.names), name.text, port, reports.source.span(tree.start, tree.end)
+        )
         earlier = seen.setdefault(part_topic(name.text, topic.ros_type), [])  # a service has two types: its parts
         if _goes_with(topic, earlier, name, reports):
             earlier.append(topic)
@@ -181,17 +179,14 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
 
 def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Reports) -> bool:
     """Whether a topic may be listed again like this; reports it if not."""
-    other = next((t for t in earlier if _same_type(t) != _same_type(topic)), None)
-    message = f"the topic `{topic.name}` has two types"
-    hint = "a topic has one type: write the same, or another topic"
-    if other is None:
-        other = next((t for t in earlier if t.port == topic.port or t.port is None or topic.port is None), None)
-        message = f"the topic `{topic.name}` is listed twice"
-        hint = (
-            "remove one of the two; a topic that carries several variables is listed once for each, with `matches(…)`"
-        )
+    other = next((t for t in earlier if _same_type(t) != _same_type(topic) or t.port in (None, topic.port)), None)
+    other = other or (earlier[0] if earlier and topic.port is None else None)
     if other is None:
         return True
+    message = f"the topic `{topic.name}` is listed twice" + (
+        " with two types" if other.ros_type != topic.ros_type else ""
+    )
+    hint = "a topic has one type, and is listed once, or once for each variable with `matches(…)`"
     notes = ((f"`{topic.name}` is first listed here", other.span),)
     reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)
     return False
@@ -205,7 +200,7 @@ def _same_type(topic: Topic) -> tuple[str, ...]:
 
 def _check_ros_type(tree: RosType, reports: Reports) -> None:
     parts = [part.text for part in tree.names]
-    shown = flat(tree)
+    shown = "/".join(parts)
     if len(parts) == 1 and parts[0] not in ROS_BUILTINS:
         hint = did_you_mean(shown, ROS_BUILTINS) or f"write the package before it: `package/{shown}`"
         reports.error("RCL217", f"ROS has no built-in type `{shown}`", tree.start, tree.end, hint=hint)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.base.suggestions import nearest
 from avow.language.contract import ClauseKind
-from avow.language.expectations import NEAR_SECTIONS, SECTION_FORMS, about_keyword
+from avow.language.expectations import SECTION_FORMS, about_keyword
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
@@ -20,9 +21,13 @@ _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _NESTED = {**_OPEN, "LSQUARE": "RSQUARE"}
 _CLOSE = frozenset(_OPEN.values())
 _TOP = frozenset(("CONTEXT", "NODE"))
-_SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "DEFINE", "ASSUME", "GUARANTEE"))
-_SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
 _ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "STEPS": 3, "DEFINE": 4, "ASSUME": 5, "GUARANTEE": 6}
+_LISTS = ("INPUTS", "OUTPUTS", "TOPICS")
+_CLAUSES = {"ASSUME": ClauseKind.ASSUMPTION, "GUARANTEE": ClauseKind.GUARANTEE}
+_SECTIONS = frozenset((*_LISTS, "DEFINE", *_CLAUSES))
+_CONTEXTS = frozenset(("context", "contexts", "type", "types", "constant", "constants"))
+"""What earlier tools and hasty authors write for `context`."""
+_SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
 
 
 def read(tokens: Sequence[Token], reports: Reports) -> FileSyntax:
@@ -54,16 +59,14 @@ class _OutlineReader:
         token = self.tokens[at]
         return f"`{token.text[:40]}`", token.start, token.end
 
-    def complain(self, code: str, message: str, at: int, hint: str | None = None) -> None:
-        words, start, end = self.found(at)
-        near = self.tokens[at - 1].start if 0 < at <= len(self.tokens) else start
+    def complain(self, code: str, message: str, hint: str | None = None) -> None:
+        """Reports the token here, `%` in the message, unless it is a consequence of what was reported before."""
+        words, start, end = self.found(self.at)
+        near = self.tokens[self.at - 1].start if 0 < self.at <= len(self.tokens) else start
         if self.reports.is_torn(near, end) or start in self.reports.odd or start == self.complained:
-            return  # something stands here that could not be read, which has been said
+            return
         self.complained = start
         self.reports.error(code, message.replace("%", words, 1), start, end, hint=hint)
-
-    def no_clause(self, hint: str) -> None:
-        self.complain("RCL111", f"`{self.tokens[self.at].text}` is not a clause of RCL", self.at, hint)
 
     # --- the file ----------------------------------------------------------------------------------------------------
 
@@ -72,77 +75,65 @@ class _OutlineReader:
         if not self.tokens and not self.reports.failed:
             self.reports.error("RCL001", "there is no contract here: neither a context nor a node", 0, 0)
         while self.at < len(self.tokens) and not self.reports.full:
-            if self.kind() == "CONTEXT":
-                contexts += 1
-                if contexts > 1:
-                    self.complain("RCL112", "a second `context` in one file", self.at, "put all into one `context`")
-                self.at += 1
-                self.context()
-            elif self.kind() == "NODE":
-                self.node()
-            elif self.kind() == "NAME" and self.tokens[self.at].text.lower() in ("context", "contexts"):
-                self.no_clause("write `context`")
-                self.at += 1
-                self.context()
-            elif self.kind() == "NAME" and (
-                self.tokens[self.at].text.lower() == "node" or (self.kind(1) == "NAME" and self.kind(2) == "LBRACE")
-            ):
-                self.no_clause("write `node`")
-                self.node()
-            elif self.kind() == "NAME" and self.kind(1) == "LBRACE":
-                word = self.tokens[self.at].text
-                if word in ("types", "constants", "type", "constant"):
-                    hint = "types (`Name : type;`) and constants (`Name = value;`) both belong in one `context { … }`"
-                    self.no_clause(hint)
+            match self.clause():
+                case "CONTEXT":
+                    contexts += self.kind() == "CONTEXT"
+                    if contexts > 1:
+                        self.complain("RCL112", "a second `context` in one file", "put all into one `context`")
                     self.at += 1
                     self.context()
-                else:
-                    self.complain(
-                        "RCL111", "expected `context` or `node` and not %", self.at, f"write `node {word} {{`"
-                    )
-                    self.at += 1
-                    self.skip_block()
-            else:
-                hint = "a file is one `context { … }` and any number of `node NAME { … }`"
-                if self.kind() in _SECTIONS:
-                    hint = "this belongs inside a `node NAME { … }`"
-                message = "expected `context` or `node` and not %"
-                if self.kind() in _CLOSE:
-                    message, hint = "% closes nothing", "remove it, or find where a bracket was closed too early"
-                self.complain("RCL111", message, self.at, hint)
-                self.at += 1
-                self.skip_to_top()
+                case "NODE":
+                    self.node()
+                case _:  # reported: reading goes on at the next clause
+                    self.skip_to_top()
         return self.out
 
-    def skip_to_top(self) -> None:
-        while self.at < len(self.tokens) and self.kind() not in _TOP:
-            if self.kind() == "NAME" and self.kind(1) == "LBRACE":
-                return
-            self.at += 1
+    def clause(self) -> str:
+        """The clause that begins here, or that a word seems to mean; empty, and reported, where there is none."""
+        kind = self.kind()
+        if kind in _TOP:
+            return kind
+        hint = "a file is one `context { … }` and any number of `node NAME { … }`"
+        message, meant = "expected `context` or `node` and not %", ""
+        if kind == "NAME" and self.kind(1) == "LBRACE" and self.tokens[self.at].text.lower() in _CONTEXTS:
+            hint, meant = (
+                "types (`Name : type;`) and constants (`Name = value;`) belong in one `context { … }`",
+                "CONTEXT",
+            )
+        elif kind == "NAME" and self.kind(1) == "NAME" and self.kind(2) == "LBRACE":
+            hint, meant = "write `node`", "NODE"
+        elif kind in _SECTIONS:
+            hint = "this belongs inside a `node NAME { … }`"
+        elif kind in _CLOSE:
+            message, hint = "% closes nothing", "remove it, or find where a bracket was closed too early"
+        self.complain("RCL111", message, hint)
+        return meant
 
-    def skip_block(self) -> None:
-        depth = 0
+    def skip_to_top(self) -> None:
+        """Past the token here, to where a clause may begin."""
+        self.at += 1
         while self.at < len(self.tokens) and self.kind() not in _TOP:
-            depth += (self.kind() == "LBRACE") - (self.kind() == "RBRACE")
-            self.at += 1
-            if depth <= 0:
+            if self.kind() == "NAME" and (
+                self.kind(1) == "LBRACE" or (self.kind(1), self.kind(2)) == ("NAME", "LBRACE")
+            ):
                 return
+            self.at += 1
 
     def open_brace(self, what: str) -> Token | None:
-        if self.kind() == "LBRACE":
-            self.at += 1
-            return self.tokens[self.at - 1]
-        words, _, _ = self.found(self.at)
-        no_name = words in ("`-`", "`.`", "`/`")
-        hint = "names are made of letters, digits and `_`" if no_name else f"write `{{` after {what}"
-        self.complain("RCL113", f"expected `{{` after {what} and not %", self.at, hint)
-        for ahead in range(1, 5):  # what is left of a name that is none
-            if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
-                break
-            if self.kind(ahead) == "LBRACE":
-                self.at += ahead + 1
-                return self.tokens[self.at - 1]
-        return None
+        if self.kind() != "LBRACE":
+            self.complain(
+                "RCL113", f"expected `{{` after {what} and not %", "names are made of letters, digits and `_`"
+            )
+            for ahead in range(1, 5):  # what is left of a name that is none
+                if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
+                    return None
+                if self.kind(ahead) == "LBRACE":
+                    self.at += ahead
+                    break
+            else:
+                return None
+        self.at += 1
+        return self.tokens[self.at - 1]
 
     # --- context -----------------------------------------------------------------------------------------------------
 
@@ -156,7 +147,7 @@ class _OutlineReader:
                 self.at += 1
                 return
             if self.kind() == "SEMICOLON":
-                self.complain("RCL113", "% ends nothing here", self.at, "remove it")
+                self.complain("RCL113", "% ends nothing here", "remove it")
                 self.at += 1
                 continue
             count += 1
@@ -189,19 +180,11 @@ class _OutlineReader:
                 stack.pop()
             self.at += 1
         if self.at == first:  # a keyword where a declaration should begin
-            self.complain(
-                "RCL113", "expected a declaration and not %", self.at, "write `Name : type;` or `Name = value;`"
-            )
-            self.at += 1
+            self.complain("RCL113", "expected a declaration and not %", "write `Name : type;` or `Name = value;`")
             self.skip_to_top()
             return None
-        text = self.reports.source.text
-        part = [
-            t._replace(type="EQUALS") if t.type == "EQ" and text.startswith(":=", t.start) else t
-            for t in self.tokens[first : self.at]
-        ]
-        begin = self.tokens[first - 1].end if first else 0
-        tree = parse("declaration", part, self.reports, part[-1].end, begin)
+        part = self.tokens[first : self.at]
+        tree = parse("declaration", part, self.reports, part[-1].end, self.tokens[first - 1].end if first else 0)
         self.out.parts.append((part[0].start, part[-1].end))
         if tree is None:
             broken.update(t.text for t in part if t.type == "NAME")
@@ -213,11 +196,6 @@ class _OutlineReader:
             self.reports.error("RCL113", message, end - 1, end, hint="end every declaration with `;`")
         return tree
 
-    def no_name(self, hint: str) -> str:
-        """The hint, after what is to be said of a keyword that stands where a name may stand."""
-        said = about_keyword(self.tokens[self.at]) if self.at < len(self.tokens) else None
-        return f"{said}; {hint}" if said else hint
-
     # --- node --------------------------------------------------------------------------------------------------------
 
     def node(self) -> None:
@@ -227,15 +205,11 @@ class _OutlineReader:
             node = NodeSyntax(self.tokens[self.at], start)
             self.at += 1
         else:
-            hint = "write `node NAME {`, with a name of letters, digits and `_`"
-            if self.kind() == "STRING":
-                hint = "a name stands without quotation marks"
-            hint = self.no_name(hint)
-            self.complain("RCL113", "expected the node's name and not %", self.at, hint)
+            hint = "write `node NAME {`, with a name of letters, digits and `_`, without quotation marks"
+            self.complain("RCL113", "expected the node's name and not %", self.about_keyword(hint))
             node = NodeSyntax(Token("NAME", "", start, start), start)
-            ahead = next((i for i in range(4) if self.kind(i) in ("LBRACE", "$END") or self.kind(i) in _SECTIONS), 0)
-            if not any(self.kind(i) in _TOP for i in range(1, ahead)):
-                self.at += ahead
+            if self.kind() not in ("LBRACE", *_TOP) and self.kind(1) == "LBRACE":
+                self.at += 1
         brace = self.open_brace("the node's name")
         self.out.nodes.append(node)
         before, seen, closed = "", dict[str, Token](), False
@@ -249,14 +223,13 @@ class _OutlineReader:
                 self.not_a_section()
                 continue
             keyword = self.tokens[self.at]
-            if section in ("INPUTS", "OUTPUTS", "TOPICS") and section in seen:
+            if section in _LISTS and section in seen:
                 earlier = self.reports.source.span(seen[section].start, seen[section].end)
                 message = f"a second `{keyword.text}` in node `{node.name.text}`"
                 notes = ((f"the first `{keyword.text}` is here", earlier),)
                 self.reports.error("RCL117", message, keyword.start, keyword.end, notes=notes)
             elif before and _ORDER[section] < _ORDER[before]:
-                words = {"DEFINE": "a definition", "ASSUME": "an assumption", "GUARANTEE": "a guarantee"}
-                message = f"`{keyword.text}` stands after {words.get(before, f'`{before.lower()}`')}"
+                message = f"`{keyword.text}` stands after `{before.lower()}`"
                 hint = "the order is: inputs, outputs, topics, steps, definitions, assumptions, guarantees"
                 self.reports.error("RCL116", message, keyword.start, keyword.end, hint=hint)
             else:
@@ -272,70 +245,65 @@ class _OutlineReader:
         self.out.parts.append((node.start, node.end))
         self.missing(node, seen, closed)
 
+    def about_keyword(self, hint: str) -> str:
+        """The hint, after what is to be said of a keyword that stands where a name may stand."""
+        said = about_keyword(self.tokens[self.at]) if self.at < len(self.tokens) else None
+        return f"{said}; {hint}" if said else hint
+
     def missing(self, node: NodeSyntax, seen: dict[str, Token], closed: bool) -> None:
         """Reports the sections that a node must have and does not. In one that is not `closed`, which has been
         reported, those at the end may be still to come."""
-        if not node.name.text:
-            return
-        where = (node.name.start, node.name.end)
-        last = max((_ORDER[s] for s in seen), default=-1)
-        for section in ("INPUTS", "OUTPUTS", "TOPICS"):
-            if section in seen:
-                continue
-            node.broken.add("*")
-            if closed or _ORDER[section] < last:
-                message = f"node `{node.name.text}` has no `{section.lower()}( … )`"
-                self.reports.error("RCL118", message, *where, hint=SECTION_FORMS[section])
-        if "GUARANTEE" not in seen and closed:
+        last = max((_ORDER[section] for section in seen), default=-1)
+        for section in _LISTS:
+            if section not in seen:
+                node.broken.add("*")
+                if node.name.text and (closed or _ORDER[section] < last):
+                    message = f"node `{node.name.text}` has no `{section.lower()}( … )`"
+                    self.reports.error("RCL118", message, node.name.start, node.name.end, hint=SECTION_FORMS[section])
+        if node.name.text and "GUARANTEE" not in seen and closed:
             message = f"node `{node.name.text}` guarantees nothing"
-            self.reports.error("RCL118", message, *where, hint="a node has at least one `guarantee( … )`")
+            hint = "a node has at least one `guarantee( … )`"
+            self.reports.error("RCL118", message, node.name.start, node.name.end, hint=hint)
 
     def section(self) -> str | None:
         kind = self.kind()
         if kind in _SECTIONS:
             return kind
-        if kind == "NAME" and self.tokens[self.at].text in ("A", "G") and self.kind(1) in ("LPAR", "NAME", "STRING"):
-            return "ASSUME" if self.tokens[self.at].text == "A" else "GUARANTEE"
-        if kind == "NAME" and self.tokens[self.at].text == "steps" and self.kind(1) == "LPAR":
-            return "STEPS"
-        return None
+        word = self.tokens[self.at].text
+        if kind == "NAME" and word in ("A", "G") and self.kind(1) in ("LPAR", "NAME", "STRING"):
+            return "ASSUME" if word == "A" else "GUARANTEE"
+        return "STEPS" if kind == "NAME" and word == "steps" and self.kind(1) == "LPAR" else None
 
     def meant_section(self) -> str | None:
-        """The section that a word not quite right begins: said once, and read as that, so that nothing else is said."""
-        if self.kind() in ("IN", "OUT") and self.kind(1) == "LPAR":
-            meant = "inputs" if self.kind() == "IN" else "outputs"
-            self.complain("RCL113", "% begins no part of a node", self.at, f"write `{meant}`")
-            return meant.upper()
-        if self.kind() != "NAME" or self.kind(1) not in ("LPAR", "NAME", "STRING"):
-            return None
+        """The section that a misspelt word begins: reported, and read as that, so that nothing else is reported."""
         word = self.tokens[self.at].text
-        numbered = word[0] in "AG" and word[1:].isdigit() and self.kind(1) == "LPAR"
-        near = NEAR_SECTIONS.get(word.lower(), word.lower())
-        meant = ("assume" if word[0] == "A" else "guarantee") if numbered else near
-        if meant.upper() not in _SECTIONS:
+        if self.kind() not in ("NAME", "IN", "OUT") or self.kind(1) not in ("LPAR", "NAME", "STRING"):
             return None
-        hint = f"a clause with a name is written `{meant} {word}( … )`" if numbered else f"write `{meant}`"
-        self.complain("RCL113", "% begins no part of a node", self.at, hint)
-        return meant.upper()
+        near = {"in": "inputs", "out": "outputs", "require": "assume", "requires": "assume", "ensure": "guarantee",
+                "ensures": "guarantee"}.get(word.lower())  # fmt: skip
+        if word[0] in "AG" and word[1:].isdigit():
+            near = "assume" if word[0] == "A" else "guarantee"
+        meant = [near] if near else nearest(word, [section.lower() for section in _SECTIONS])
+        if not meant:
+            return None
+        hint = f"write `{meant[0]}`"
+        if word[1:].isdigit():
+            hint = f"a clause with a name is written `{meant[0]} {word}( … )`"
+        self.complain("RCL113", "% begins no part of a node", hint)
+        return meant[0].upper()
 
     def not_a_section(self) -> None:
-        token = self.tokens[self.at]
-        hint: str | None = "a node has inputs, outputs, topics, assumptions and guarantees, each with parentheses"
         message = "expected `inputs`, `outputs`, `topics`, `assume`, `guarantee` or `}` and not %"
-        if token.type == "RPAR":
+        hint = "a node has inputs, outputs, topics, assumptions and guarantees, each with parentheses"
+        if self.kind() == "RPAR":
             message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
-            if self.out.parts and self.reports.is_torn(self.out.parts[-1][0], token.end):
-                self.complained = token.start  # `[0, 1)`: what could not be read may have been its partner
-        elif token.type in ("SEMICOLON", "COMMA", "DOT"):
-            message, hint = (
-                "% stands between the parts of a node",
-                "no sign stands between the parts of a node: remove it",
-            )
-        self.complain("RCL113", message, self.at, hint)
+            if self.out.parts and self.reports.is_torn(self.out.parts[-1][0], self.tokens[self.at].end):
+                self.complained = self.tokens[self.at].start  # `[0, 1)`: its partner may not have been readable
+        elif self.kind() in ("SEMICOLON", "COMMA", "DOT"):
+            message, hint = "% stands between the parts of a node", "remove it"
+        self.complain("RCL113", message, hint)
         self.at += 1
-        while self.at < len(self.tokens) and self.kind() not in _TOP and self.section() is None:
-            if self.kind() == "RBRACE":
-                return
+        while self.at < len(self.tokens) and self.kind() not in (*_TOP, "RBRACE") and self.section() is None:
             if self.kind() in _OPEN:
                 self.balanced()
             else:
@@ -344,7 +312,7 @@ class _OutlineReader:
     def balanced(self) -> int | None:
         """Past the bracket here and its partner; the partner's position, or None where it has none (then: where the
         search ended, at a section keyword or the end)."""
-        stack, opened = [_OPEN[self.kind()]], [self.tokens[self.at]]
+        opened = [self.tokens[self.at]]
         self.innermost = None
         self.at += 1
         while self.at < len(self.tokens):
@@ -352,18 +320,15 @@ class _OutlineReader:
             if kind in _TOP or kind in _SECTIONS:
                 return None
             if kind in _OPEN:
-                stack.append(_OPEN[kind])
                 opened.append(self.tokens[self.at])
             elif kind in _CLOSE:
-                if kind != stack[-1]:
+                if kind != _OPEN[opened[-1].type]:
                     self.innermost = opened[-1]
                     return None
-                stack.pop()
                 opened.pop()
-                if not stack:
-                    self.at += 1
-                    return self.at - 1
             self.at += 1
+            if not opened:
+                return self.at - 1
         return None
 
     def read_section(self, section: str, node: NodeSyntax) -> None:
@@ -374,7 +339,7 @@ class _OutlineReader:
             return
         self.at += 1
         name = sentence = None
-        if section in ("ASSUME", "GUARANTEE"):
+        if section in _CLAUSES:
             if self.kind() == "NAME":
                 name = self.tokens[self.at]
                 self.at += 1
@@ -383,80 +348,69 @@ class _OutlineReader:
                 self.at += 1
         if self.kind() != "LPAR":
             hint = f"write `{keyword.text}( … )`"
-            if section in ("ASSUME", "GUARANTEE") and self.kind() not in ("LBRACE", "RBRACE", "$END"):
+            if section in _CLAUSES and self.kind() not in ("LBRACE", "RBRACE", "$END"):
                 hint = f'write `{keyword.text} NAME "sentence" ( … )`; the name and the sentence may be left out'
-                hint = self.no_name(hint)
-            self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at, hint)
+                hint = self.about_keyword(hint)
+            self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", hint)
             if self.kind() == "LBRACE":
                 self.balanced()
-            if section not in ("ASSUME", "GUARANTEE"):
-                node.broken.add("*")
-            while self.at < len(self.tokens) and self.kind() not in _TOP and self.kind() != "RBRACE":
-                if self.section() is not None:
-                    return
-                self.at += 1
+            self.to_next_section(section, node, ())
             return
         opening = self.tokens[self.at]
         first = self.at + 1
         close = self.balanced()
         if close is None:
-            self.unclosed(self.innermost or opening, first, section, node)
+            self.unclosed(self.innermost or opening)
+            self.to_next_section(section, node, self.tokens[first : self.at])
             return
-        part = self.tokens[first:close]
-        end = self.tokens[close].start
+        part, end = self.tokens[first:close], self.tokens[close].start
         if section == "STEPS":
             whole = (keyword.start, self.tokens[close].end)
             formula = parse("formula", self.tokens[first - 2 : close + 1], self.reports, whole[1], keyword.start)
             node.clauses.append(ClauseSyntax(ClauseKind.GUARANTEE, keyword, None, formula, whole, *whole))
-            return
-        if section in ("ASSUME", "GUARANTEE"):
-            kind = ClauseKind.ASSUMPTION if section == "ASSUME" else ClauseKind.GUARANTEE
+        elif section in _CLAUSES:
             formula = None
             if part or self.reports.is_torn(opening.end, end):
                 formula = parse("formula", part, self.reports, end, opening.end)
             else:
-                message = f"this {kind.value} says nothing"
-                hint = "leave it out: no assumption means that every input is accepted"
-                if section == "GUARANTEE":
-                    hint = "write `TRUE` where the node promises nothing"
+                message = f"this {_CLAUSES[section]} says nothing"
+                hint = "write `TRUE` where the node promises nothing"
+                if section == "ASSUME":
+                    hint = "leave it out: no assumption means that every input is accepted"
                 self.reports.error("RCL119", message, opening.start, self.tokens[close].end, hint=hint)
-            inside = (opening.end, end)
-            node.clauses.append(
-                ClauseSyntax(kind, name, sentence, formula, inside, keyword.start, self.tokens[close].end)
-            )
-            return
-        listing: PortList | TopicList | None
-        if section == "TOPICS":
-            listing = topics = parse("topics", part, self.reports, end, opening.end)
-            node.topics = node.topics or topics
+            whole = (keyword.start, self.tokens[close].end)
+            node.clauses.append(ClauseSyntax(_CLAUSES[section], name, sentence, formula, (opening.end, end), *whole))
         else:
-            listing = ports = parse("ports", part, self.reports, end, opening.end)
-            if section == "INPUTS":
-                node.inputs = node.inputs or ports
+            listing: PortList | TopicList | None
+            if section == "TOPICS":
+                listing = topics = parse("topics", part, self.reports, end, opening.end)
+                node.topics = node.topics or topics
             else:
-                node.outputs = node.outputs or ports
-        if listing is None:
-            node.broken.update(t.text for t in part if t.type == "NAME")
-        else:
-            self.out.parts.extend((t.start, t.end) for t in listing.items)
+                listing = ports = parse("ports", part, self.reports, end, opening.end)
+                if section == "INPUTS":
+                    node.inputs = node.inputs or ports
+                else:
+                    node.outputs = node.outputs or ports
+            if listing is None:
+                node.broken.update(t.text for t in part if t.type == "NAME")
+            else:
+                self.out.parts.extend((t.start, t.end) for t in listing.items)
 
-    def unclosed(self, opening: Token, first: int, section: str, node: NodeSyntax) -> None:
-        """Reports a parenthesis without partner and goes to where reading can begin again."""
+    def unclosed(self, opening: Token) -> None:
+        """Reports a parenthesis without partner."""
         words, start, end = self.found(self.at)
-        where = self.reports.source.span(start, end)
         if not self.reports.is_torn(opening.end, end):  # what could not be read may hold the partner
-            self.reports.error(
-                "RCL115",
-                f"this `{_SIGN[opening.type]}` is never closed",
-                opening.start,
-                opening.end,
-                hint=f"close it with `{_SIGN[_OPEN[opening.type]]}`",
-                notes=((f"it should be closed before {words} here", where),),
-            )
-        if section not in ("ASSUME", "GUARANTEE"):
-            node.broken.update(t.text for t in self.tokens[first : self.at] if t.type == "NAME")
+            note = (f"it should be closed before {words} here", self.reports.source.span(start, end))
+            hint = f"close it with `{_SIGN[_OPEN[opening.type]]}`"
+            message = f"this `{_SIGN[opening.type]}` is never closed"
+            self.reports.error("RCL115", message, opening.start, opening.end, hint=hint, notes=(note,))
+
+    def to_next_section(self, section: str, node: NodeSyntax, part: Sequence[Token]) -> None:
+        """Goes to where reading can begin again after a section in error with these tokens."""
+        if section in _LISTS:
+            node.broken.update(t.text for t in part if t.type == "NAME")
             node.broken.add("*")
         while self.at < len(self.tokens) and self.kind() not in _TOP and self.section() is None:
-            if self.kind() == "RBRACE" and self.kind(1) in (*_TOP, "$END", "RBRACE"):
+            if self.kind() == "RBRACE" and (not part or self.kind(1) in (*_TOP, "$END", "RBRACE")):
                 return
             self.at += 1

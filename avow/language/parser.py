@@ -6,16 +6,15 @@ It is iterative: no nesting, however deep, can exhaust the stack.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal, NamedTuple, TypeVar, overload
+from typing import Any, Literal, TypeVar, overload
 
 from avow.base.grammars import lark_of
-from avow.base.tuning.bounds import CHAIN
 from avow.base.tuning.sizes import NESTING
 from avow.language import syntax
+from avow.language.expectations import explain
 from avow.language.lexer import KEYWORDS, Token
 from avow.language.source import Reports
 from avow.language.terms import Quantifier
@@ -53,19 +52,23 @@ def parse(
 ) -> syntax.Syntax | None:
     """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
     and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
+    from lark.exceptions import UnexpectedToken  # Lark takes long to import, and most runs parse nothing
+
     if start == "topics":
         tokens = _topic_names(tokens)
-    tree = _run(_tables(start), tokens, Token("$END", "", end, end))
     if begin is None:
         begin = tokens[0].start if tokens else end
-    if isinstance(tree, Token):
-        at = next((i for i, t in enumerate(tokens) if t is tree), len(tokens))
-        guessed = any(t.start in reports.odd for t in tokens[max(at - 1, 0) : at + 1])
-        guessed = guessed or any(t.type == "UPTO" and t.start in reports.odd for t in tokens[at + 1 : at + 2])
-        if not guessed and not reports.is_torn(begin, tree.end):
-            from avow.language.expectations import explain
-
-            explain(start, tokens, at, tree, _accepted(start, tokens, tree), reports)
+    last = Token("$END", "", end, end)
+    state = _lark().parse_interactive("", start=start).parser_state
+    try:
+        for token in (*tokens, last):
+            tree = state.feed_token(token, is_end=token is last)
+    except UnexpectedToken as error:
+        bad = error.token
+        at = next((i for i, token in enumerate(tokens) if token is bad), len(tokens))
+        guessed = any(token.start in reports.odd for token in tokens[max(at - 1, 0) : at + 1])
+        if not guessed and not reports.is_torn(begin, bad.end):
+            explain(start, tokens, at, bad, _accepted(start, tokens[:at]), reports)
         return None
     if start in ("formula", "topics") and reports.is_torn(begin, end):
         return None  # what it says would be something else
@@ -78,88 +81,15 @@ def parse(
             hint="split the clause, or name its parts",
         )
         return None
-    return tree
+    found: syntax.Syntax = tree
+    return found
 
 
-class _Tables(NamedTuple):
-    """Lark's LALR tables of one start symbol, made ready for the loop below."""
-
-    first: int
-    last: int
-    shifts: dict[int, dict[str, int]]
-    reductions: dict[int, dict[str, tuple[int, str, Callable[[list[Any]], Any] | None]]]
-    """State → terminal → (how many values, the rule's symbol, its callback; None: the one value stays as it is)."""
-    gotos: dict[int, dict[str, int]]
-
-
-def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> syntax.Syntax | Token:
-    """The LALR automaton, on Lark's tables. (Lark's own loop does the same and takes three times as long: it calls a
-    function for every token, and makes a list and two calls for each of the many reductions that change nothing.)
-    Gives the token where it cannot go on."""
-    _, last, shifts, reductions, gotos = tables
-    state = tables.first
-    states, values = [state], list[Any]()
-    for token in (*tokens, end):
-        kind = token.type
-        while True:
-            following = shifts[state].get(kind)
-            if following is not None:
-                states.append(following)
-                values.append(token)
-                state = following
-                break
-            reduction = reductions[state].get(kind)
-            if reduction is None:
-                if token is end and state == last:
-                    break
-                return token
-            size, symbol, callback = reduction
-            if callback is None:
-                states.pop()
-            elif size:
-                children = values[-size:]
-                del states[-size:]
-                del values[-size:]
-                values.append(callback(children))
-            else:
-                values.append(callback([]))
-            state = gotos[states[-1]][symbol]
-            states.append(state)
-            if token is end and state == last:
-                break
-    tree: syntax.Syntax = values[-1]
-    return tree
-
-
-@functools.cache
-def _tables(start: str) -> _Tables:
-    from lark.parsers.lalr_analysis import Shift
-
-    state = _lark().parse_interactive("", start=start).parser_state
-    configuration = state.parse_conf
-    shifts: dict[int, dict[str, int]] = {}
-    gotos: dict[int, dict[str, int]] = {}
-    reductions: dict[int, dict[str, tuple[int, str, Callable[[list[Any]], Any] | None]]] = {}
-    for number, actions in configuration.states.items():
-        shifts[number], gotos[number], reductions[number] = {}, {}, {}
-        for symbol, (action, argument) in actions.items():
-            if action is Shift:
-                target = shifts if symbol.isupper() or symbol == "$END" else gotos
-                target[number][symbol] = argument
-                continue
-            size = len(argument.expansion)
-            stays = size == 1 and argument.options.expand1 and argument.alias is None
-            callback = None if stays else configuration.callbacks[argument]
-            reductions[number][symbol] = (size, argument.origin.name, callback)
-    return _Tables(configuration.start_state, configuration.end_state, shifts, reductions, gotos)
-
-
-def _accepted(start: str, tokens: Iterable[Token], bad: Token) -> frozenset[str]:
-    """The terminals that could stand in the place of the bad token."""
+def _accepted(start: str, tokens: Iterable[Token]) -> frozenset[str]:
+    """The terminals that may follow these tokens. (Lark reduces as far as it can before it finds an error, so that the
+    state of the parser that failed accepts less.)"""
     machine = _lark().parse_interactive("", start=start)
     for token in tokens:
-        if token is bad:
-            break
         machine.parser_state.feed_token(token)
     return frozenset(machine.accepts())
 
@@ -188,7 +118,7 @@ def _word(kind: Callable[[int, int, int, str], _Made]) -> Callable[[list[Any]], 
 
 def _chain(kind: Callable[..., _Made], c: list[Any], *fields: Any) -> _Made:
     """Operands with signs between them, which count as deep as their term becomes."""
-    depth = max([part.depth for part in c[::2]]) + min(len(c) // 2, CHAIN)
+    depth = max([part.depth for part in c[::2]]) + len(c) // 2
     return kind(c[0].start, c[-1].end, depth, *fields)
 
 

@@ -15,7 +15,7 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.records import dataclass
 from avow.base.remembered import Shelf, Stretch
 from avow.base.tuning.shown import DIAGNOSTICS
-from avow.base.tuning.sizes import CONTRACT_PARTS, TOKENS
+from avow.base.tuning.sizes import TOKENS
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.lexer import Token, tokens
@@ -42,8 +42,6 @@ class _Piece:
     """The names that it speaks of."""
     words: int
     """How many tokens it has."""
-    written_out: int
-    """How many parts its formulas have, constants written out."""
     parts: tuple[tuple[int, int], ...]
     allows: tuple[Token, ...]
     """Comments that allow something."""
@@ -106,8 +104,6 @@ def _by_pieces(sources: Sequence[Source], off: frozenset[str], shelf: Shelf) -> 
     every = [piece for some in pieces for piece in some]
     if len({piece.node.name for piece in every}) < len(every):
         raise _Whole
-    if sum(piece.written_out for piece in every) > CONTRACT_PARTS:
-        raise _Whole
     contract = Contract(
         tuple(source.file for source in sources),
         tuple(environment.types.items()),
@@ -169,8 +165,6 @@ def _piece(source: Source, declarations: Declarations) -> _Piece:
     if reports.found or syntax.declarations or syntax.broken or len(syntax.nodes) != 1:
         raise _Whole
     (tree,) = syntax.nodes
-    environment = declarations.environment
-    before = environment.written_out
     node = check_node(tree, *check_ports(tree, declarations, reports), declarations, reports)
     if reports.found:
         raise _Whole
@@ -180,7 +174,6 @@ def _piece(source: Source, declarations: Declarations) -> _Piece:
         tuple(of_node(file, tree, node)),
         spoken(tree),
         len(found),
-        environment.written_out - before,
         tuple(syntax.parts),
         tuple(filter(allows, comments)),
     )

@@ -10,218 +10,170 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.base.plain import decimal
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.operators import OPERATORS, Level
-from avow.language.sorts import (
-    BUILTINS,
-    REAL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
 from avow.language.styles import STYLES, Style
 from avow.language.styles import StyleName as StyleName
 from avow.language.styles import latex_escape as latex_escape
-from avow.language.terms import (
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Item,
-    Length,
-    Limit,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Past,
-    Quantified,
-    Role,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 _LOOSEST, IFF, IMPLIES, OR, AND, LASTING, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = Level
 _UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
 
 
-def show_term(term: Term, style: StyleName = "unicode") -> str:
+def show_term(term: t.Term, style: StyleName = "unicode") -> str:
     """The term as text. `latex` is for mathematics mode, and escapes every name and string."""
     return _Printer(STYLES[style]).show(term, _LOOSEST)
 
 
-def show_sort(sort: Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
+def show_sort(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
     """A sort by its name, or written out where it has none (or none of those `named`)."""
     chosen = STYLES[style]
     match sort:
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
+        case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
             return chosen.sorts[_BUILTIN[sort]]
-        case EnumSort(name=name) | DataSort(name=name) | OpaqueSort(name=name) | TupleSort(name=name) if (
+        case s.EnumSort(name=name) | s.DataSort(name=name) | s.OpaqueSort(name=name) | s.TupleSort(name=name) if (
             name if named is None else name in named
         ):
             return chosen.name(name)
-        case FunctionSort(parameters=parameters, result=result):
+        case s.FunctionSort(parameters=parameters, result=result):
             left = chosen.times.join(_in_product(p, style, named) for p in parameters)
             return f"{left}{chosen.arrow}{_in_product(result, style, named)}"
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             return f"{chosen.sequence[0]}{show_sort(item, style, named)}{chosen.sequence[1]}"
-        case SetSort(item=item):
+        case s.SetSort(item=item):
             return f"a set of {show_sort(item, style, named)}"
-        case EnumSort() | DataSort() | OpaqueSort() | TupleSort():
+        case s.EnumSort() | s.DataSort() | s.OpaqueSort() | s.TupleSort():
             return show_type(sort, style, named)
 
 
-def show_type(sort: Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
+def show_type(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
     """The sort as its declaration writes it: ``{red, orange, green}``, ``{}``."""
     chosen = STYLES[style]
     match sort:
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return chosen.braces(", ".join(chosen.name(m) for m in members))
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             shown = []
             for c in constructors:
                 arguments = ", ".join(show_sort(p, style, named) for p in c.parameters)
                 shown.append(f"{chosen.name(c.name)}({arguments})" if arguments else chosen.name(c.name))
             return chosen.braces(", ".join(shown))
-        case OpaqueSort():
+        case s.OpaqueSort():
             return chosen.unspecified
-        case TupleSort(items=items, labels=labels):
+        case s.TupleSort(items=items, labels=labels):
             shown = [show_sort(item, style, named) for item in items]
             if not labels:
                 return f"({', '.join(shown)})"
-            return f"[{', '.join(f'{chosen.name(label)} : {s}' for label, s in zip(labels, shown, strict=True))}]"
+            return f"[{', '.join(f'{chosen.name(label)} : {part}' for label, part in zip(labels, shown, strict=True))}]"
         case _:  # written out anyway
             return show_sort(sort, style, named)
 
 
-def _in_product(sort: Sort, style: StyleName, named: Container[str] | None) -> str:
+def _in_product(sort: s.Sort, style: StyleName, named: Container[str] | None) -> str:
     shown = show_sort(sort, style, named)
-    return f"({shown})" if isinstance(sort, FunctionSort) else shown
+    return f"({shown})" if isinstance(sort, s.FunctionSort) else shown
 
 
-_BUILTIN = {sort: name for name, sort in BUILTINS.items()}
+_BUILTIN = {sort: name for name, sort in s.BUILTINS.items()}
 
 
 class _Printer:
     def __init__(self, style: Style) -> None:
         self.style = style
 
-    def show(self, term: Term, place: int, *, real: bool = False) -> str:
+    def show(self, term: t.Term, place: int, *, real: bool = False) -> str:
         """`place`: how tightly the text must bind. `real`: a reader takes a number here for a REAL anyway."""
-        if isinstance(term, Widen):
+        if isinstance(term, t.Widen):
             return self.show(term.term, place)
         text, level = self.form(term, real)
         return f"({text})" if level < place else text
 
-    def form(self, term: Term, real: bool) -> tuple[str, int]:
+    def form(self, term: t.Term, real: bool) -> tuple[str, int]:
         words = self.style.words
         match term:
-            case Literal():
+            case t.Literal():
                 return self.literal(term, real)
-            case EnumValue(name=name):
+            case t.EnumValue(name=name):
                 return self.style.name(name), ATOM
-            case Variable():
+            case t.Variable():
                 return self.style.name(self.variable(term)), ATOM
-            case Construct(constructor=name, arguments=arguments, sort=sort):
+            case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 parameters = sort.constructor(name).parameters
                 return self.applied(self.style.name(name), arguments, parameters), ATOM
-            case Apply(function=function, arguments=arguments):
+            case t.Apply(function=function, arguments=arguments):
                 sort_ = function.sort
-                parameters = sort_.parameters if isinstance(sort_, FunctionSort) else ()
+                parameters = sort_.parameters if isinstance(sort_, s.FunctionSort) else ()
                 return self.call(self.show(function, ATOM), arguments, parameters), ATOM
-            case Index(sequence=sequence, index=index):
+            case t.Index(sequence=sequence, index=index):
                 return self.call(self.show(sequence, ATOM), (index,), ()), ATOM
-            case Item(record=record, position=position):
-                labels = record.sort.labels if isinstance(record.sort, TupleSort) else ()
+            case t.Item(record=record, position=position):
+                labels = record.sort.labels if isinstance(record.sort, s.TupleSort) else ()
                 label = labels[position] if labels else str(position)
                 return f"{self.show(record, ATOM)}.{self.style.name(label)}", ATOM
-            case Argument(value=value, constructor=name, position=position):
+            case t.Argument(value=value, constructor=name, position=position):
                 return f"{self.show(value, ATOM)}.{self.style.name(name)}.{position}", ATOM
-            case Length(sequence=sequence):
+            case t.Length(sequence=sequence):
                 return f"{self.style.name('length')}({self.show(sequence, _LOOSEST)})", ATOM
-            case Arithmetic():
+            case t.Arithmetic():
                 return self.arithmetic(term)
-            case Negative(term=inner):
+            case t.Negative(term=inner):
                 shown = self.show(inner, UNARY)
-                return f"-({shown})" if isinstance(inner, Literal) or shown.startswith("-") else f"-{shown}", UNARY
-            case TupleTerm(items=items):
+                return f"-({shown})" if isinstance(inner, t.Literal) or shown.startswith("-") else f"-{shown}", UNARY
+            case t.TupleTerm(items=items):
                 return f"({self.listed(items, _LOOSEST)})", ATOM
-            case SequenceTerm(items=items):
+            case t.SequenceTerm(items=items):
                 left, right = self.style.sequence
                 return f"{left}{self.listed(items, SUM)}{right}", ATOM
-            case SequenceRange(low=low, high=high):
+            case t.SequenceRange(low=low, high=high):
                 left, right = self.style.sequence
                 return f"{left}{self.show(low, SUM)}{words['upto']}{self.show(high, SUM)}{right}", ATOM
-            case SetTerm(items=items):
+            case t.SetTerm(items=items):
                 return self.style.braces(self.listed(items, SUM)), ATOM
-            case Compare():
+            case t.Compare():
                 return self.chain((term,)), COMPARE
-            case In(item=item, collection=collection):
+            case t.In(item=item, collection=collection):
                 return self.membership(item, collection, "in"), COMPARE
-            case Not(body=In(item=item, collection=collection)):
+            case t.Not(body=t.In(item=item, collection=collection)):
                 return self.membership(item, collection, "!in"), COMPARE
-            case Not(body=body):
+            case t.Not(body=body):
                 return f"{words['not']}{self.show(body, NOT)}", NOT
-            case And(items=items) if len(items) > 1 and _is_chain(items):
-                return self.chain(tuple(i for i in items if isinstance(i, Compare))), COMPARE
-            case And(items=()):
+            case t.And(items=items) if len(items) > 1 and _is_chain(items):
+                return self.chain(tuple(i for i in items if isinstance(i, t.Compare))), COMPARE
+            case t.And(items=()):
                 return words["TRUE"], ATOM
-            case Or(items=()):
+            case t.Or(items=()):
                 return words["FALSE"], ATOM
-            case And(items=(only,)) | Or(items=(only,)):
+            case t.And(items=(only,)) | t.Or(items=(only,)):
                 return self.form(only, real)
-            case And(items=items):
+            case t.And(items=items):
                 return words["and"].join(self.show(i, LASTING) for i in items), AND
-            case Or(items=items):
+            case t.Or(items=items):
                 return words["or"].join(self.show(i, AND) for i in items), OR
-            case Implies(left=left, right=right):
+            case t.Implies(left=left, right=right):
                 return f"{self.side(left, OR)}{words['->']}{self.side(right, IMPLIES)}", IMPLIES
-            case Iff(left=left, right=right):
+            case t.Iff(left=left, right=right):
                 return f"{self.side(left, IFF)}{words['<=>']}{self.side(right, IMPLIES)}", IFF
-            case Quantified():
+            case t.Quantified():
                 return self.quantified(term)
-            case Operation(operator=operator, arguments=arguments):
+            case t.Operation(operator=operator, arguments=arguments):
                 return f"{words[operator]}({self.listed(arguments, _LOOSEST)})", ATOM
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
+            case t.Conditional(condition=condition, then=then, otherwise=otherwise):
                 whole = words["if"] + self.show(condition, IFF) + words["then"] + self.show(then, IFF)
                 return whole + words["else"] + self.show(otherwise, _LOOSEST), _LOOSEST
-            case History():
+            case t.History():
                 return self.history(term)
-            case Widen(term=inner):
+            case t.Widen(term=inner):
                 return self.form(inner, real)
             case _:
                 assert_never(term)
 
-    def history(self, term: History) -> tuple[str, int]:
+    def history(self, term: t.History) -> tuple[str, int]:
         """``once[5 steps](F)``, ``F since G``; in words where the style has some."""
-        if term.operator is Past.STEPS and term.limit is not None and isinstance(term.limit.amount, Literal):
+        if term.operator is t.Past.STEPS and term.limit is not None and isinstance(term.limit.amount, t.Literal):
             told = {"==": "every", "<=": "at most"}[term.limit.relation]
             length = f"{told} {show_number(Fraction(term.limit.amount.value))[0]} s"
-            said = self.style.phrases.get(Past.STEPS, f"{self.style.past(Past.STEPS)}({{limit}})")
+            said = self.style.phrases.get(t.Past.STEPS, f"{self.style.past(t.Past.STEPS)}({{limit}})")
             return said.replace("{limit}", length), ATOM
         limit = "" if term.limit is None else self.limit(term.limit)
         phrase = self.style.phrases.get(term.operator)
@@ -230,41 +182,43 @@ class _Printer:
             limited = self.style.phrases.get(f"{term.operator} limited", phrase) if limit else phrase
             return limited.format(*shown, limit=limit.strip("[]")), OR  # `not a for 3 steps` would be read both ways
         name = self.style.past(term.operator)
-        if term.operator in (Past.SINCE, Past.UNTIL):
+        if term.operator in (t.Past.SINCE, t.Past.UNTIL):
             left, right = (self.show(each, NOT) for each in term.arguments)
             return f"{left} {name}{limit} {right}", LASTING
-        if term.operator is Past.COUNTED:
+        if term.operator is t.Past.COUNTED:
             left, right = (self.show(each, NOT) for each in term.arguments)
-            return f"{name}({left} {self.style.past(Past.SINCE)} {right})", ATOM
-        real = term.operator is Past.PREVIOUS and any(map(_shows_real, term.arguments))
+            return f"{name}({left} {self.style.past(t.Past.SINCE)} {right})", ATOM
+        real = term.operator is t.Past.PREVIOUS and any(map(_shows_real, term.arguments))
         return f"{name}{limit}({self.listed(term.arguments, _LOOSEST, real=real)})", ATOM
 
-    def limit(self, limit: Limit) -> str:
+    def limit(self, limit: t.Limit) -> str:
         relation = self.style.words[limit.relation].strip() + " " if limit.relation else ""
         amount = limit.amount
         if limit.steps:
             shown = f"{self.show(amount, SUM)} steps"
-        elif isinstance(amount, Literal):
+        elif isinstance(amount, t.Literal):
             shown = f"{show_number(Fraction(amount.value))[0]} s"
         else:
             shown = self.show(amount, SUM)
         return self.style.limit(f"{relation}{shown}")
 
-    def variable(self, term: Variable) -> str:
+    def variable(self, term: t.Variable) -> str:
         """``in.r``; of another node, ``sensor.r`` (in RCL ``sensor.in.r``, which has one meaning always)."""
         node, dot, name = term.name.partition(".")
-        if not dot or term.role is Role.BOUND:
+        if not dot or term.role is t.Role.BOUND:
             return term.qualified
         return f"{node}.{term.role}.{name}" if self.style.careful else term.name
 
-    def side(self, term: Term, place: int) -> str:
+    def side(self, term: t.Term, place: int) -> str:
         """A side of `->` or `<=>`. RCL has parentheses round `and` and `or` there, as the lint RCL401 asks for."""
         bare = (
-            isinstance(term, And | Or) and len(term.items) > 1 and not (isinstance(term, And) and _is_chain(term.items))
+            isinstance(term, t.And | t.Or)
+            and len(term.items) > 1
+            and not (isinstance(term, t.And) and _is_chain(term.items))
         )
         return self.show(term, ATOM if bare and self.style.careful else place)
 
-    def literal(self, term: Literal, real: bool) -> tuple[str, int]:
+    def literal(self, term: t.Literal, real: bool) -> tuple[str, int]:
         value = term.value
         if isinstance(value, bool):
             return self.style.words["TRUE" if value else "FALSE"], ATOM
@@ -272,57 +226,57 @@ class _Printer:
             return self.style.string(value), ATOM
         fraction = Fraction(value)
         text, level = show_number(fraction)
-        if term.sort == REAL and fraction.denominator == 1 and not real:
+        if term.sort == s.REAL and fraction.denominator == 1 and not real:
             text += ".0"
         return text, level
 
-    def applied(self, name: str, arguments: tuple[Term, ...], parameters: tuple[Sort, ...]) -> str:
+    def applied(self, name: str, arguments: tuple[t.Term, ...], parameters: tuple[s.Sort, ...]) -> str:
         return self.call(name, arguments, parameters) if arguments else name
 
-    def call(self, name: str, arguments: tuple[Term, ...], parameters: tuple[Sort, ...]) -> str:
+    def call(self, name: str, arguments: tuple[t.Term, ...], parameters: tuple[s.Sort, ...]) -> str:
         shown = []
         for i, argument in enumerate(arguments):
-            real = i < len(parameters) and parameters[i] == REAL
+            real = i < len(parameters) and parameters[i] == s.REAL
             shown.append(self.show(argument, _LOOSEST, real=real))
         return f"{name}({self.style.comma.join(shown)})"
 
-    def listed(self, items: tuple[Term, ...], place: int, *, real: bool = False) -> str:
+    def listed(self, items: tuple[t.Term, ...], place: int, *, real: bool = False) -> str:
         return self.style.comma.join(self.show(i, place, real=real) for i in items)
 
-    def arithmetic(self, term: Arithmetic) -> tuple[str, int]:
+    def arithmetic(self, term: t.Arithmetic) -> tuple[str, int]:
         level = OPERATORS[term.operator].level
         divided = term.operator == "/"
         left = self.show(term.left, level, real=divided or _shows_real(term.right))
         right = self.show(term.right, level + 1, real=divided or _shows_real(term.left))
         return f"{left}{self.style.words[term.operator]}{right}", level
 
-    def membership(self, item: Term, collection: Term, relation: str) -> str:
+    def membership(self, item: t.Term, collection: t.Term, relation: str) -> str:
         shown = self.show(item, SUM)
-        if isinstance(collection, SetTerm):
+        if isinstance(collection, t.SetTerm):
             of = self.style.braces(self.listed(collection.items, SUM, real=_shows_real(item)))
         else:
             of = self.show(collection, SUM)
         return f"{shown}{self.style.words[relation]}{of}"
 
-    def chain(self, links: tuple[Compare, ...]) -> str:
+    def chain(self, links: tuple[t.Compare, ...]) -> str:
         parts = [self.show(links[0].left, SUM, real=_shows_real(links[0].right))]
         for i, link in enumerate(links):
             neighbours = (link.left, links[i + 1].right) if i + 1 < len(links) else (link.left,)
             real = all(_shows_real(n) for n in neighbours)
-            if i + 1 < len(links) and links[i + 1].left.sort != REAL:
+            if i + 1 < len(links) and links[i + 1].left.sort != s.REAL:
                 real = True  # written as a whole number: it is one for the next comparison
             parts.append(self.style.words[link.operator])
             parts.append(self.show(link.right, SUM, real=real))
         return "".join(parts)
 
-    def quantified(self, term: Quantified) -> tuple[str, int]:
-        groups: list[tuple[list[str], Sort]] = []
+    def quantified(self, term: t.Quantified) -> tuple[str, int]:
+        groups: list[tuple[list[str], s.Sort]] = []
         for variable in term.variables:
             if groups and groups[-1][1] == variable.sort:
                 groups[-1][0].append(self.style.name(variable.name))
             else:
                 groups.append(([self.style.name(variable.name)], variable.sort))
-        style_name = next(n for n, s in STYLES.items() if s is self.style)
+        style_name = next(n for n, style in STYLES.items() if style is self.style)
         binders = ", ".join(
             f"{', '.join(names)}{self.style.words['in']}{show_sort(sort, style_name)}" for names, sort in groups
         )
@@ -339,33 +293,33 @@ def show_number(value: Fraction) -> tuple[str, int]:
     return text, UNARY if value < 0 else ATOM
 
 
-def _shows_real(term: Term) -> bool:
+def _shows_real(term: t.Term) -> bool:
     """Whether the printed term is a REAL for a reader who does not know what is wanted."""
     match term:
-        case Literal(value=value):
+        case t.Literal(value=value):
             return isinstance(value, Fraction) and value.denominator != 1
-        case Widen():
+        case t.Widen():
             return False
-        case Arithmetic(operator="/"):
+        case t.Arithmetic(operator="/"):
             return True
-        case Arithmetic(left=left, right=right):
+        case t.Arithmetic(left=left, right=right):
             return _shows_real(left) or _shows_real(right)
-        case Negative(term=inner):
+        case t.Negative(term=inner):
             return _shows_real(inner)
-        case Operation(arguments=terms) if term.sort == REAL:
+        case t.Operation(arguments=terms) if term.sort == s.REAL:
             return any(map(_shows_real, terms))
-        case Conditional(then=then, otherwise=otherwise):
+        case t.Conditional(then=then, otherwise=otherwise):
             return _shows_real(then) or _shows_real(otherwise)
         case _:  # what is no number that was written down has its sort from its name
-            return bool(term.sort == REAL)
+            return bool(term.sort == s.REAL)
 
 
-def _is_chain(items: tuple[Term, ...]) -> bool:
+def _is_chain(items: tuple[t.Term, ...]) -> bool:
     """Whether a conjunction is ``a < b <= c``: each comparison begins where the last one ended, all one way."""
-    previous: Term | None = None
+    previous: t.Term | None = None
     operators = set()
     for item in items:
-        if not isinstance(item, Compare) or isinstance(item.left.sort, BoolSort):
+        if not isinstance(item, t.Compare) or isinstance(item.left.sort, s.BoolSort):
             return False
         if previous is not None and _bare(previous) != _bare(item.left):
             return False
@@ -374,9 +328,9 @@ def _is_chain(items: tuple[Term, ...]) -> bool:
     return operators <= _UP or operators <= _DOWN
 
 
-def _bare(term: Term) -> Term:
-    if isinstance(term, Widen):
+def _bare(term: t.Term) -> t.Term:
+    if isinstance(term, t.Widen):
         return term.term
-    if isinstance(term, Literal) and not isinstance(term.value, bool | str):
-        return Literal(Fraction(term.value), REAL)
+    if isinstance(term, t.Literal) and not isinstance(term.value, bool | str):
+        return t.Literal(Fraction(term.value), s.REAL)
     return term

@@ -25,8 +25,6 @@ class Environment:
     anonymous: dict[str, EnumSort | DataSort] = field(default_factory=dict)
     places: dict[str, Span] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)
-    written_out: int = 0
-    """How many parts the formulas checked so far have, constants written out."""
 
     def sort(self, name: str) -> Sort | None:
         """The sort of that name, also of one that was written in place and named by us."""

@@ -15,27 +15,13 @@ from fractions import Fraction
 from avow.base.records import dataclass
 from avow.base.tuning.shown import SENTENCE_CHARACTERS
 from avow.base.tuning.sizes import SENTENCE
+from avow.language import terms as t
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
 from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    Builtin,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    Literal,
-    Operation,
-    Quantified,
-    Quantifier,
-    Term,
-    Variable,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +39,7 @@ def mismatches(clause: Clause, elements: Mapping[str, str]) -> Iterator[Mismatch
         yield from differences(clause.sentence, clause.written or clause.formula, elements)
 
 
-def differences(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
+def differences(sentence: str, formula: t.Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
     """What a sentence is seen to say otherwise than a formula in which these elements could stand."""
     sentence = sentence[:SENTENCE]
     yield from _comparisons(sentence, formula)
@@ -84,12 +70,12 @@ _SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
 _EITHER = "make the two say the same, whichever is meant"
 
 
-def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
+def _comparisons(sentence: str, formula: t.Term) -> Iterator[Mismatch]:
     said = list(comparisons(sentence))
     if not said:
         return
     found = list(bounds(formula))
-    numbers = sorted({n for t in subterms(formula) if (n := constant(t)) is not None})
+    numbers = sorted({n for term in subterms(formula) if (n := constant(term)) is not None})
     for what in said:
         about = [b for b in found if _same(what, b.number)]
         if any(b.may_mean(what.signs) for b in about):
@@ -125,18 +111,18 @@ def _short(text: str) -> str:
 # --- one way or both -------------------------------------------------------------------------------------------------
 
 
-def _directions(sentence: str, formula: Term) -> Iterator[Mismatch]:
+def _directions(sentence: str, formula: t.Term) -> Iterator[Mismatch]:
     core = formula
-    while isinstance(core, Quantified) and core.quantifier is Quantifier.FORALL:
+    while isinstance(core, t.Quantified) and core.quantifier is t.Quantifier.FORALL:
         core = core.body
-    if isinstance(core, Iff) and is_one_way(sentence):
+    if isinstance(core, t.Iff) and is_one_way(sentence):
         yield Mismatch(
             "RCL414",
             "the sentence goes one way (if …, then …), the formula both ways (`<=>`)",
             "write `->`, or say in the sentence that it is so exactly then",
         )
     words = both_ways(sentence)
-    if words and isinstance(core, Implies) and not any(map(_is_both_ways, subterms(core))):
+    if words and isinstance(core, t.Implies) and not any(map(_is_both_ways, subterms(core))):
         yield Mismatch(
             "RCL414",
             f"the sentence goes both ways (“{words}”), the formula one way (`->`)",
@@ -144,19 +130,24 @@ def _directions(sentence: str, formula: Term) -> Iterator[Mismatch]:
         )
 
 
-def _is_both_ways(term: Term) -> bool:
+def _is_both_ways(term: t.Term) -> bool:
     match term:
-        case Iff() | Conditional() | Operation(operator=Builtin.XOR) | Quantified(quantifier=Quantifier.UNIQUE):
+        case (
+            t.Iff()
+            | t.Conditional()
+            | t.Operation(operator=t.Builtin.XOR)
+            | t.Quantified(quantifier=t.Quantifier.UNIQUE)
+        ):
             return True
-        case Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another way to write `done`
-            return left.sort == BOOL and not isinstance(left, Literal) and not isinstance(right, Literal)
+        case t.Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another way to write `done`
+            return left.sort == BOOL and not isinstance(left, t.Literal) and not isinstance(right, t.Literal)
     return False
 
 
 # --- elements --------------------------------------------------------------------------------------------------------
 
 
-def _elements(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
+def _elements(sentence: str, formula: t.Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
     said = dict[str, str]()
     for word, name in mentions(sentence, elements):
         said.setdefault(name, word)
@@ -170,10 +161,10 @@ def _elements(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iter
             )
 
 
-def _names_in(formula: Term) -> Iterator[str]:
+def _names_in(formula: t.Term) -> Iterator[str]:
     for part in subterms(formula):
         match part:
-            case EnumValue(name=name) | Variable(name=name) | Construct(constructor=name):
+            case t.EnumValue(name=name) | t.Variable(name=name) | t.Construct(constructor=name):
                 yield name
 
 
@@ -202,21 +193,10 @@ _COMPARISON = re.compile(
     rf"\s*(?P<number>{_NUMBER})(?!\d|\.\d)(?P<unit>{_UNIT})(?!\w)(?:\s*and\s+(?P<second>{_NUMBER}))?",
     re.IGNORECASE,
 )
-_OR_MORE = re.compile(
-    rf"(?<![\w.<>=-])(?P<number>{_NUMBER})(?!\d|\.\d)(?P<unit>{_UNIT})\s+or\s+"
-    rf"(?:(?P<more>{_MORE}|above|over)|{_LESS}|below|under)(?!\w|\s+than\b|\s+{_NUMBER})",
-    re.IGNORECASE,
+_NEGATION = re.compile(
+    r"\b(?:not|never|no|cannot|nor|without|unless|may|might|allowed|permitted)\b|n't\b", re.IGNORECASE
 )
 _SPEED = re.compile(r"\b(?:faster|slower)\b", re.IGNORECASE)
-_NO_SPEED = re.compile(r"|(?:milli|micro|[µunm])?s|sec|(?:milli|micro)?seconds?|min|minutes?|h|hours?", re.IGNORECASE)
-"""A unit of time, or none: ``faster than 2 s`` is less than 2 s, ``faster than 2 m/s`` is more."""
-_JUST_BEFORE = re.compile(
-    r"(?:\b(?:not|never|cannot)|n't)(?:\s+(?:be|is|goe?s?|gets?|rises?|falls?|drops?|stays?|have|has|comes?|moves?|drives?"
-    r"|travels?|runs?|fl(?:y|ies)|turns?|rotates?))?\s*$",
-    re.IGNORECASE,
-)
-_MAY = re.compile(r"\b(?:may|might|allowed|permitted)\b", re.IGNORECASE)
-_NEGATION = re.compile(r"\b(?:not|never|no|cannot|nor|without|unless)\b|n't\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +211,7 @@ class Comparison:
 
 
 def comparisons(sentence: str) -> Iterator[Comparison]:
-    """Every comparison with a number. Near a negation, what is meant may be the opposite; right behind one, it is."""
+    """Every comparison with a number."""
     for match in _COMPARISON.finditer(sentence):
         kind = next(_PHRASES[i][0] for i in range(len(_PHRASES)) if match.group(f"o{i}"))
         number, unit = _number(match["number"]), match["unit"].strip()
@@ -243,24 +223,16 @@ def comparisons(sentence: str) -> Iterator[Comparison]:
             continue
         text = sentence[match.start() : match.end("unit")].strip()
         signs = frozenset({"<", "<="} if kind == "up to" else {kind})
-        yield Comparison(text, _meant(signs, sentence[: match.start()], text, unit), number, unit, in_digits)
-    for match in _OR_MORE.finditer(sentence):
-        text, unit = match[0], match["unit"].strip()
-        signs = _meant(frozenset({">=" if match["more"] else "<="}), sentence[: match.start()], text, unit)
-        yield Comparison(text, signs, _number(match["number"]), unit, match["number"].lower() not in _WORDS)
+        yield Comparison(text, _meant(signs, sentence[: match.start()], text), number, unit, in_digits)
 
 
-def _meant(signs: frozenset[str], before: str, text: str, unit: str) -> frozenset[str]:
-    """What these signs may mean in a comparison with these words before it. What may be more than a number where
-    something is so, is at most that number elsewhere."""
-    if _SPEED.search(text) and _NO_SPEED.fullmatch(unit):
+def _meant(signs: frozenset[str], before: str, text: str) -> frozenset[str]:
+    """What these signs may mean in a comparison with these words before it: near a negation, a permission or a speed
+    (``faster than 2 s`` is less than 2 s) the opposite as well."""
+    if _SPEED.search(text):
         signs |= {FLIPPED[sign] for sign in signs}
-    clause = re.split(r"[.;:,]", before)[-1]
-    opposite = frozenset(OPPOSITE[sign] for sign in signs)
-    if _JUST_BEFORE.search(clause):
-        return opposite
-    allowed = signs <= {"<", ">"} and _MAY.search(clause)
-    return signs | opposite if allowed or _NEGATION.search(clause) else signs
+    unsure = _NEGATION.search(re.split(r"[.;:,]", before)[-1])
+    return signs | {OPPOSITE[sign] for sign in signs} if unsure else signs
 
 
 def _number(text: str) -> Fraction:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from dataclasses import field
+from collections import Counter
+from dataclasses import field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.records import dataclass
-from avow.base.tuning.shown import DIAGNOSTICS
+from avow.base.tuning.shown import ALIKE, DIAGNOSTICS
 
 _LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")
 
@@ -60,7 +61,8 @@ class Source:
 
 @dataclass(slots=True)
 class Reports:
-    """Diagnostics about one text, in the order found; identical ones are kept once."""
+    """Diagnostics about one text, in the order found; identical ones are kept once. Of those that differ in their place
+    alone the first `ALIKE` are kept, and all are counted."""
 
     source: Source
     found: list[Diagnostic] = field(default_factory=list)
@@ -69,6 +71,7 @@ class Reports:
     torn: list[int] = field(default_factory=list)
     """Where the lexer left something out, in ascending order: what is found near it is most likely a consequence."""
     _seen: set[tuple[str, str, Span | None]] = field(default_factory=set)
+    alike: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def add(self, diagnostic: Diagnostic) -> None:
         key = (diagnostic.code, diagnostic.message, diagnostic.span)
@@ -77,6 +80,9 @@ class Reports:
         if self.full:
             return
         self._seen.add(key)
+        self.alike[key[:2]] += 1
+        if self.alike[key[:2]] > ALIKE:
+            return
         self.found.append(diagnostic)
 
     def error(
@@ -111,6 +117,10 @@ class Reports:
 def in_order(reports: Reports) -> list[Diagnostic]:
     """What was found, by its place; at the end, that there is more than is kept."""
     found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
+    for (code, message), count in reports.alike.items():
+        if count > ALIKE:
+            at = next(k for k, d in enumerate(found) if (d.code, d.message) == (code, message))
+            found[at] = replace(found[at], message=f"{message} ({count} times, of which {ALIKE} are shown)")
     if reports.full:
         severity = Severity.ERROR if reports.failed else Severity.WARNING
         message = f"there is more to say, but {len(found)} diagnostics of one file are enough"

@@ -3,15 +3,17 @@
 The checker makes these from the surface syntax: every name is resolved, every widening explicit, every sort known.
 All later stages (Z3, Dafny, monitors, printers, hashes) read this and nothing else. Spans do not count in equality.
 
-Every node has `children`, its direct subterms in reading order (the bound variables of a quantifier are not subterms),
-and `rebuild`, itself with others in their place. A node without one of them is an error of mypy wherever it is used.
+Every node names the fields that hold its subterms; `children` and `rebuild` follow from that. The bound variables of a
+quantifier are not subterms.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
-from typing import TypeVar
+from operator import attrgetter
+from typing import Any
 
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
@@ -23,47 +25,54 @@ from avow.language.operator_names import Role as Role
 from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort, Sort, TupleSort
 
 
-class _Leaf:
-    """A term without subterms."""
+class _Node:
+    """What all terms have: `children` and `rebuild`, by the names of the fields that hold subterms."""
 
     __slots__ = ()
+    _subterms = ""
+    """These names, in reading order; one that is a tuple of subterms stands last, with a star."""
 
     @property
     def children(self) -> tuple[Term, ...]:
+        """The direct subterms in reading order."""
         return ()
 
-    def rebuild(self: _Self, parts: tuple[Term, ...]) -> _Self:
-        return self
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        """The term with other direct subterms."""
+        return self  # type: ignore[return-value]  # every subclass is one of the terms
+
+    def __init_subclass__(cls) -> None:
+        names = cls._subterms.split()
+        if names and "rebuild" not in vars(cls):
+            cls.rebuild = _rebuilding(names)  # type: ignore[method-assign,assignment]
+        if names:
+            cls.children = property(_listing(names))  # type: ignore[assignment]
 
 
-class _Pair:
-    """A term of two subterms."""
-
-    __slots__ = ()
-    left: Term
-    right: Term
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.left, self.right)
-
-
-class _Several:
-    """A term of as many subterms as are written."""
-
-    __slots__ = ()
-    items: tuple[Term, ...]
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.items
+def _listing(names: Sequence[str]) -> Callable[[Any], tuple[Term, ...]]:
+    """Reads the fields of these names."""
+    several = names[-1].startswith("*")
+    if several and len(names) == 1:
+        return attrgetter(names[0][1:])
+    if several:
+        first, rest = names[0], names[1][1:]
+        return lambda term: (getattr(term, first), *getattr(term, rest))
+    return attrgetter(*names) if len(names) > 1 else lambda term: (getattr(term, names[0]),)
 
 
-_Self = TypeVar("_Self")
+def _rebuilding(names: Sequence[str]) -> Callable[[Any, tuple[Term, ...]], Any]:
+    """Puts other values into these fields of a new term."""
+    at = {name.lstrip("*"): slice(k, None) if name.startswith("*") else k for k, name in enumerate(names)}
+
+    def rebuild(self: Any, parts: tuple[Term, ...]) -> Any:
+        fields = self.__dataclass_fields__
+        return type(self)(*[parts[at[name]] if name in at else getattr(self, name) for name in fields])
+
+    return rebuild
 
 
 @dataclass(frozen=True, slots=True)
-class Literal(_Leaf):
+class Literal(_Node):
     """A truth value, number or string; decimals are exact fractions."""
 
     value: bool | int | Fraction | str
@@ -72,7 +81,7 @@ class Literal(_Leaf):
 
 
 @dataclass(frozen=True, slots=True)
-class EnumValue(_Leaf):
+class EnumValue(_Node):
     """An element of an enumeration."""
 
     name: str
@@ -81,7 +90,7 @@ class EnumValue(_Leaf):
 
 
 @dataclass(frozen=True, slots=True)
-class Variable(_Leaf):
+class Variable(_Node):
     """An input, an output or a bound variable; `name` has no prefix."""
 
     role: Role
@@ -96,84 +105,62 @@ class Variable(_Leaf):
 
 
 @dataclass(frozen=True, slots=True)
-class Construct:
+class Construct(_Node):
     """``move(x, y)``: a value of an algebraic data type."""
+
+    _subterms = "*arguments"
 
     constructor: str
     arguments: tuple[Term, ...]
     sort: DataSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.arguments
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Construct(self.constructor, parts, self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Apply:
+class Apply(_Node):
     """``in.at(x, y)``: a function-typed variable applied to all its arguments."""
+
+    _subterms = "function *arguments"
 
     function: Term
     arguments: tuple[Term, ...]
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.function, *self.arguments)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Apply(parts[0], parts[1:], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Index:
+class Index(_Node):
     """``s(i)``: the element of a sequence at position i, counted from 0; without a value outside the sequence."""
+
+    _subterms = "sequence index"
 
     sequence: Term
     index: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.sequence, self.index)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Index(parts[0], parts[1], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Length:
+class Length(_Node):
     """``length(s)``, a natural number."""
+
+    _subterms = "sequence"
 
     sequence: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.sequence,)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Length(parts[0], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class Item(_Node):
     """``p.x``: an item of a record, by its position."""
+
+    _subterms = "record"
 
     record: Term
     position: int
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.record,)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         whole = parts[0]
@@ -181,20 +168,18 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class Argument(_Node):
     """The argument at `position` of the constructor that a value was made with: y of ``move(x, y)`` at 1; without a
     value where it was made with another one. No contract says it: it is what `avow.formulas.one_point_rule` puts for a
     variable, and only beside the condition that the value was made so (`made_with`)."""
+
+    _subterms = "value"
 
     value: Term
     constructor: str
     position: int
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.value,)
 
     def rebuild(self, parts: tuple[Term, ...]) -> Term:
         whole = parts[0]
@@ -204,24 +189,21 @@ class Argument:
 
 
 @dataclass(frozen=True, slots=True)
-class Widen:
+class Widen(_Node):
     """An INTEGER or NATURAL term used where a REAL is wanted; `sort` is REAL."""
+
+    _subterms = "term"
 
     term: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.term,)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Widen(parts[0], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Arithmetic(_Pair):
+class Arithmetic(_Node):
     """``+ - * /``; both sides have the sort of the whole, up to NATURAL within INTEGER. ``/`` is REAL."""
+
+    _subterms = "left right"
 
     operator: str
     left: Term
@@ -229,80 +211,65 @@ class Arithmetic(_Pair):
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Arithmetic(self.operator, parts[0], parts[1], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Negative:
+class Negative(_Node):
     """Unary minus; INTEGER or REAL."""
+
+    _subterms = "term"
 
     term: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.term,)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Negative(parts[0], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class TupleTerm(_Several):
+class TupleTerm(_Node):
+    _subterms = "*items"
     items: tuple[Term, ...]
     sort: TupleSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return TupleTerm(parts, self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class SequenceTerm(_Several):
+class SequenceTerm(_Node):
     """``<a, b, c>``."""
+
+    _subterms = "*items"
 
     items: tuple[Term, ...]
     sort: SequenceSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return SequenceTerm(parts, self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class SequenceRange:
+class SequenceRange(_Node):
     """``<a upto b>``: the integers from a to b, both included; empty where b < a."""
+
+    _subterms = "low high"
 
     low: Term
     high: Term
     sort: SequenceSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.low, self.high)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return SequenceRange(parts[0], parts[1], self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class SetTerm(_Several):
+class SetTerm(_Node):
     """``{red, orange}``."""
+
+    _subterms = "*items"
 
     items: tuple[Term, ...]
     sort: SetSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return SetTerm(parts, self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Compare(_Pair):
+class Compare(_Node):
     """``== != < <= > >=`` between terms of one sort (NATURAL and INTEGER count as one)."""
+
+    _subterms = "left right"
 
     operator: str
     left: Term
@@ -310,86 +277,66 @@ class Compare(_Pair):
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Compare(self.operator, parts[0], parts[1], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class In:
+class In(_Node):
     """``t in S`` where S is a set literal or a sequence; ``!in`` is its `Not`."""
+
+    _subterms = "item collection"
 
     item: Term
     collection: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.item, self.collection)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return In(parts[0], parts[1], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Not:
+class Not(_Node):
+    _subterms = "body"
     body: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.body,)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Not(parts[0], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class And(_Several):
+class And(_Node):
+    _subterms = "*items"
     items: tuple[Term, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return And(parts, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Or(_Several):
+class Or(_Node):
+    _subterms = "*items"
     items: tuple[Term, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Or(parts, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Implies(_Pair):
+class Implies(_Node):
+    _subterms = "left right"
     left: Term
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Implies(parts[0], parts[1], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Iff(_Pair):
+class Iff(_Node):
+    _subterms = "left right"
     left: Term
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Iff(parts[0], parts[1], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Quantified:
+class Quantified(_Node):
     """``forall(x, y in REAL | body)``. A bound variable never shadows another name in scope."""
+
+    _subterms = "body"
 
     quantifier: Quantifier
     variables: tuple[Variable, ...]
@@ -397,49 +344,32 @@ class Quantified:
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.body,)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Quantified(self.quantifier, self.variables, parts[0], self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Operation:
+class Operation(_Node):
     """``min(a, b)``: a built-in operator applied to arguments that have been brought to the sorts it wants.
 
     Of `mod` and `div` the second argument is a positive whole number that is written down, so that both are total."""
+
+    _subterms = "*arguments"
 
     operator: Builtin
     arguments: tuple[Term, ...]
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return self.arguments
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Operation(self.operator, parts, self.sort, self.span)
-
 
 @dataclass(frozen=True, slots=True)
-class Conditional:
+class Conditional(_Node):
     """``if F then s else t``; both branches have the sort of the whole, up to NATURAL within INTEGER."""
+
+    _subterms = "condition then otherwise"
 
     condition: Term
     then: Term
     otherwise: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def children(self) -> tuple[Term, ...]:
-        return (self.condition, self.then, self.otherwise)
-
-    def rebuild(self, parts: tuple[Term, ...]) -> Term:
-        return Conditional(parts[0], parts[1], parts[2], self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -454,7 +384,7 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
-class History:
+class History(_Node):
     """``once[5 steps](F)``, ``F since G``: what a run was like up to now, or (a response) has to be like from now on.
 
     The arguments are in the order in which they are written; of `counted(F since G)` they are F and G."""

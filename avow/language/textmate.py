@@ -48,6 +48,7 @@ def grammar() -> dict[str, Any]:
                 "match": rf"\b(assume|guarantee|A|G)\s+({_NAME})(?=\s*[\"(])",
                 "captures": {"1": {"name": "keyword.control.rcl"}, "2": {"name": "entity.name.function.rcl"}},
             },
+            {"name": "variable.language.rcl", "match": r"\b(in|out)(?=\.)"},
             {"name": "keyword.control.rcl", "match": _words((*_STRUCTURE, "A", "G"))},
             {"name": "keyword.operator.word.rcl", "match": _words((*_CONTROL, *infix))},
             {"name": "support.function.rcl", "match": _words(called) + r"(?=\s*[(\[])"},

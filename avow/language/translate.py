@@ -18,22 +18,19 @@ from avow.language.contract import Clause, Contract, Node, Port, Topic
 from avow.language.definitions import show_clause
 from avow.language.format import format_text
 from avow.language.lexer import quote
+from avow.language.load import check_text
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import BOOL, BUILTINS, Constructor
 from avow.language.styles import StyleName, latex_escape, latex_name
-from avow.language.subterms import subterms
-from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term
+from avow.language.terms import Conditional, Literal, Term
 
 
 def to_rcl(contract: Contract) -> str:
     """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas.
 
-    Raises `Rejected` where a formula so written would be nested too deeply to be read, or where a constant stands for
-    an element whose name is that of a port of the node.
+    Raises `Rejected` where that text could not be read: a formula is nested too deeply, or a constant stands for an
+    element whose name a port of the node has.
     """
-    hidden = tuple(fault for node in contract.nodes for fault in _hidden_elements(node))
-    if hidden:
-        raise Rejected(*hidden)
     out: list[str] = []
     declarations = list(_declarations(contract))
     if declarations:
@@ -53,36 +50,21 @@ def to_rcl(contract: Contract) -> str:
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
         out += ["}", ""]
     try:
-        return format_text("\n".join(out), "contract.rcl")
+        text = format_text("\n".join(out), "contract.rcl")
+        faults = tuple(d for d in check_text(text, "contract.rcl")[1] if d.is_error)
     except Rejected as rejected:
-        if any(d.code != "RCL110" for d in rejected.diagnostics):
-            raise
-        message = "with its constants and the sets of its quantifiers written out, the contract is nested too deeply"
+        text, faults = "", rejected.diagnostics
+    if faults:
         place = contract.nodes[0].span if contract.nodes else None
-        raise Rejected(Diagnostic("RCL110", message, place, hint="split the deepest clause")) from rejected
+        hint = "rename what has two meanings, or split the deepest clause"
+        first = f"with its constants written out, the contract is no RCL: {faults[0].message}"
+        raise Rejected(Diagnostic(faults[0].code, first, place, hint=hint))
+    return text
 
 
 def _is_own_section(clause: Clause) -> bool:
     """Whether a clause is written as ``steps(every 20 ms)``."""
     return clause.pace is not None and clause.name == "steps" and clause.sentence is None
-
-
-def _hidden_elements(node: Node) -> Iterator[Diagnostic]:
-    """Elements that the node's formulas speak of by way of constants only: their own names mean a port here."""
-    ports = {port.name: port for port in (*node.inputs, *node.outputs)}
-    for clause in node.clauses:
-        bound = {v.name for part in subterms(clause.formula) if isinstance(part, Quantified) for v in part.variables}
-        for term in subterms(clause.formula):
-            if isinstance(term, Operation) and (term.operator in ports or term.operator in bound):
-                message = f"a constant in `{clause.name}` applies `{term.operator}`, which is another name here"
-                yield Diagnostic("RCL202", message, clause.span, hint="rename one of the two")
-                break
-            name = term.name if isinstance(term, EnumValue) else term.constructor if isinstance(term, Construct) else ""
-            if name in ports and not (isinstance(term, Construct) and term.arguments):
-                what = f"a constant in `{clause.name}` stands for the element `{name}`"
-                message = f"{what}, whose name is an {ports[name].role}put here: that cannot be written without it"
-                yield Diagnostic("RCL202", message, clause.span, hint="rename one of the two")
-                break
 
 
 def _declarations(contract: Contract) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from avow.language.lexer import KEYWORDS, Token
 from avow.lsp.names import Occurrence, Text, What
@@ -81,47 +82,11 @@ def _look(token: Token, name: Occurrence | None) -> tuple[str, tuple[str, ...]]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Fold:
-    """A part that can be folded, by offsets; `kind` is the protocol's (``comment`` or ``region``)."""
-
-    start: int
-    end: int
-    kind: str = "region"
-
-
-def folds(text: Text) -> tuple[Fold, ...]:
-    """Contexts, nodes, their parts, and runs of comments, wherever they take more than a line."""
-    found = [Fold(start, end) for start, end in text.syntax.parts]
-    found += _contexts(text)
-    run: list[Token] = []
-    for comment in (*text.comments, None):
-        if run and comment is not None and _follows(run[-1], comment, text.text):
-            run.append(comment)
-            continue
-        if run:
-            found.append(Fold(run[0].start, run[-1].end, "comment"))
-        run = [comment] if comment is not None else []
-    several = {(f.start, f.end): f for f in found if "\n" in text.text[f.start : f.end]}
-    return tuple(several[place] for place in sorted(several))
-
-
-def _follows(comment: Token, other: Token, text: str) -> bool:
-    """Whether a comment stands on the line after another, with nothing between them."""
-    between = text[comment.end : other.start]
-    return not between.strip() and between.count("\n") == 1
-
-
-def _contexts(text: Text) -> list[Fold]:
-    """From each ``context`` to the brace before the next node."""
-    found: list[Fold] = []
-    begun: Token | None = None
-    last: Token | None = None
-    for token in (*text.tokens, Token("NODE", "", len(text.text), len(text.text))):
-        if token.type in ("CONTEXT", "NODE"):
-            if begun is not None and last is not None:
-                found.append(Fold(begun.start, last.end))
-            begun = token if token.type == "CONTEXT" else None
-        if token.type == "RBRACE":
-            last = token
-    return found
+def folds(text: Text) -> tuple[tuple[int, int], ...]:
+    """Contexts, nodes and their parts that take more than a line, by the offsets where they begin and end."""
+    found = set(text.syntax.parts)
+    for at, token in enumerate(text.tokens):
+        if token.type == "CONTEXT":
+            inside = takewhile(lambda t: t.type not in ("CONTEXT", "NODE"), text.tokens[at + 1 :])
+            found |= {(token.start, end) for end in [t.end for t in inside if t.type == "RBRACE"][-1:]}
+    return tuple(sorted(place for place in found if "\n" in text.text[slice(*place)]))

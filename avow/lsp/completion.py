@@ -1,15 +1,13 @@
-"""What may be written at a place of a contract or plan, and what the arguments of an operator or function are.
+"""What may be written at a place of a contract, and what the arguments of an operator or function are.
 
 It works on words, so that it does while a text is being typed.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 from avow.language import parser
 from avow.language.contract import Contract, Definition, Node, Port
@@ -17,11 +15,10 @@ from avow.language.lexer import LONG_UNITS, STEPS, UNITS, Token
 from avow.language.nodes import ROS_BUILTINS
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.scope import of_contract
-from avow.language.sorts import DataSort, FunctionSort, SequenceSort, Sort, TupleSort, components
+from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, SequenceSort, Sort, TupleSort, components
 from avow.language.terms import Past, Role
 from avow.lsp.names import Text
 from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE, QUANTIFIERS, SECTIONS
-from avow.system.schema import plan_schema
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +236,10 @@ def _of_formula(place: _Place, node: Node | None, contract: Contract) -> Iterato
         return
     if words[-1:] in (["IN"], ["NOT_IN"]):
         yield from _types(contract)
+    if words[-1:] in (["EQ"], ["NE"]) and (sort := _sort_before(place, node)) is not None:
+        yield from _of_sort(sort, node, contract)
+        if isinstance(sort, EnumSort | DataSort | BoolSort):
+            return
     yield from (Offer(name, "variable", "quantified") for name in place.bound)
     yield from (Offer(name, "variable", "a parameter") for name in place.parameters)
     for role in (Role.INPUT, Role.OUTPUT):
@@ -262,20 +263,46 @@ def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...
 
 def _fields(place: _Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
     """Those of the record before the point; where it is none of the node's ports, those of all records."""
-    chain: list[str] = []
-    for token in reversed(place.before):
-        if token.type not in ("NAME", "DOT", "IN", "OUT"):
-            break
-        chain += [token.text] if token.type == "NAME" else []
-    chain.reverse()
     ports = (*node.inputs, *node.outputs) if node is not None else ()
-    found: list[Sort] = [p.sort for p in ports if chain and p.name == chain[0]]
-    for name in chain[1:] if found else ():
-        found = [dict(zip(s.labels, s.items, strict=False))[name] for s in _records(found) if name in s.labels]
+    found = _sorts_of(place.before, ports)
     whole = found or [*components(*(sort for _, sort in contract.types), *(p.sort for p in ports))]
     for sort in _records(whole):
         pairs = zip(sort.labels, sort.items, strict=False)
         yield from (Offer(label, "field", show_sort(item)) for label, item in pairs)
+
+
+def _sorts_of(before: Sequence[Token], ports: Sequence[Port]) -> list[Sort]:
+    """The sorts that the port, or the field of one, has whose name ends the words."""
+    chain: list[str] = []
+    for token in reversed(before):
+        if token.type not in ("NAME", "DOT", "IN", "OUT"):
+            break
+        chain += [token.text] if token.type == "NAME" else []
+    chain.reverse()
+    found: list[Sort] = [p.sort for p in ports if chain and p.name == chain[0]]
+    for name in chain[1:] if found else ():
+        found = [dict(zip(s.labels, s.items, strict=False))[name] for s in _records(found) if name in s.labels]
+    return found
+
+
+def _sort_before(place: _Place, node: Node | None) -> Sort | None:
+    """The sort of the port, or the field of one, that stands before the last word."""
+    ports = (*node.inputs, *node.outputs) if node is not None else ()
+    return next(iter(_sorts_of(place.before[:-1], ports)), None)
+
+
+def _of_sort(sort: Sort, node: Node | None, contract: Contract) -> Iterator[Offer]:
+    """What has this sort: elements, the truth values, constants and ports."""
+    elements = of_contract(contract).elements
+    yield from (o for o in _values(contract) if o.kind == "element" and elements[o.label] == sort)
+    yield from (Offer(name, "constant", show_term(t, "rcl")) for name, t in contract.constants if t.sort == sort)
+    if isinstance(sort, BoolSort):
+        yield from (Offer(word, "constant", "BOOL") for word in ("TRUE", "FALSE"))
+    alike = (
+        {f"{p.role}.{p.name}" for p in (*node.inputs, *node.outputs) if p.sort == sort} if node is not None else set()
+    )
+    for role in (Role.INPUT, Role.OUTPUT):
+        yield from (o for o in _ports(node, role, f"{role}.") if o.label in alike)
 
 
 def _records(sorts: Iterable[Sort]) -> list[TupleSort]:
@@ -369,91 +396,3 @@ def _applied(place: _Place, name: str, role: str | None, contract: Contract) -> 
         shown = tuple(map(show_sort, parameters))
         return Signature(f"{name}({', '.join(shown)})", shown, 0, f"an element of {sort.name}")
     return None
-
-
-# --- plans: their keys, from the schema, and the names of the contract ------------------------------------------------
-
-_KEY = re.compile(r"^(?P<indent> *)(?P<dashes>(?:- +)*)(?P<key>[A-Za-z_][\w.]*)\s*:(?P<rest>.*)$")
-_TYPING = re.compile(r"^ *(?:- +)*[\w.]*$")
-_NAMED = ("nodes", "compound", "external")
-
-
-def plan_offers(text: str, contract: Contract, offset: int) -> tuple[Offer, ...]:
-    """All that may be written at an offset of a plan.
-
-    After ``node.`` its ports and guarantees; at the start of a line the
-    keys of the schema, and nodes where these are keys; elsewhere nodes."""
-    begin = text.rfind("\n", 0, offset) + 1
-    line = text[begin:offset]
-    if _in_comment(line):
-        return ()
-    owner = re.search(r"([A-Za-z_][A-Za-z0-9_']*)\.(?:(in|out)\.)?[A-Za-z0-9_']*$", line)
-    if owner is not None:
-        return tuple(_of_node(contract, owner[1], owner[2]))
-    nodes = [Offer(node.name, "node", "node") for node in contract.nodes]
-    if not _TYPING.match(line):
-        return tuple(nodes)
-    path = _path(text[:begin].split("\n"), len(line) - len(line.lstrip(" -")))
-    keys = [Offer(key, "key", detail, f"{key}: ") for key, detail in _keys(path)]
-    if path and path[-1] in _NAMED:
-        keys += [Offer(node.name, "node", "node", f"{node.name}:") for node in contract.nodes]
-    return tuple(keys or nodes)
-
-
-def _in_comment(line: str) -> bool:
-    return bool(re.search(r"(^|\s)#", re.sub(r"\"[^\"]*\"|'[^']*'", "", line)))
-
-
-def _of_node(contract: Contract, owner: str, role: str | None) -> Iterator[Offer]:
-    for node in contract.nodes:
-        if owner in ("in", "out") or node.name == owner:
-            side = role or (owner if owner in ("in", "out") else None)
-            for port in (*node.inputs, *node.outputs):
-                if side is None or port.role == side:
-                    yield Offer(port.name, "input" if port in node.inputs else "output", port.type_name)
-        if node.name == owner and role is None:
-            yield from (Offer(c.name, "guarantee", c.sentence or "") for c in node.guarantees)
-
-
-def _path(lines: Sequence[str], indent: int) -> tuple[str, ...]:
-    """The keys around a line with this indentation, outermost first."""
-    found: list[str] = []
-    for line in reversed(lines):
-        match = _KEY.match(line)
-        if match is None:
-            continue
-        at = len(match["indent"]) + len(match["dashes"])
-        if at < indent:
-            found.append(match["key"])
-            indent = len(match["indent"])
-            if match["dashes"]:
-                indent += 1  # what holds the list may stand in the column of its dashes
-    return tuple(reversed(found))
-
-
-def _keys(path: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The keys that the schema has at a path, with what they are."""
-    here = [plan_schema()]
-    for key in path:
-        here = [inner for schema in here for inner in _under(schema, key)]
-    for schema in here:
-        for key, inner in schema.get("properties", {}).items():
-            yield key, str(inner.get("description", ""))
-
-
-def _under(schema: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
-    properties, other = schema.get("properties", {}), schema.get("additionalProperties")
-    for inner in (properties[key],) if key in properties else (other,) if isinstance(other, dict) else ():
-        yield from _resolved(inner)
-
-
-def _resolved(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The schema, or what it refers to, or chooses among, or lists."""
-    if "$ref" in schema:
-        yield from _resolved(plan_schema()["$defs"][schema["$ref"].rsplit("/", 1)[-1]])
-        return
-    for inner in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
-        yield from _resolved(inner)
-    if isinstance(schema.get("items"), dict):
-        yield from _resolved(schema["items"])
-    yield schema

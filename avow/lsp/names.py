@@ -1,7 +1,7 @@
 """What every name in the contracts of a system stands for, and where it stands: a table, made from the syntax.
 
-It says the same as the checker (`avow.language.check_names`), for every clause that parses; a clause that does not is
-looked through word by word, which is enough for hovering. Places are offsets into the texts.
+It says the same as the checker (`avow.language.check_names`), for every clause that parses. Places are offsets into the
+texts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from avow.language.contract import ClauseKind, Contract
 from avow.language.lexer import Token, tokens
 from avow.language.load import unless_torn
 from avow.language.outline import read
-from avow.language.parser import QUANTIFIERS
 from avow.language.scope import Environment, of_contract
 from avow.language.source import Reports, Source
 from avow.language.syntax import (
@@ -228,7 +227,8 @@ class _Reader:
             if clause.formula is not None:
                 yield from self.in_formula(clause.formula, {})
             else:
-                yield from self.in_words([t for t in self.text_.tokens if _within(t, clause.inside)])
+                first, last = clause.inside
+                yield from self.in_words([t for t in self.text_.tokens if first <= t.start < last])
         self.node = ""
 
     def in_definition(self, tree: Define) -> Iterator[Occurrence]:
@@ -288,34 +288,13 @@ class _Reader:
         return ports.meaning(self.node, name) or self.global_name(name)
 
     def in_words(self, found: Sequence[Token]) -> Iterator[Occurrence]:
-        """The names of a clause that does not parse."""
-        bound: dict[str, Meaning] = {}
+        """The names of a clause that does not parse, but for those that it binds."""
         for at, token in enumerate(found):
-            if token.type in QUANTIFIERS:
-                for name in _bound_after(found, at):
-                    bound[name.text] = Meaning(What.VARIABLE, name.text, f"{self.text_.file}:{name.start}")
-                    yield from self.at(bound[name.text], name.start, name.end, True)
-            if token.type != "NAME":
-                continue
-            if at > 1 and found[at - 1].type == "DOT":
-                ports, role = self.nodes.get(self.node, Ports()), found[at - 2].text
-                meaning = ports.meaning(self.node, token.text, role) if role in (Role.INPUT, Role.OUTPUT) else None
-            else:
-                meaning = bound.get(token.text) or self.meaning(token.text)
-            yield from self.at(meaning, token.start, token.end)
-
-
-def _bound_after(found: Sequence[Token], at: int) -> Iterator[Token]:
-    """The names between a quantifier's parenthesis and its first ``in``."""
-    for token in found[at + 2 :]:
-        if token.type == "NAME":
-            yield token
-        elif token.type != "COMMA":
-            return
-
-
-def _within(token: Token, inside: tuple[int, int]) -> bool:
-    return inside[0] <= token.start < inside[1]
+            role = found[at - 2].text if at > 1 and found[at - 1].type == "DOT" else None
+            if token.type == "NAME" and role in (None, *Role):
+                ports = self.nodes.get(self.node, Ports())
+                meaning = self.meaning(token.text) if role is None else ports.meaning(self.node, token.text, role)
+                yield from self.at(meaning, token.start, token.end)
 
 
 def _declaring(one: Occurrence) -> Occurrence:

@@ -70,7 +70,7 @@ def project_of(file: str, texts: Mapping[str, str]) -> Project:
         return _project(alone, frozenset(), None)
     found = [clean_text(by_path[n][1], by_path[n][0]) if n in by_path else read_source(n) for n in names]
     sources = tuple(f for f in found if isinstance(f, Source))
-    return _project(sources, frozenset(plan.lints_off), PlanText(name, shown))
+    return _project(sources, plan.off, PlanText(name, shown))
 
 
 def _project(sources: tuple[Source, ...], off: frozenset[str], plan: PlanText | None) -> Project:

@@ -18,7 +18,6 @@ from avow.base.tuning.running import FIXES_TRIED
 from avow.language.source import Source
 
 _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
-_MEANT = re.compile(r"did you mean `([^`\n]+)`\?")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_']*")
 
 Check = Callable[[str], tuple[Diagnostic, ...]]
@@ -61,56 +60,29 @@ def _helps(fix: Fix, diagnostic: Diagnostic, text: str, before: tuple[Diagnostic
 
 
 def _candidates(diagnostic: Diagnostic, text: str, start: int, end: int) -> Iterator[Fix]:
-    hint = diagnostic.hint or ""
-    shown = text[start:end]
-    if meant := _MEANT.search(hint):
-        yield from _instead(meant[1], text, start, end)
+    hint, shown = diagnostic.hint or "", text[start:end]
     if "remove it" in hint or "delete it" in hint:
         after = end + 1 if text[end : end + 1] == " " and text[max(start - 1, 0)] in " \n" else end
-        yield Fix(f"Remove `{shown}`" if len(shown) < 30 else "Remove it", start, after, "")
-    if "end every declaration with `;`" in hint:
-        yield Fix("Write `;`", end, end, ";")
-        return
+        yield Fix("Remove it", start, after, "")
+    proposals = [next(filter(None, match.groups())) for match in _QUOTED.finditer(hint)]
     if "close it with" in hint:
-        yield from _closed(diagnostic, hint, text, start)
+        places = [len(text[: Source("", text).offset(s.line, s.column)].rstrip()) for _, s in diagnostic.notes if s]
+        line_end = text.find("\n", start)
+        for at in (*places, line_end if line_end >= 0 else len(text), len(text.rstrip())):
+            yield Fix(f"Close it with `{proposals[0]}`", at, at, f" {proposals[0]}")
         return
-    for match in _QUOTED.finditer(hint):
-        proposal = match[1] or match[2] or match[3]
-        commented = "//" in shown or "/*" in shown
-        if "…" in proposal or "NAME" in proposal or (commented and len(proposal.split()) > 1):
+    for proposal in proposals:
+        if "…" in proposal or "NAME" in proposal:
             continue
-        if f'"{proposal}"' in shown:
-            at = start + shown.index(f'"{proposal}"')
-            yield Fix(f"Write `{proposal}`", at, at + len(proposal) + 2, proposal)
-        yield from _instead(proposal, text, start, end)
-        if diagnostic.is_error and len(proposal.split()) == 1:
-            yield Fix(f"Write `{proposal}`", end, end, f" {proposal}" if proposal[:1].isalnum() else proposal)
-            yield Fix(f"Write `{proposal}`", start, start, f"{proposal} ")
+        title = f"Write `{proposal}`"
+        if (at := shown.find(f'"{proposal}"')) >= 0:
+            yield Fix(title, start + at, start + at + len(proposal) + 2, proposal)
         head = _WORD.match(proposal)
-        if head and proposal[head.end() :].startswith("("):
-            yield from _instead(head[0], text, start, end)
-
-
-def _instead(proposal: str, text: str, start: int, end: int) -> Iterator[Fix]:
-    """The proposal in place of all that the message is about, or of a word of it."""
-    title = f"Write `{proposal}`"
-    yield Fix(title, start, end, proposal)
-    words = list(_WORD.finditer(text, start, end))
-    for word in reversed(words[:1] + words[-1:]):
-        yield Fix(title, word.start(), word.end(), proposal)
-
-
-def _closed(diagnostic: Diagnostic, hint: str, text: str, start: int) -> Iterator[Fix]:
-    """What is missing, put where the message says that it should be, or at the end of the line or the text."""
-    sign = next((m[1] or m[2] for m in _QUOTED.finditer(hint)), "")
-    title = f"Close it with `{sign}`"
-    for _, span in diagnostic.notes:
-        if span is not None:
-            at = len(text[: Source("", text).offset(span.line, span.column)].rstrip())
-            yield Fix(title, at, at, f" {sign}")
-    line_end = text.find("\n", start)
-    at = line_end if line_end >= 0 else len(text)
-    yield Fix(title, at, at, sign)
-    at = len(text.rstrip())
-    yield Fix(title, at, at, f"\n{sign}" if sign == "}" else f" {sign}")
-    yield Fix(title, at, at, f"\n{sign}\n")
+        applied = head is not None and proposal[head.end() :].startswith("(")
+        for written in (proposal, head[0]) if head is not None and applied else (proposal,):
+            yield Fix(title, start, end, written)
+            words = list(_WORD.finditer(text, start, end))
+            yield from (Fix(title, *word.span(), written) for word in reversed(words[:1] + words[-1:]))
+        if diagnostic.is_error and len(proposal.split()) == 1:
+            yield Fix(title, end, end, f" {proposal}" if proposal[:1].isalnum() else proposal)
+            yield Fix(title, start, start, f"{proposal} ")

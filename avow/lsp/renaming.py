@@ -1,7 +1,7 @@
 """Renaming in all files of a system: the contracts and the plan.
 
-The new texts are checked before any edit is proposed: they declare the same contract as the old ones but for the name,
-no name in them means anything else than it did, and the plan names nothing that is not there. What does not come out so
+The new texts are checked before any edit is proposed: they have no new errors, no name in them means anything else than
+it did, and the plan names nothing that is not there. What does not come out so
 is refused with the reason. Ports that share a name are one thing to a system (they link, or the environment gives them
 one value), so they are renamed together.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,12 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.files import read_text
 from avow.base.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 from avow.formulas.formula import digest
-from avow.language.contract import Contract, Node, Port
+from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS, LIMITED
 from avow.language.load import check_in_part
-from avow.language.sorts import Constructor, DataSort, EnumSort, OpaqueSort, TupleSort
 from avow.language.source import Source
-from avow.language.terms import Builtin, Construct, EnumValue, Past, Role, Variable
-from avow.lsp.names import CLAUSES, OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
+from avow.language.terms import Builtin, Past
+from avow.lsp.names import OWNED, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.project import Project, faults_of_plan
 from avow.system.load import PLAN_FILE
@@ -153,8 +152,6 @@ def _compare(project: Project, after: Project, before: Sequence[Occurrence], mea
     now = [_bare(o.meaning) for o in all_occurrences(after)]
     if now != [to(o.meaning) for o in before]:
         raise Refused(f"`{new}` would stand for something else in another place")
-    if _flat(project.contract, meaning, new) != _flat(after.contract, None, ""):
-        raise Refused(f"with `{new}` the contract would say something else")
     if meaning.what is What.VARIABLE:
         clauses = zip(_clauses(project.contract), _clauses(after.contract), strict=True)
         if any(digest(one) != digest(other) for one, other in clauses):
@@ -176,69 +173,3 @@ def _new_faults(project: Project, after: Project) -> list[Diagnostic]:
     old, new = faults_of_plan(project), faults_of_plan(after)
     more = Counter(d.code for d in new) - Counter(d.code for d in old)
     return [d for d in new if more[d.code]]
-
-
-# --- the same contract but for a name --------------------------------------------------------------------------------
-
-
-def _flat(value: object, meaning: Meaning | None, new: str) -> list[object]:
-    """Everything that a contract says, in one list, with the name of what is meant changed on the way. Names of
-    quantified variables are left out (a digest compares them), and types as they are written."""
-    out: list[object] = []
-    stack: list[object] = [value]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, tuple):
-            out.append(len(part))
-            stack.extend(reversed(part))
-        elif is_dataclass(part) and not isinstance(part, type):
-            out.append(type(part).__name__)
-            for each in reversed(fields(part)):
-                if each.compare and not _is_left_out(part, each.name):
-                    stack.append(_changed(part, each.name, getattr(part, each.name), meaning, new))
-        else:
-            out.append(part)
-    return out
-
-
-def _is_left_out(part: object, name: str) -> bool:
-    match part:
-        case Variable(role=Role.BOUND):
-            return name == "name"
-        case Port():
-            return name == "type_name"
-        case EnumSort() | DataSort() | OpaqueSort():
-            return name == "name"  # what has none is called by its elements; names of types stand in the contract
-        case Contract():
-            return name == "files"
-        case _:  # all of it counts
-            return False
-
-
-_NAMED = ("types", "constants")
-"""Parts of a contract whose items are a name, and what has it: an enumeration may be of both."""
-_CLAUSES = ("assumptions", "guarantees")
-
-
-def _changed(part: object, name: str, value: object, meaning: Meaning | None, new: str) -> object:
-    if meaning is None:
-        return value
-    match part:
-        case Contract() if name in _NAMED and meaning.what in (What.TYPE, What.CONSTANT) and isinstance(value, tuple):
-            return tuple((new if own == meaning.name else own, said) for own, said in value)
-        case Node(name=meaning.name) if name == "name" and meaning.what is What.NODE:
-            return new
-        case Node(name=meaning.owner) if name in _CLAUSES and meaning.what in CLAUSES and isinstance(value, tuple):
-            return tuple(replace(clause, name=new) if clause.name == meaning.name else clause for clause in value)
-        case Port() | Variable() if name == "name" and meaning.what in PORTS and value == meaning.name:
-            return new
-        case TupleSort() if name == "labels" and meaning.what is What.FIELD and isinstance(value, tuple):
-            return tuple(new if label == meaning.name else label for label in value)
-        case EnumSort() if name == "members" and meaning.what is What.ELEMENT and isinstance(value, tuple):
-            return tuple(new if member == meaning.name else member for member in value)
-        case EnumValue() | Constructor() if name == "name" and meaning.what is What.ELEMENT and value == meaning.name:
-            return new
-        case Construct() if name == "constructor" and meaning.what is What.ELEMENT and value == meaning.name:
-            return new
-        case _:  # no name, or another
-            return value

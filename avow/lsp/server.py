@@ -21,9 +21,10 @@ from avow.language.load import check_in_part, clean_text
 from avow.lsp import features, protocol
 from avow.lsp.appearance import coloured, folds
 from avow.lsp.background import Answer, Asked, askable
-from avow.lsp.completion import offers, plan_offers, signature
+from avow.lsp.completion import offers, signature
 from avow.lsp.features import Document, StatusLookup
 from avow.lsp.names import CLAUSES, Occurrence, What
+from avow.lsp.plan_keys import about_key, plan_offers
 from avow.lsp.plan_names import PlanText
 from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
@@ -178,6 +179,8 @@ class Server:
     def hover(self, document: Document, lines: Lines, params: types.HoverParams) -> types.Hover | None:
         offset = lines.offset(params.position)
         said = features.hover(document, offset, self.status(document.file), self.asked.about)
+        if said is None and is_plan(document.file):
+            said = about_key(document.text, offset)
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
     def definition(self, document: Document, lines: Lines, params: types.DefinitionParams) -> list[types.Location]:
@@ -279,12 +282,8 @@ class Server:
         return [protocol.symbol(s, lines) for s in features.symbols(document)]
 
     def folding(self, document: Document, lines: Lines, _: types.FoldingRangeParams) -> list[types.FoldingRange]:
-        return [
-            types.FoldingRange(
-                lines.position(f.start).line, lines.position(f.end).line, kind=types.FoldingRangeKind(f.kind)
-            )
-            for f in folds(document.taken_apart)
-        ]
+        places = (lines.range(*place) for place in folds(document.taken_apart))
+        return [types.FoldingRange(p.start.line, p.end.line, kind=types.FoldingRangeKind.Region) for p in places]
 
     def semantic_tokens(self, document: Document, lines: Lines, _: types.SemanticTokensParams) -> types.SemanticTokens:
         return protocol.semantic_tokens(coloured(document.taken_apart, document.names), lines)
@@ -344,7 +343,7 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
         (types.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT, server.highlights, None),
         (types.TEXT_DOCUMENT_PREPARE_RENAME, server.prepare_rename, None),
         (types.TEXT_DOCUMENT_RENAME, server.rename, types.RenameOptions(prepare_provider=True)),
-        (types.TEXT_DOCUMENT_COMPLETION, server.completion, types.CompletionOptions(trigger_characters=["."])),
+        (types.TEXT_DOCUMENT_COMPLETION, server.completion, types.CompletionOptions(trigger_characters=[".", "="])),
         (
             types.TEXT_DOCUMENT_SIGNATURE_HELP,
             server.signature_help,

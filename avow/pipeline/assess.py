@@ -22,7 +22,7 @@ from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCond
 from avow.assurance.signed import KEYS, newest_signed
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest_file, is_intact, read_regular, read_text, sha256, write
+from avow.base.files import digest_file, digest_or_missing, is_intact, read_regular, read_text, sha256, write
 from avow.base.git import head
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
@@ -39,132 +39,119 @@ from avow.evidence.signing import private_key
 from avow.pipeline import check as checking
 from avow.pipeline.doctor import findings
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
+from avow.pipeline.node_index import INDEX, write_indexes
+from avow.pipeline.plan_check import left_out
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, Run, asked_seconds, signing_key
+from avow.pipeline.settings import EXPLAIN, asked_seconds, signing_key
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
+from avow.report import render_all, write_index
+from avow.report.page import environment
+from avow.report.short import terminal_lines
 from avow.system.folding import seen
 from avow.system.graph import dataflow
 from avow.system.graph_svg import sheet
 from avow.system.plan import System
 
 
-@dataclass(frozen=True, slots=True)
-class Assessment:
-    """What is needed to assess one system."""
+def _ledger(state: State, surveyed: Survey) -> Ledger:
+    return ledger_of(state.workspace.ledger(surveyed.system.name))
 
-    state: State
-    surveyed: Survey
 
-    @property
-    def workspace(self) -> Workspace:
-        return self.state.workspace
-
-    @property
-    def run(self) -> Run:
-        return self.state.run
-
-    @property
-    def system(self) -> str:
-        return self.surveyed.system.name
-
-    @property
-    def stamp(self) -> Path:
-        return self.workspace.artifacts / self.system / "report.json"
+def _stamp(state: State, surveyed: Survey) -> Path:
+    return state.workspace.artifacts / surveyed.system.name / "report.json"
 
 
 def is_settled(state: State) -> bool:
     """Whether a later run would ask nothing again: no answer is one that it must not be content with."""
-    for a in state.assessments:
-        with (ledger := ledger_of(a.workspace.ledger(a.system))).still():
-            found = (ledger.current(o.id, w.keys[o.id]) for w in a.surveyed.catalogue.works for o in w.obligations)
+    for surveyed in state.surveyed:
+        with (ledger := _ledger(state, surveyed)).still():
+            found = (ledger.current(o.id, w.keys[o.id]) for w in surveyed.catalogue.works for o in w.obligations)
             if any(records and records[-1].evidence.details.get(RETRY) for records in found):
                 return False
     return True
 
 
-def render(assessment: Assessment) -> Result:
+def render(state: State, surveyed: Survey) -> Result:
     """Build the case and write every format, unless what stands in reports/ already says the same."""
-    system = assessment.surveyed.system
-    ledger = ledger_of(assessment.workspace.ledger(assessment.system))
-    acknowledge(assessment.workspace, ledger)
-    key = _key(assessment)
-    known = read_note(Rendering, assessment.stamp)
-    root = assessment.workspace.root
+    system, ledger = surveyed.system, _ledger(state, surveyed)
+    acknowledge(state.workspace, ledger)
+    key = _key(state, surveyed)
+    known = read_note(Rendering, _stamp(state, surveyed))
+    root = state.workspace.root
     if known is not None and known.key == key and all(is_intact(root / p, sha) for p, sha in known.files.items()):
         result = known.result
     else:
-        from avow.report import render_all
+        case = build(state, surveyed)
+        state.cases[surveyed.system.name] = key, case
+        written = render_all(case, state.workspace.report(surveyed.system.name), signing_key())
+        result = _summarise(state, surveyed, case)
+        pages = write_indexes(state.workspace, surveyed.catalogue.works, case)
+        files = {state.workspace.relative(p): digest_file(p) for p in (*written, *pages)}
+        write_note(_stamp(state, surveyed), Rendering(key, files, result))
+        state.changed.append(surveyed.system.name)
+    confirm(state.workspace, ledger)
+    plans = [(Path(d.span.file), f"{d.message} [{d.code}]") for d in left_out(system) if d.span]
+    beside = ((state.workspace.relative(path), why) for path, why in plans)
+    return replace(result, left_out=tuple(beside))
 
-        case = build(assessment)
-        assessment.state.cases[assessment.system] = key, case
-        rendered = render_all(case, assessment.workspace.report(assessment.system), signing_key())
-        result = _summarise(assessment, case, rendered.left_out)
-        files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
-        write_note(assessment.stamp, Rendering(key, files, result))
-        assessment.state.changed.append(assessment.system)
-    confirm(assessment.workspace, ledger)
-    plans = [(Path(d.span.file), f"{d.message} [{d.code}]") for d in checking.left_out(system) if d.span]
-    beside = ((assessment.workspace.relative(path), why) for path, why in plans)
-    return replace(result, left_out=(*result.left_out, *beside))
 
-
-def certify(assessment: Assessment) -> KernelRun:
+def certify(state: State, surveyed: Survey) -> KernelRun:
     """Let the kernel establish again, in this run, what the calculus told that it proved: the report's grades."""
-    workspace, system = assessment.workspace, assessment.surveyed.system
+    workspace, system = state.workspace, surveyed.system
     ledger = ledger_of(workspace.ledger(system.name))
-    entries = counting_now(ledger, workspace.root, system, assessment.run)
-    found = kernel_run(entries, workspace.root, system, assessment.run)
+    entries = counting_now(ledger, workspace.root, system, state.run)
+    found = kernel_run(entries, workspace.root, system, state.run)
     twice = sum(one.solvers > 1 for one in found.established)
     told = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
-    assessment.state.certified[system.name] = told
+    state.certified[system.name] = told
     return found
 
 
-def report(assessment: Assessment) -> bool:
+def report(state: State, surveyed: Survey) -> bool:
     """Render the report, whatever the gates say."""
-    return assessment.state.results.note(render(assessment), gated=False)
+    return state.results.note(render(state, surveyed), gated=False)
 
 
-def gate(assessment: Assessment) -> TaskError | bool:
+def gate(state: State, surveyed: Survey) -> TaskError | bool:
     """Render the report and note whether the policy's gates pass: the run's exit code follows from all of them."""
     try:
-        return assessment.state.results.note(render(assessment), gated=True)
+        return state.results.note(render(state, surveyed), gated=True)
     except Rejected as rejected:
         return checking.refuse(rejected)
     except OSError as error:
         return TaskError(f"the report cannot be written: {error}")
 
 
-def case_of(assessment: Assessment) -> Case:
+def case_of(state: State, surveyed: Survey) -> Case:
     """The case as it was made for the report, if that is of what stands now; else made anew. Raises Rejected."""
-    made = assessment.state.cases.get(assessment.system)
-    return made[1] if made is not None and made[0] == _key(assessment) else build(assessment)
+    made = state.cases.get(surveyed.system.name)
+    return made[1] if made is not None and made[0] == _key(state, surveyed) else build(state, surveyed)
 
 
-def build(assessment: Assessment) -> Case:
+def build(state: State, surveyed: Survey) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
-    system, workspace = assessment.surveyed.system, assessment.workspace
+    system, workspace = surveyed.system, state.workspace
     ledger = ledger_of(workspace.ledger(system.name))
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
     files = (*plan.contract_files, plan.path, *plan.included)
-    entries = counting_now(ledger, workspace.root, system, assessment.run)
+    entries = counting_now(ledger, workspace.root, system, state.run)
     texts = {workspace.relative(path): read_regular(path) for path in files}
     return conclude(
         facts_of_system(
             system,
-            assessment.surveyed.catalogue.obligations,
+            surveyed.catalogue.obligations,
             entries,
-            keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
+            keys={**surveyed.keys, **_given_up(state, surveyed, ledger)},
             today=_today(),
             run=RunInfo(
-                assessment.run.id,
+                state.run.id,
                 datetime.now(UTC).isoformat(timespec="seconds"),
-                round(assessment.run.seconds, 1),
+                round(state.run.seconds, 1),
                 __version__,
-                assessment.run.fresh,
+                state.run.fresh,
                 f"doit verify:{system.name}",
                 head(workspace.root),
                 {
@@ -174,41 +161,44 @@ def build(assessment: Assessment) -> Case:
             ),
             derivations=_derivation_views(system),
             discharging=_discharging(system),
-            methods=_methods(assessment),
+            methods=_methods(state, surveyed),
             tools=_tools(),
-            discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
+            discrepancies=discrepancies(workspace, ledger, surveyed),
             digests={path: sha256(data) for path, data in texts.items()},
             ledger_head=ledger.head,
             graph_svg=_picture(system),
             sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
             baseline=newest_signed(workspace.signed, system.name)[0],
-            kernel=kernel_run(entries, workspace.root, system, assessment.run),
+            kernel=kernel_run(entries, workspace.root, system, state.run),
             recorded=ledger.records(),
         )
     )
 
 
-def _given_up(assessment: Assessment, ledger: Ledger) -> dict[tuple[str, str], str]:
-    """Refutations by a case of claim and subject as they are now, by methods that the plan no longer has: to take the
-    method out of the plan is no answer to what it found."""
+def _given_up(state: State, surveyed: Survey, ledger: Ledger) -> dict[tuple[str, str], str]:
+    """Refutations by a counterexample, of claim and files as they are now, by methods that the plan no longer has: a
+    method that leaves the plan does not take its refutation with it; a repaired program does."""
     found: dict[tuple[str, str], str] = {}
-    planned, now = assessment.surveyed.keys, {o.id: o.digest for o in assessment.surveyed.catalogue.obligations}
-    for entry in as_of_now(ledger, assessment.workspace.root):
+    root = state.workspace.root
+    planned, now = surveyed.keys, {o.id: o.digest for o in surveyed.catalogue.obligations}
+    for entry in as_of_now(ledger, state.workspace.root):
         record = entry.evidence
         pair = (record.obligation, record.method)
-        if CASE in record.details and now.get(record.obligation) == record.obligation_digest and pair not in planned:
+        refuted = CASE in record.details and now.get(record.obligation) == record.obligation_digest
+        same = (digest_or_missing(root / path) == mark for path, mark in record.inputs.items())
+        if refuted and pair not in planned and all(same):
             found[pair] = record.key
     return found
 
 
-def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
-    plugins = assessment.surveyed.system.plan.plugins
+def _methods(state: State, surveyed: Survey) -> tuple[MethodInfo, ...]:
+    plugins = surveyed.system.plan.plugins
     found = []
     for name in names():
         tool = backend(name, plugins)
         missing = [t for t in tool.tools() if not t.present and not t.optional]
         install = missing[0].install if missing else ""
-        unsuited = tuple(node.name for node in assessment.surveyed.system.contract.nodes if not tool.suits(node))
+        unsuited = tuple(node.name for node in surveyed.system.contract.nodes if not tool.suits(node))
         found.append(
             MethodInfo(
                 tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install, unsuited
@@ -225,21 +215,22 @@ def _today() -> date:
     return datetime.now().astimezone().date()
 
 
-def _key(assessment: Assessment) -> str:
+def _key(state: State, surveyed: Survey) -> str:
     """The report depends on the texts, the plan, all evidence, the day (reviews and accepted risks expire), and what is
     installed: a format that was left out is made once its tool is there."""
-    surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
-    keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
+    ledger = _ledger(state, surveyed)
+    asked = {**surveyed.keys, **_given_up(state, surveyed, ledger)}
+    keys = sorted((*pair, key) for pair, key in asked.items())
     damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
     explain = os.environ.get(EXPLAIN, "")
-    root = assessment.workspace.root
-    entries = counting_now(ledger, root, surveyed.system, assessment.run)
+    root = state.workspace.root
+    entries = counting_now(ledger, root, surveyed.system, state.run)
     earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
-    signed = [digest_file(path) for path in _signatures(assessment)]
+    signed = [digest_file(path) for path in _signatures(state, surveyed)]
     key = signing_key()
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
-    kernel = kernel_run(entries, root, surveyed.system, assessment.run)
+    kernel = kernel_run(entries, root, surveyed.system, state.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     tools = [[tool.name, tool.version, tool.install] for tool in _tools()]
     told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
@@ -251,21 +242,19 @@ def _seconds_in_words() -> str:
     return "60, unless the plan says otherwise" if asked is None else f"{asked:g}, as asked for this run"
 
 
-def _signatures(assessment: Assessment) -> list[Path]:
+def _signatures(state: State, surveyed: Survey) -> list[Path]:
     """The files that say which report was signed last."""
-    signed = assessment.workspace.signed
-    return [p for folder in (assessment.system, KEYS) for p in sorted((signed / folder).glob("*")) if p.is_file()]
+    signed = state.workspace.signed
+    return [p for folder in (surveyed.system.name, KEYS) for p in sorted((signed / folder).glob("*")) if p.is_file()]
 
 
-def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, str], ...]) -> Result:
-    from avow.report.short import terminal_lines
-
+def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
     explain = bool(os.environ.get(EXPLAIN))
     gates = []
     for g in case.gates:
         closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
         gates.append((g.title, g.passed, "; ".join([g.reason, *(f"next: {text}" for text in closes)])))
-    index = assessment.workspace.relative(assessment.workspace.report(assessment.system) / "index.html")
+    index = state.workspace.relative(state.workspace.report(surveyed.system.name) / "index.html")
     counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
     return Result(
         case.system,
@@ -273,10 +262,9 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         dict(counts),
         index,
         tuple(gates),
-        left_out,
-        case.answers.told,
-        case.answers.tone.value,
-        tuple(terminal_lines(case)),
+        verdict=case.answers.told,
+        tone=case.answers.tone.value,
+        lines=tuple(terminal_lines(case)),
     )
 
 
@@ -289,6 +277,14 @@ class Rendering:
     result: Result
 
 
+def edited_pages(workspace: Workspace, system: str) -> tuple[Path, ...]:
+    """The nodes' pages that are not as they were written with the last report, where this user wrote it."""
+    known = read_note(Rendering, workspace.artifacts / system / "report.json")
+    files = known.files if known is not None else {}
+    pages = {workspace.root / name: sha for name, sha in files.items() if Path(name).name == INDEX}
+    return tuple(path for path, sha in pages.items() if path.is_file() and digest_file(path) != sha)
+
+
 _OVERVIEW = ".overview.json"
 """Beside the artifacts: the digest of the page over all systems, as it was written, and whose reports are old."""
 
@@ -298,7 +294,7 @@ def earlier(state: State) -> tuple[str, ...]:
     Of a run that read nothing, none is known."""
     if not state.read:
         return ()
-    reports, read = state.workspace.reports, {a.system for a in state.assessments}
+    reports, read = state.workspace.reports, {s.system.name for s in state.surveyed}
     return tuple(sorted(p.parent.name for p in reports.glob("*/report.json") if p.parent.name not in read))
 
 
@@ -316,15 +312,13 @@ def index_is_due(state: State) -> bool:
     if state.changed or earlier(state) != known.earlier:
         return True
     page = state.workspace.reports / "index.html"
-    return bool(state.assessments and state.results.all and not is_intact(page, known.sha256))
+    return bool(state.surveyed and state.results.all and not is_intact(page, known.sha256))
 
 
 def write_overview(state: State) -> None:
     """Write reports/index.html over every system that has evidence. Raises OSError."""
-    from avow.report import write_index
-
     workspace, old = state.workspace, earlier(state)
-    cases = [case_of(a) for a in state.assessments if workspace.ledger(a.system).is_file()]
+    cases = [case_of(state, s) for s in state.surveyed if workspace.ledger(s.system.name).is_file()]
     if cases or old:
         write_index(cases, workspace.reports, old)
         page = digest_file(workspace.reports / "index.html")
@@ -334,8 +328,6 @@ def write_overview(state: State) -> None:
 def mark_earlier(state: State) -> None:
     """Say in reports of an earlier state, in every format, that they are. Once the system can be read again they are
     not as they were written, and therefore written anew. Raises OSError."""
-    from avow.report import render_all
-
     for name in earlier(state):
         place = state.workspace.reports / name
         try:
@@ -348,8 +340,6 @@ def mark_earlier(state: State) -> None:
 
 def _mark_pages(folder: Path) -> None:
     """Where report.json was damaged: what a person opens is marked, as it stands."""
-    from avow.report.page import environment
-
     mark = environment().get_template("earlier.html.j2").render()
     for page in sorted(folder.glob("*.html")):
         before, body, after = read_text(page, "utf-8", errors="replace").partition("<body>")
@@ -385,6 +375,5 @@ def _view(system: System, written: Written) -> Derivation:
             SideCondition(c.text, f"{system.name}/{c.obligation}" if c.obligation else "")
             for c in written.side_conditions
         ),
-        written.latex,
         written.conditional,
     )

@@ -1,41 +1,28 @@
-"""The check stage: what is wrong with contract and plan, before any solver is asked."""
+"""The check stage, and how it reports what is wrong with contract and plan."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.assurance.policy import read_policy
-from avow.backend_kit import one_step
-from avow.backend_kit.protocol import COMMON_OPTIONS, asking
-from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
 from avow.base.plain import count
 from avow.base.records import dataclass
-from avow.base.remembered import Shelf
 from avow.base.rendering import printable, render
 from avow.base.tuning.shown import WARNINGS
-from avow.base.workspace import Workspace, plans_within
-from avow.language.load import check_paths
+from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
+from avow.pipeline.methods import is_portable, method_backend
+from avow.pipeline.plan_check import diagnostics, left_out
 from avow.pipeline.state import task_name
-from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
+from avow.pipeline.work import Work, planned_method
 from avow.pipeline.workload import Survey
-from avow.system import launched
-from avow.system.faults import rest_of
-from avow.system.graph import dataflow
-from avow.system.plan import Located, Method, System
-from avow.system.rosgraph import account
-from avow.system.schema import violations
-from avow.system.statements import requirement_sentences, unconfirmed, without_words
-from avow.system.topics import heard, turned, unknown_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,158 +63,6 @@ def _depends_on_slice(work: Work) -> bool:
     return not work.is_engine and is_portable(method_backend(work.system, planned_method(work)))
 
 
-def diagnostics(
-    system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
-) -> tuple[Diagnostic, ...]:
-    """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off.
-    `clean`: (node, method) of which nothing is to be said; those found to be so are added. `shelf`: where it is kept
-    what the nodes' texts say, and which options have the right shape."""
-    off = frozenset(system.plan.lints_off)
-    return (*check_paths(system.plan.contract_files, off=off, shelf=shelf)[1], *of_plan(system, clean, shelf))
-
-
-def of_plan(
-    system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
-) -> tuple[Diagnostic, ...]:
-    """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
-    what each backend says of its options; without the warnings that the plan switches off. `clean` and `shelf`: as for
-    `diagnostics`."""
-    found = [
-        *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
-        *launched.told(system),
-        *unknown_types(system.plan, system.contract),
-        *turned(system.plan, system.contract),
-        *_model(system),
-        *_policy(system),
-        *requirement_sentences(system),
-        *without_words(system),
-        *unconfirmed(system),
-        *left_out(system),
-    ]
-    for plan in system.plan.nodes:
-        for method in plan.methods:
-            name = plan.node, method.id
-            if clean is None or name not in clean:
-                said = tuple(_method(system, plan.node, method, shelf))
-                found += said
-                if clean is not None and not said:
-                    clean.add(name)
-    return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
-
-
-def left_out(system: System) -> tuple[Diagnostic, ...]:
-    """The plans in and below the system's folder that it does not take in, a warning each; none where the plan switches
-    them off."""
-    if "CLI021" in system.plan.lints_off:
-        return ()
-    taken_in = {path.resolve() for path in (system.plan.path, *system.plan.included)}
-    below = (path for path in plans_within(system.plan.root) if path.resolve() not in taken_in)
-    return tuple(not_verified(path, system.name, Severity.WARNING) for path in below)
-
-
-def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERROR) -> Diagnostic:
-    """What is to be said of a plan that no run looks at; `around`: the system in whose folder it lies."""
-    why = f"'{around}' does not take it in" if around else "its folder is not one of contracts/ itself"
-    hint = "move its folder into contracts/, or take it in under `subsystems` of another plan"
-    if path.name != "plan.yaml":
-        why, hint = "a plan's file is called plan.yaml", "rename it, or remove it"
-    return Diagnostic("CLI021", f"this plan is not verified: {why}", Span(str(path), 1, 1, 1, 1), severity, hint)
-
-
-def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
-    """What is to be said of the policy and of the methods' options of a system that cannot be loaded."""
-    rest = rest_of(folder)
-    if rest is None:
-        return ()
-    found = [*_policy(rest.system), *unknown_types(rest.system.plan, rest.system.contract)]
-    plan, contract, _ = heard(rest.system.plan, rest.system.contract)
-    system = replace(rest.system, plan=plan, contract=contract)
-    for node in rest.system.plan.nodes:
-        for method in node.methods:
-            try:
-                found += _method(system, node.node, method, follows=rest.may_follow)
-            except Rejected as rejected:
-                found += rejected.diagnostics
-            except Exception:
-                if rest.is_sound:
-                    raise
-    return tuple(d for d in found if d.is_error)
-
-
-def _model(system: System) -> tuple[Diagnostic, ...]:
-    """The paper's step 1: does the system model account for all of the ROS graph?"""
-    try:
-        told = account(system, dataflow(system))
-    except Rejected as rejected:  # a graph that cannot be read: said with everything else that is wrong
-        return rejected.diagnostics
-    return told.findings if told is not None else ()
-
-
-def _policy(system: System) -> tuple[Diagnostic, ...]:
-    try:
-        read_policy(system.plan.policy)
-    except Rejected as rejected:
-        return rejected.diagnostics
-    return ()
-
-
-def _method(
-    system: System,
-    node: str,
-    method: Method,
-    shelf: Shelf | None = None,
-    *,
-    follows: Callable[[Diagnostic], bool] = lambda _: False,
-) -> Iterable[Diagnostic]:
-    """What is wrong with the options, and what the backend says of those that are right, but for what only follows from
-    a fault that is told already."""
-    if method.id in ENGINES:
-        yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
-        return
-    try:
-        tool = method_backend(system, method)
-    except Rejected as rejected:
-        if any(d.code != "BACKEND005" for d in rejected.diagnostics):
-            raise
-        yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
-        return
-    whole = f"nodes.{node}: {method.id}"
-    with asking(tool.name, "options_schema"):
-        wrong = tuple(_schema(tool.options_schema, method.options, whole, shelf))
-    yield from wrong
-    if any(d.is_error for d in wrong):
-        method = replace(method, options=_right(tool.options_schema, method.options))
-        if any(_schema(tool.options_schema, method.options, whole)):
-            return  # without what is wrong they say nothing
-    if node in [n.name for n in system.contract.nodes]:
-        job = method_job(system, system.contract.node(node), method)
-        yield from (d for d in one_step.check(tool, job) if not follows(d))
-
-
-def _right(schema: Mapping[str, Any], options: Located) -> Located:
-    """The options that are right by themselves."""
-    known = schema.get("properties", {})
-    if not isinstance(options.data, Mapping):
-        return options
-    alone = {key: Located({key: value}, options.span) for key, value in options.data.items()}
-    right = {
-        key: options.data[key]
-        for key, one in alone.items()
-        if key in COMMON_OPTIONS or (key in known and not any(_schema({"properties": known}, one, "")))
-    }
-    return replace(options, data=right)
-
-
-def _schema(
-    schema: Mapping[str, Any], options: Located, whole: str, shelf: Shelf | None = None
-) -> Iterable[Diagnostic]:
-    data = options.data
-    if isinstance(data, Mapping):
-        own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
-        options = Located(own, options.span, options.spans)
-    yield from violations(options, schema, whole, shelf)
-
-
 def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> None:
     """The first few warnings, a line each: `avow check` shows all of it, with the source."""
     warned = [d for d in found if d.severity is Severity.WARNING]
@@ -254,7 +89,7 @@ def refuse_quietly(name: str) -> TaskError:
     return TaskError(f"{name} cannot be read; see check:{task_name(name)}")
 
 
-def _stamp(workspace: Workspace, surveyed: Survey) -> Any:
+def _stamp(workspace: Workspace, surveyed: Survey) -> Path:
     return workspace.artifacts / surveyed.system.name / "check.json"
 
 

@@ -1,43 +1,39 @@
-"""Works on other machines, by Dask.distributed (the extra ``avow[cluster]``).
+"""Jobs on other machines, by Dask.distributed (the extra ``avow[cluster]``).
 
-The scheduler and its connections are Dask's; what travels is bytes, both ways: nothing that a worker says is unpickled
-here, and nothing that it prints is shown. What a worker does is in `avow.pipeline.cluster_worker`. Who reaches a
-scheduler can run code on its workers, so that connections to other machines are by TLS with certificates on both sides.
+Dask has the scheduler and the connections; what travels is a request's bytes and a response's bytes. A worker is in
+`avow.pipeline.cluster_worker`. Whoever reaches a scheduler can run code on its workers, so that connections to other
+machines are by TLS with certificates on both sides.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import ipaddress
 import logging
 import os
-import queue
 import socket
 import ssl
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
-from avow.base.codec import Unreadable, from_text
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tuning.running import (
-    CLUSTER_ANSWER,
-    CLUSTER_CONNECT,
-    CLUSTER_LOOK,
-    CLUSTER_PATIENCE,
-    CLUSTER_RETRIES,
-    WORKER_GRACE,
-)
-from avow.pipeline.cluster_worker import needs, own_code, perform, tools_of
-from avow.pipeline.executors import Asked, Came, Failed
+from avow.base.tuning.running import CLUSTER_ANSWER, CLUSTER_CONNECT, CLUSTER_LOOK, CLUSTER_PATIENCE, CLUSTER_RETRIES
+from avow.pipeline.cluster_worker import OWN, Own, needs, offered, own_code, perform, tools_of
+from avow.pipeline.engine_code import code_mark
+from avow.pipeline.requests import Request, Response, read_response, request_bytes, request_digest
 
 _TLS = {"ca": "AVOW_TLS_CA", "cert": "AVOW_TLS_CERT", "key": "AVOW_TLS_KEY"}
 """Environment: files of the certificate authority, of this side's certificate and of its key."""
+_GONE = "the cluster's scheduler does not answer any more"
+_NOBODY = "no worker of the cluster is left that could do it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +45,7 @@ class Address:
 
     @classmethod
     def read(cls, text: str) -> Address:
-        """Of ``dask+tls://HOST:PORT`` or ``dask+tcp://HOST:PORT``. Raises Rejected (``CLUSTER001``)."""
+        """From ``dask+tls://HOST:PORT`` or ``dask+tcp://HOST:PORT``. Raises Rejected (``CLUSTER001``)."""
         scheme, found, rest = text.partition("://")
         host = rest.rpartition(":")[0].strip("[]")
         if not found or scheme not in ("dask+tls", "dask+tcp") or not host or not rest.rpartition(":")[2].isdigit():
@@ -63,8 +59,9 @@ class Address:
         return cls(f"{scheme.removeprefix('dask+')}://{rest}", scheme == "dask+tls")
 
     def security(self) -> Any:
-        """Raises Rejected (``CLUSTER002``) where a certificate is missing."""
-        from distributed.security import Security
+        """Raises Rejected: ``CLUSTER002`` where a certificate is missing, ``CLUSTER005`` where one, of either side, is
+        not accepted (Dask would try again and again, and not say why)."""
+        from distributed.security import Security  # an extra
 
         if not self.secure:
             return Security(require_encryption=False)
@@ -73,19 +70,15 @@ class Address:
         if missing:
             message = f"dask+tls:// needs certificates: {', '.join(missing)} must name files"
             raise Rejected(Diagnostic("CLUSTER002", message))
+        self._greet(paths)
         parts = {f"tls_{side}_{part}": paths[part] for side in ("client", "worker") for part in ("cert", "key")}
         return Security(require_encryption=True, tls_ca_file=paths["ca"], **parts)
 
-    def greet(self) -> None:
-        """Raises Rejected (``CLUSTER005``) where a certificate, of either side, is not accepted: Dask would only try
-        again and again, and not say why. That nobody is there yet is no matter of certificates."""
-        if not self.secure:
-            return
-        paths = {name: os.environ.get(variable, "") for name, variable in _TLS.items()}
+    def _greet(self, paths: Mapping[str, str]) -> None:
         host, _, port = self.url.partition("://")[2].rpartition(":")
         try:
             context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=paths["ca"])
-            context.check_hostname = False  # as Dask has it: who has a certificate of the authority belongs to it
+            context.check_hostname = False  # as Dask has it: a certificate of the authority is enough
             context.load_cert_chain(paths["cert"], paths["key"])
             with (
                 socket.create_connection((host.strip("[]"), int(port)), timeout=CLUSTER_CONNECT) as plain,
@@ -98,7 +91,7 @@ class Address:
             told = f"{whose} certificate is not accepted at {self.url}: {why.replace('_', ' ').lower()}"
             raise Rejected(Diagnostic("CLUSTER005", told)) from error
         except OSError:
-            return
+            return  # that nobody is there yet is no matter of certificates
 
 
 def _is_loopback(host: str) -> bool:
@@ -109,38 +102,26 @@ def _is_loopback(host: str) -> bool:
 
 
 class Cluster:
-    """An executor (`avow.pipeline.executors.Executor`)."""
+    """A remote executor (`avow.pipeline.dispatch.Executor`)."""
 
     def __init__(self, address: Address) -> None:
         """Raises Rejected (``CLUSTER003``) where there is no such cluster, or it does not know us."""
         try:
-            from distributed import Client
+            from distributed import Client  # an extra
         except ImportError as error:
-            raise not_installed() from error
+            raise _not_installed() from error
         security = address.security()
-        address.greet()
-        _unpickle_nothing()
-        _say_nothing()
+        _log_nothing()
         try:
             self._client = Client(
-                address.url,
-                security=security,
-                deserializers=["msgpack"],
-                set_as_default=False,
-                timeout=CLUSTER_CONNECT,
-                name="avow",
+                address.url, security=security, set_as_default=False, timeout=CLUSTER_CONNECT, name="avow"
             )
         except (OSError, TimeoutError, ValueError) as error:
             raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
-        for topic in ("print", "warn"):  # else a worker writes on our terminal, and into our answer
-            self._client.unsubscribe_topic(topic)
-        self._under_way: dict[str, tuple[Asked, Any]] = {}
-        self._tries: dict[str, int] = {}
-        self._wanted: set[frozenset[str]] = set()
-        self._lock = threading.Lock()
-        self._closed = threading.Event()
-        self._came: queue.SimpleQueue[Came | None] = queue.SimpleQueue()
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._looking = threading.Lock()
+        self._looked: tuple[float, Mapping[str, Mapping[str, int]] | None] = (float("-inf"), None)
+        """When the scheduler was last asked for its workers, and what it answered."""
+        self._warned = ""
 
     def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
         """Raises Rejected (``CLUSTER004``) where there are workers, but none that could answer us."""
@@ -154,165 +135,122 @@ class Cluster:
         if len(fit) < len(workers):
             print(
                 f"warning: {len(workers) - len(fit)} of the cluster's {len(workers)} workers have another Avow or Z3 "
-                "and get no work",
+                "and get no jobs",
                 file=sys.stderr,
             )
         return {name: tools_of(offered) for name, offered in fit.items()}
 
     @property
     def slots(self) -> int:
-        """How many works it does at once."""
+        """How many jobs it executes at once."""
         return sum(offered[own_code()] for offered in self._workers().values() if own_code() in offered)
 
-    def submit(self, asked: Asked) -> None:
-        wanted = needs(asked.request)
-        with self._lock:
-            if asked.key in self._under_way:
-                return
-            self._wanted.add(frozenset(wanted))
+    def run(self, request: Request) -> Response:
+        data = request_bytes(request)
+        digest = request_digest(data)
+        for _ in range(1 + CLUSTER_RETRIES):
             try:
                 future = self._client.submit(
-                    perform,
-                    asked.data,
-                    asked.key,
-                    asked.request.seconds + WORKER_GRACE,
-                    key=f"avow-{asked.key}",
-                    pure=False,
-                    resources=dict.fromkeys(wanted, 1),
+                    perform, data, key=f"avow-{digest}", pure=False, resources=dict.fromkeys(needs(request), 1)
                 )
-            except Exception as error:  # of a client that lost its cluster, whatever it is
-                self._came.put(Came(asked.key, failure=f"{_GONE} ({type(error).__name__})"))
-                return
-            self._under_way[asked.key] = asked, future
-        # Dask has one thread for what is to be done at the end of all works, and an answer may take a while to come
-        future.add_done_callback(
-            lambda done: threading.Thread(target=self._fetch, args=(asked, done), daemon=True).start()
-        )
-
-    def results(self) -> Iterator[Came]:
-        while (came := self._came.get()) is not None:
-            yield came
-
-    def cancel(self, keys: Collection[str]) -> None:
-        self._drop(keys)
+                response = self._awaited(future, request, digest)
+            except CancelledError:  # the connection was lost; the scheduler may come again
+                continue
+            except Exception as error:  # a client that lost its cluster raises anything
+                return Response(digest, failure=f"{_GONE} ({type(error).__name__})")
+            return response
+        return Response(digest, failure=_GONE)
 
     def close(self) -> None:
-        self._closed.set()
-        self.cancel(tuple(self._under_way))
-        self._came.put(None)
-        with contextlib.suppress(Exception):  # as above; also what its reader failed of
+        """Ends what is under way, and its tools with it."""
+        with contextlib.suppress(Exception):  # as above
             self._client.close(timeout=5)
 
-    # -- inside ------------------------------------------------------------------------------------------
+    def _awaited(self, future: Any, request: Request, digest: str) -> Response:
+        """Dask waits for ever for a worker that could execute the job, and so must not be waited for itself. Raises
+        CancelledError where the connection was lost."""
+        lacking_since: float | None = None
+        while True:
+            try:
+                return read_response(future.result(timeout=CLUSTER_LOOK), digest)
+            except TimeoutError:
+                why = self._unable(request)
+            except CancelledError:
+                raise
+            except Exception as error:  # KilledWorker, or whatever kept a worker from beginning
+                why = "worker after worker was lost over it, or could not begin it"
+                return Response(digest, failure=f"{why} ({type(error).__name__})")
+            lacking_since = (lacking_since or time.monotonic()) if why else None
+            if why and why != self._warned:
+                print(f"warning: {why}; waited for, {CLUSTER_PATIENCE:.0f} s", file=sys.stderr)
+            self._warned = why
+            if lacking_since and time.monotonic() - lacking_since > CLUSTER_PATIENCE:
+                future.cancel(force=True)
+                return Response(digest, failure=why)
 
-    def _drop(self, keys: Collection[str]) -> list[str]:
-        """Those of the keys that were under way still."""
-        with self._lock:
-            found = {key: self._under_way.pop(key)[1] for key in keys if key in self._under_way}
-        with contextlib.suppress(Exception):  # who lost its cluster has nothing there to cancel
-            self._client.cancel(list(found.values()), force=True)
-        return list(found)
+    def _unable(self, request: Request) -> str:
+        """Why nobody can execute the job now; empty where somebody can. The scheduler is asked once for all threads."""
+        with self._looking:
+            when, workers = self._looked
+            if time.monotonic() - when > CLUSTER_LOOK:
+                try:
+                    workers = self._workers(CLUSTER_ANSWER)
+                except Exception:  # of whatever kind: there is no answer
+                    workers = None
+                self._looked = time.monotonic(), workers
+        if workers is None:
+            return _GONE
+        wanted = set(needs(request))
+        return "" if any(wanted <= offered.keys() for offered in workers.values()) else _NOBODY
 
-    def _fetch(self, asked: Asked, future: Any) -> None:
-        came = _fetched(asked, future)
-        with self._lock:
-            known = self._under_way.get(asked.key)
-            if known is None or known[1] is not future:  # cancelled, or given up
-                return
-            del self._under_way[asked.key]
-            tries = self._tries[asked.key] = self._tries.get(asked.key, 0) + 1
-        future.release()
-        if came is None and tries <= CLUSTER_RETRIES:  # the scheduler was lost, and may come again
-            self.submit(asked)
-        else:
-            self._came.put(came or Came(asked.key, failure=_GONE))
-
-    def _workers(self, seconds: float = CLUSTER_CONNECT) -> dict[str, Mapping[str, int]]:
+    def _workers(self, seconds: float = CLUSTER_CONNECT) -> Mapping[str, Mapping[str, int]]:
         """What each worker offers. Raises whatever a client raises that has no cluster any more."""
-        if (reader := self._client._handle_report_task) is not None and reader.done():
-            raise OSError("it hears nothing any more")  # Dask does not notice: a message could not be read
         found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=seconds)
         return {str(name): info["resources"] for name, info in found["workers"].items() if info["status"] == "running"}
 
-    def _watch(self) -> None:
-        """What nobody can do any more is not waited for: Dask would, for ever."""
-        alone: dict[frozenset[str], float] = {}
-        while not self._closed.wait(CLUSTER_LOOK):
-            try:
-                workers, why = self._workers(CLUSTER_ANSWER), "no worker of the cluster is left that could do it"
-            except Exception:  # of whatever kind: there is no answer
-                workers, why = {}, _GONE
-            now, was = time.monotonic(), bool(alone)
-            with self._lock:
-                asked_for, under_way = tuple(self._wanted), [asked for asked, _ in self._under_way.values()]
-            lacking = [w for w in asked_for if not any(w <= offered.keys() for offered in workers.values())]
-            alone = {wanted: alone.get(wanted, now) for wanted in lacking}
-            waiting = [asked for asked in under_way if frozenset(needs(asked.request)) in alone]
-            if waiting and not was and not self._closed.is_set():
-                print(f"warning: {why}; waited for, {CLUSTER_PATIENCE:.0f} s", file=sys.stderr)
-            late = [a for a in waiting if now - alone[frozenset(needs(a.request))] > CLUSTER_PATIENCE]
-            for key in self._drop([asked.key for asked in late]):
-                self._came.put(Came(key, failure=why))
 
-
-_GONE = "the cluster's scheduler does not answer any more"
-
-
-def _fetched(asked: Asked, future: Any) -> Came | None:
-    """At once: an answer that was not fetched dies with its worker, and is waited for once more. None: whoever had the
-    work lost us, or we them."""
-    if future.status in ("cancelled", "lost"):
-        return None
-    if future.status == "error":
-        return Came(asked.key, failure="worker after worker was lost over it, or could not begin it")
+def serve(address: Address, slots: int) -> None:
+    """Be a worker of that cluster, until it ends or this process is told to end. Raises Rejected (``CLUSTER003``), and
+    ``CLUSTER006`` where this machine can do no works any more."""
+    own = Own(code_mark())
+    own.processes.prepare(Path(tempfile.gettempdir()))  # Dask starts threads
     try:
-        said = future.result(timeout=asked.request.seconds + WORKER_GRACE)
-    except Exception as error:  # what cannot be read is no answer, whatever it is
-        lost = future.status in ("cancelled", "lost")
-        return None if lost else Came(asked.key, failure=f"the answer cannot be read: {type(error).__name__}"[:200])
-    if not isinstance(said, bytes) or said[:1] not in (b"+", b"-"):
-        return Came(asked.key, failure="the answer is none")
-    if said[:1] == b"+":
-        return Came(asked.key, said[1:])
+        from distributed import Worker  # an extra
+    except ImportError as error:
+        raise _not_installed() from error
+
+    security, resources = address.security(), dict.fromkeys(offered(), slots)
+
+    async def work() -> None:
+        worker = Worker(
+            address.url,
+            nthreads=slots,
+            security=security,
+            resources=resources,
+            host="127.0.0.1" if not address.secure else None,
+            dashboard=False,
+            death_timeout=CLUSTER_CONNECT,
+        )
+        worker.extensions[OWN] = own
+        async with worker:
+            await worker.finished()
+
     try:
-        why = from_text(Failed, said[1:])
-    except Unreadable as error:
-        return Came(asked.key, failure=f"the answer is none: {error}"[:300])
-    return Came(asked.key, failure=why.failure[:500], timed_out=why.timed_out, log=why.log)
+        asyncio.run(work())
+    except (OSError, TimeoutError) as error:
+        raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
+    if own.unfit:
+        raise Rejected(Diagnostic("CLUSTER006", f"this worker has left the cluster: {own.unfit}"))
 
 
-def not_installed() -> Rejected:
+def _not_installed() -> Rejected:
     """``CLUSTER003``."""
     message = "other machines are reached by Dask, which is not installed"
     return Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'"))
 
 
-# -- what comes from a cluster is data -----------------------------------------------------------------------------
-
-
-def _unpickle_nothing() -> None:
-    """Answers are bytes, but Dask also unpickles errors, warnings and parts of its own messages, which a worker can
-    make, and a pickle can run anything. In this process Dask finds nothing for one to run: only the name of the type
-    of bytes, which it writes so."""
-    if not _guarded:
-        sys.addaudithook(_refuse)  # it cannot be taken away again
-        _guarded.append(True)
-
-
-_guarded: list[bool] = []
-
-
-def _refuse(event: str, arguments: tuple[object, ...]) -> None:
-    if event == "pickle.find_class" and arguments != ("builtins", "bytes"):
-        frame: FrameType | None = sys._getframe(1)
-        while frame is not None:
-            if str(frame.f_globals.get("__name__")).partition(".")[0] == "distributed":
-                raise TypeError("what comes from a cluster is not unpickled")
-            frame = frame.f_back
-
-
-def _say_nothing() -> None:
-    """What Dask logs here is of no use to who reads our terminal: what matters is said as an answer's failure."""
+def _log_nothing() -> None:
+    """Dask's log is of no use on the user's terminal: a response states the failure."""
     for name in ("asyncio", "tornado", *logging.root.manager.loggerDict):
         if name.partition(".")[0] in ("asyncio", "tornado", "distributed"):
             logging.getLogger(name).disabled = True

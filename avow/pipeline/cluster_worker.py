@@ -1,37 +1,31 @@
-"""What ``avow worker`` is: a worker of Dask's that does each work in a fork of its own.
+"""What ``avow worker`` is: a worker of Dask's that executes each job in a process of its own.
 
-The fork (`avow.pipeline.forks`) ends with its tools when it is done, out of time, cancelled, or when the worker dies.
-What a worker offers are resources of Dask's: its own code, its backends' code, and its tools. So a work only comes to
-one whose answer would fit its key.
+That process (`avow.pipeline.processes`) ends with its tools when it is done, out of time, cancelled, or when the worker
+dies. A worker offers, as Dask's resources, its own code, its backends' code, and its tools, so that a job only comes to
+a worker whose answer would fit its key.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import functools
-import socket
+import platform
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from avow import __version__
 from avow.backend_kit.registry import backend, names
-from avow.base.codec import Unreadable, canonical, from_text, line
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.codec import Unreadable, canonical, from_text
 from avow.base.files import sha256
 from avow.base.tools import package_version
-from avow.base.tuning.running import CLUSTER_CONNECT
 from avow.pipeline.engine_code import backend_digest, code_mark, reading_digest
-from avow.pipeline.executors import Failed, answered
-from avow.pipeline.forks import Forks
-from avow.pipeline.requests import Request
-from avow.pipeline.work import ENGINES, engine_identity, is_portable, tool_identities
-
-if TYPE_CHECKING:
-    from avow.pipeline.cluster import Address
+from avow.pipeline.methods import is_portable, tool_identities
+from avow.pipeline.processes import Processes
+from avow.pipeline.requests import Request, read_request, response_bytes
+from avow.pipeline.work import ENGINES, engine_identity
 
 
 @functools.cache
@@ -72,42 +66,40 @@ def _tool(tool: Sequence[str]) -> str:
 
 
 @dataclass(slots=True)
-class _Own:
+class Own:
     """What a worker knows of itself."""
 
     began: str
-    """Of which code it is. Its forks have that in memory, and would answer for what lies there now."""
-    forks: Forks = field(default_factory=Forks)
+    """The code that it has in memory; the keys that it computes name the code on disk."""
+    processes: Processes = field(default_factory=Processes)
     unfit: str = ""
     """Why it leaves the cluster."""
 
 
-_OWN = "avow"
+OWN = "avow"
 
 
-def perform(data: bytes, key: str, seconds: float) -> bytes:
-    """Runs on a worker: the work in a fork; the answer's bytes, or why there is none as JSON. A worker that cannot do
-    works any more leaves: else it would take them all, and fail faster than others are done."""
-    from distributed import get_worker
+def perform(data: bytes) -> bytes:
+    """Execute the request on this worker; the response. A worker that cannot execute jobs any more leaves the cluster:
+    it would take all jobs, and fail faster than others finish."""
+    from distributed import get_worker  # an extra
 
     worker = get_worker()
-    own: _Own = worker.extensions[_OWN]
+    own: Own = worker.extensions[OWN]
     if own.began != code_mark():
         _leave(worker, own, "Avow is another since this worker began: start it again")
     try:
-        # one folder for all works of this process: a fork server is of one
-        came = answered(own.forks, data, key, seconds, Path(tempfile.gettempdir()), _cancelled(worker))
+        response = own.processes.run(read_request(data), Path(tempfile.gettempdir()), _cancelled(worker))
     except OSError as error:
         _leave(worker, own, f"it cannot do works any more: {error}")
-    if isinstance(came.data, bytes):
-        return b"+" + came.data
-    said = f"{came.failure} (on {socket.gethostname()})"
-    return b"-" + line(Failed(said, came.timed_out, came.log))
+    if response.failure:
+        response = replace(response, failure=f"{response.failure} (on {platform.node()})")
+    return response_bytes(response)
 
 
-def _leave(worker: Any, own: _Own, why: str) -> NoReturn:
-    """Have the work done elsewhere, and do no other."""
-    from distributed import Reschedule
+def _leave(worker: Any, own: Own, why: str) -> NoReturn:
+    """Have another worker execute the job, and execute no more."""
+    from distributed import Reschedule  # an extra
 
     own.unfit = own.unfit or why
     worker.loop.add_callback(worker.close)
@@ -123,39 +115,3 @@ def _cancelled(worker: Any) -> Callable[[], bool]:
         return found is None or found.state in ("cancelled", "released", "forgotten") or worker.status.name == "closed"
 
     return cancelled
-
-
-def serve(address: Address, slots: int) -> None:
-    """Be a worker of that cluster, until it ends or this process is told to end. Raises Rejected (``CLUSTER003``), and
-    ``CLUSTER006`` where this machine can do no works any more."""
-    from avow.pipeline.cluster import not_installed
-
-    try:
-        from distributed import Worker
-    except ImportError as error:
-        raise not_installed() from error
-
-    own = _Own(code_mark())
-    security, resources = address.security(), dict.fromkeys(offered(), slots)
-    address.greet()
-
-    async def work() -> None:
-        worker = Worker(
-            address.url,
-            nthreads=slots,
-            security=security,
-            resources=resources,
-            host="127.0.0.1" if not address.secure else None,
-            dashboard=False,
-            death_timeout=CLUSTER_CONNECT,
-        )
-        worker.extensions[_OWN] = own
-        async with worker:
-            await worker.finished()
-
-    try:
-        asyncio.run(work())
-    except (OSError, TimeoutError) as error:
-        raise Rejected(Diagnostic("CLUSTER003", f"no cluster answers at {address.url}: {error}")) from error
-    if own.unfit:
-        raise Rejected(Diagnostic("CLUSTER006", f"this worker has left the cluster: {own.unfit}"))

@@ -21,12 +21,13 @@ from avow.evidence.currency import outlived
 from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, ISOLATION, OBSERVED, RETRY, Evidence
-from avow.pipeline import asking
+from avow.pipeline import dispatch
 from avow.pipeline.export import folder, generated
+from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
-from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
+from avow.pipeline.work import LANGUAGE, Work, planned_method
 
 Intact = Callable[[str, str], bool]
 
@@ -64,13 +65,12 @@ def _is_settled(
 
 
 def prepare(state: State) -> None:
-    """Where works are open: have what they are forked from made now, while the run has one thread."""
-    works = [w for a in state.assessments for w in a.surveyed.catalogue.works if w.engine != LANGUAGE]
+    """Where works are open: fork the server of their processes now, while the run has one thread."""
+    works = [w for s in state.surveyed for w in s.catalogue.works if w.engine != LANGUAGE]
     with contextlib.suppress(OSError):  # the stage says so
         if any(open_obligations(state.workspace, work, state.run) for work in works):
             methods = {work.name: work for work in works if not work.is_engine}
-            state.run.beside.prepare(state.workspace.root, lambda name: generated(methods[name]))
-            state.run.forks.prepare(state.workspace.root)
+            state.run.processes.prepare(state.workspace.root, lambda name: generated(methods[name]))
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:
@@ -85,7 +85,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     report = (
         _language(todo)
         if work.engine == LANGUAGE
-        else asking.settle(workspace, work, todo, place, run, kept=_kept(workspace, work, todo))
+        else dispatch.settle(workspace, work, todo, place, run, kept=_kept(workspace, work, todo))
     )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)

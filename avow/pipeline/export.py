@@ -12,16 +12,18 @@ from pathlib import Path
 from avow.backend_kit import one_step
 from avow.base.codec import LATER
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import identity, is_intact, sha256, write
+from avow.base.files import digest_file, identity, is_intact, sha256, write
 from avow.base.notes import read_note, write_note
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.tuning.running import SETTLED_NS
 from avow.base.workspace import Workspace
 from avow.language.contract import Node
-from avow.pipeline.beside import Beside
+from avow.pipeline.blobs import encode
+from avow.pipeline.methods import method_backend, method_job
+from avow.pipeline.processes import Processes
 from avow.pipeline.slices import MethodSlice, whole_node
-from avow.pipeline.work import Work, method_backend, method_job, planned_method
+from avow.pipeline.work import Work, planned_method
 
 STAMP = ".export.json"
 
@@ -71,8 +73,6 @@ def _marks(place: Path, files: Iterable[str]) -> tuple[str, bool]:
 @by_identity(20_000)
 def key(work: Work) -> str:
     """An artifact may show more than its obligations' meaning (names, sentences): all that its slice says."""
-    from avow.pipeline.blobs import encode
-
     assert work.shown is not None
     cut, root = work.shown(), work.system.plan.root.absolute()
     assert isinstance(cut, MethodSlice)
@@ -91,8 +91,6 @@ def key(work: Work) -> str:
 @by_identity(20_000)
 def whole_digest(node: Node) -> str:
     """SHA-256 of all that a method may be shown of the node."""
-    from avow.pipeline.blobs import encode
-
     return sha256(encode(whole_node(node), Path()))
 
 
@@ -107,9 +105,9 @@ def generated(work: Work) -> Mapping[str, str]:
     return one_step.export(tool, job)
 
 
-def export(workspace: Workspace, work: Work, key: str, beside: Beside | None = None) -> tuple[str, ...]:
+def export(workspace: Workspace, work: Work, key: str, processes: Processes | None = None) -> tuple[str, ...]:
     """Write what the backend generates and remove what it generated before and no more; the files' names."""
-    files = beside.ask(work.name) if beside is not None else None
+    files = processes.generated(work.name) if processes is not None else None
     if files is None:
         files = generated(work)
     place = folder(workspace, work)
@@ -123,6 +121,19 @@ def export(workspace: Workspace, work: Work, key: str, beside: Beside | None = N
     digests = {name: sha256(text) for name, text in sorted(files.items())}
     write_note(place / STAMP, Stamp(key, digests))
     return tuple(sorted(files))
+
+
+def edited(workspace: Workspace, work: Work) -> tuple[Path, ...]:
+    """The generated files that are neither what the backend generates today nor what it generated before. Raises
+    Rejected and OSError."""
+    place, stamp = folder(workspace, work), read_stamp(folder(workspace, work))
+    before = stamp.files if stamp is not None else {}
+    known = {name: {sha256(text), before.get(name)} for name, text in generated(work).items()}
+    return tuple(
+        place / name
+        for name, digests in known.items()
+        if (place / name).is_file() and digest_file(place / name) not in digests
+    )
 
 
 def clean(workspace: Workspace, work: Work, dryrun: bool) -> None:

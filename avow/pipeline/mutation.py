@@ -24,10 +24,11 @@ from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import RETRY, Evidence
-from avow.pipeline import asking
+from avow.pipeline import dispatch
+from avow.pipeline.methods import method_backend
 from avow.pipeline.requests import Altered, chosen
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, method_backend, planned_method
+from avow.pipeline.work import Work, planned_method
 from avow.sanity.mutants import Difference, Mutant, difference
 
 _Task = tuple[Work, Obligation, Evidence]
@@ -78,6 +79,7 @@ def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jo
     """Score every piece of current, supporting evidence of these works, `jobs` mutants at once; each score comes as
     soon as it, and those before it, are there."""
     tasks = [task for work in works if _reads_formulas(work) for task in _tasks(workspace, work)]
+    run.processes.prepare(workspace.root)  # while there is one thread
     with ThreadPoolExecutor(jobs) as pool:
         yield from pool.map(lambda task: _score(workspace, task, run, limit), tasks)
 
@@ -107,7 +109,9 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
-            report = asking.settle(workspace, work, (obligation,), folder, run, Altered(obligation.name, number, limit))
+            report = dispatch.settle(
+                workspace, work, (obligation,), folder, run, Altered(obligation.name, number, limit)
+            )
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         match _noticed(report.outcomes[0], record):

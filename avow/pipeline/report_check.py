@@ -30,7 +30,8 @@ from avow.evidence.currency import as_of_now, changed, changed_since, not_establ
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.kernel.certificate import Certificate
-from avow.report import ATTESTATION, LeftOut, formats
+from avow.report import ATTESTATION, PDF, formats
+from avow.report.pdf import render_pdf
 from avow.solving.apart import Both
 from avow.system.load import PLAN_FILE, load_system
 
@@ -61,6 +62,14 @@ def stale(case: Case, root: Path) -> tuple[str, ...]:
     marks = {pair for record in counting for pair in record.inputs.items()}
     seen = {path for record in counting for path in changed(record, root)}
     return tuple(sorted(seen | {path for path, mark in marks if _digest(root / path) != mark}))
+
+
+def outdated(case: Case, path: Path, root: Path) -> tuple[str, ...]:
+    """Why a report does not say what is so now: its ledger at `path` says something else, or a file that the report or
+    its evidence was made of has changed. Raises OSError where there is a ledger that cannot be read."""
+    files = {name for name, mark in case.digests if (root / name).exists() and _digest(root / name) != mark}
+    changed_now = sorted(files | set(stale(case, root)))
+    return (*differences(case, path, root), *(f"{name} has changed since the report was made" for name in changed_now))
 
 
 def differences(case: Case, path: Path, root: Path) -> tuple[str, ...]:
@@ -125,11 +134,7 @@ def _where(stated: object, again: object) -> str:
 def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
     for name, content in formats(case):
         path = folder / name
-        if isinstance(content, LeftOut):
-            if path.exists():
-                yield f"{name} cannot be compared here: {content.reason}"
-            continue
-        data = content.encode() if isinstance(content, str) else content
+        data = content.encode()
         try:
             found = read_regular(path)
             same = found == data
@@ -140,6 +145,12 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
             continue
         if not same:
             yield f"{name} is not what the case in report.json renders to"
+    if (path := folder / PDF).exists():
+        try:
+            if read_regular(path) != render_pdf(case):
+                yield f"{PDF} is not what the case in report.json renders to"
+        except (OSError, Rejected) as error:
+            yield f"{PDF} cannot be compared here: {error}"
 
 
 def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:

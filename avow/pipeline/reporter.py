@@ -103,6 +103,8 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         from avow.pipeline.summary import append_job_summary, print_obligations, print_summary, results_json
 
         results = self._state.results
+        if sys.exc_info()[0] is None:
+            self._state.run.close()
         process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
         with self._lock:
             self._clear()
@@ -154,13 +156,13 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             return
         from avow.pipeline.assess import is_settled
 
-        complete = {a.system for a in state.assessments} == set(state.results.finished)
-        plugins = any(a.surveyed.system.plan.plugins for a in state.assessments)  # their code may be anywhere
+        complete = {surveyed.system.name for surveyed in state.surveyed} == set(state.results.finished)
+        plugins = any(surveyed.system.plan.plugins for surveyed in state.surveyed)  # their code may be anywhere
         undisturbed = not (plugins or self.failures or self.runtime_errors or self._earlier())
         if "verify" in self._selected and complete and undisturbed and is_settled(state):
             from avow.pipeline.work import programs
 
-            works = (work for a in state.assessments for work in a.surveyed.catalogue.works)
+            works = (work for surveyed in state.surveyed for work in surveyed.catalogue.works)
             state.shortcut.keep(state.results.all, programs(works))
 
     def _line(self, text: str) -> None:

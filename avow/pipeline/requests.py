@@ -1,9 +1,8 @@
-"""What a worker is asked, and what it answers: bytes both ways, with a digest of all that they say."""
+"""What a job's process is sent, and what it answers: bytes both ways, with a digest of what was asked."""
 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ Tools = tuple[tuple[str, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Altered:
-    """Which mutant of which guarantee stands in for the guarantee (see `avow.pipeline.mutation`)."""
+    """Which mutant replaces which guarantee (see `avow.pipeline.mutation`)."""
 
     clause: str
     number: int
@@ -31,7 +30,7 @@ class Altered:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One work. It is answered where it comes to: nothing is read but what it holds, unless it names a `root`."""
+    """One job. The process that executes it reads nothing but what the request holds, unless that names a `root`."""
 
     system: str
     node: str
@@ -48,14 +47,14 @@ class Request:
     """The plan's files that the answer depends on, by their path in the system's folder."""
     tools: Tools = ()
     root: str = ""
-    """The system's folder, for a method that looks at more than those files: it runs where that folder is."""
+    """The system's folder, for a method that reads more than those files: its job runs where that folder is."""
     folder: str = ""
     """Where the exported files are; relative to the workspace."""
     altered: Altered | None = None
     kept: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
-    """Obligation → cases that refuted it once, as its backend wrote them (`record.CASE`): to be tried first."""
+    """Obligation → earlier refuting cases, as its backend wrote them (`record.CASE`): they are tried first."""
     earlier: str = ""
-    """What the engine kept for itself when it was asked last (`avow.calculus.kept_answers`): hints."""
+    """What the engine kept for itself in its last job (`avow.calculus.entailment`): hints."""
 
     @property
     def wanted(self) -> Tools:
@@ -70,22 +69,26 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """The answer to the request of that digest; `refused` says why there is none."""
+    """What came of the request with that digest: a report, or why there is none."""
 
     request: str
-    report: Report | None
-    refused: str = ""
+    report: Report | None = None
+    failure: str = ""
+    timed_out: bool = False
     worker: str = ""
+    """The machine's name."""
     cpu: float = 0.0
     """Processor seconds."""
-
-
-class Unanswered(ValueError):  # noqa: N818 - it says what it is
-    """Bytes that are no answer to what was asked."""
+    log: str = ""
+    """What the process wrote to standard error."""
 
 
 def request_bytes(request: Request) -> bytes:
     return canonical(to_json(request)).encode()
+
+
+def request_digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def read_request(data: bytes) -> Request:
@@ -94,35 +97,24 @@ def read_request(data: bytes) -> Request:
 
 
 def response_bytes(response: Response) -> bytes:
-    text = canonical(to_json(response))
-    return json.dumps({"body": text, "sha256": hashlib.sha256(text.encode()).hexdigest()}).encode()
+    return canonical(to_json(response)).encode()
 
 
-def read_response(data: object, asked: bytes) -> Response:
-    """Raises Unanswered for anything but an answer to what was asked, whole."""
-    if not isinstance(data, bytes):
-        raise Unanswered(f"an answer is bytes, not {type(data).__name__}")
+def read_response(data: object, digest: str) -> Response:
+    """The response to the request with that digest. Anything else becomes a response that reports the failure."""
     try:
-        outer = from_text(dict[str, str], data)
-        text = outer["body"]
-        if hashlib.sha256(text.encode()).hexdigest() != outer["sha256"]:
-            raise Unanswered("its digest is not that of what it says")
-        found = from_text(Response, text)
-    except (Unreadable, KeyError, UnicodeError) as error:
-        raise Unanswered(f"{type(error).__name__}: {error}"[:300]) from error
-    if found.request != request_digest(asked):
-        raise Unanswered("it answers another request")
-    if (found.report is None) is not bool(found.refused):
-        raise Unanswered("it neither answers nor says why not")
+        found = from_text(Response, data) if isinstance(data, bytes) else None
+    except (Unreadable, UnicodeError) as error:
+        return Response(digest, failure=f"the engine's answer cannot be read: {error}"[:300])
+    if found is None or found.request != digest:
+        return Response(digest, failure="the engine answers another request")
+    if (found.report is None) is not bool(found.failure):
+        return Response(digest, failure="the engine's answer has neither a report nor a reason")
     return found
 
 
-def request_digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
-
-
 def lay_out(files: Mapping[str, bytes], root: Path) -> None:
-    """Write a request's files. Raises ValueError for one that would lie elsewhere."""
+    """Write a request's files. Raises ValueError for one outside the folder."""
     for name, data in files.items():
         path = root / name
         if Path(name).is_absolute() or ".." in Path(name).parts:
@@ -132,7 +124,7 @@ def lay_out(files: Mapping[str, bytes], root: Path) -> None:
 
 
 def alter(system: System, node: Node, altered: Altered) -> System:
-    """The system with a mutant in place of a guarantee. Raises KeyError and IndexError for one that there is not."""
+    """The system with a mutant in place of a guarantee. Raises KeyError or IndexError where there is none."""
     clause = node.clause(altered.clause)
     mutant = chosen(node, clause, altered.limit)[altered.number]
     guarantees = tuple(replace(c, formula=mutant.formula) if c.name == clause.name else c for c in node.guarantees)

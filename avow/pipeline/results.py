@@ -20,7 +20,7 @@ class Result:
     gates: tuple[tuple[str, bool, str], ...]
     """(title, passed, reason and what would close it)."""
     left_out: tuple[tuple[str, str], ...] = ()
-    """(file, why): formats of the report that could not be written, and plans that no run looks at."""
+    """(file, why): plans that no run verifies."""
     verdict: str = ""
     """The case's verdict in words."""
     tone: str = ""

@@ -28,15 +28,15 @@ from avow.base.tools import LIBRARIES, package_digest, program_files
 from avow.base.tuning.running import TICK_SECONDS
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
-from avow.isolation.observed import Observed, Seen, guards, look, marks
+from avow.isolation.observed import Observed, Seen, look, marks
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
+from avow.pipeline.settings import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
-_OURS = (".doit.json", ".lock", ".settled.json")
-"""Among the artifacts: doit's own memory and our locks, which change with every run."""
+_OURS = (".doit.json", ".lock", ".settled.json", "report.pdf")
+"""Among the artifacts: doit's own memory and our locks, which change with every run, and what is written on demand."""
 _PACKAGES = (*LIBRARIES, "hypothesis", "rosbags")
 """Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
 
@@ -94,8 +94,7 @@ class Shortcut:
             if self._begun != sources or _reads_elsewhere(self.workspace):
                 return
             seen = _observed(self.workspace)
-            places = (*programs, *(place for kind in dict.fromkeys(o.kind for o in seen) for place in guards(kind)))
-            tools = (Observed(Seen.READ, str(file)) for path in places for file in program_files(path))
+            tools = (Observed(Seen.READ, str(file)) for path in programs for file in program_files(path))
             observed = (*seen, *dict.fromkeys(tools))
             identity = _identity(self.workspace, sources, observed)
             write_note(_stamp(self.workspace), _Settled(sources, identity, observed, tuple(results)))

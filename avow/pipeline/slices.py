@@ -22,7 +22,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options, upstream_of
-from avow.pipeline.work import is_portable
+from avow.pipeline.methods import is_portable
 from avow.system.graph import dataflow
 from avow.system.plan import NOWHERE, NodePlan, Plan, Ros, System
 
@@ -71,10 +71,11 @@ def compose_slice(system: System) -> ComposeSlice:
     plan = replace(
         system.plan,
         title="",
+        old_names=(),
         contract_files=(),
         model=NOWHERE,
         messages=(),
-        requirements=tuple(replace(r, confirmed=None, linked="") for r in system.plan.requirements),
+        requirements=tuple(replace(r, validation=None, linked="", source="") for r in system.plan.requirements),
         nodes=tuple(NodePlan(node.node, "", (), node.span) for node in system.plan.nodes),
         policy=NOWHERE,
         expected=None,
@@ -82,6 +83,7 @@ def compose_slice(system: System) -> ComposeSlice:
         plugins=(),
         lints_off=(),
         pictures=(),
+        hazards=(),
         statements=(),
         launched=None,
         included=(),

@@ -8,22 +8,23 @@ attempts in flight, and a run with nothing to do does nothing.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, partial
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from doit.exceptions import TaskError
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.records import dataclass
 from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.ledger import ledger_of, readable
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
-from avow.pipeline.assess import Assessment, certify, gate, report
+from avow.pipeline.assess import certify, gate, report
 from avow.pipeline.discharge import discharge, open_obligations
+from avow.pipeline.node_index import INDEX
+from avow.pipeline.plan_check import not_verified
 from avow.pipeline.state import State, task_name
 from avow.pipeline.work import LANGUAGE, Work
 from avow.pipeline.workload import Survey, survey, write_obligations
@@ -31,16 +32,20 @@ from avow.pipeline.workload import Survey, survey, write_obligations
 Task = dict[str, Any]
 
 STAGES = {
-    "check": "parse and check the contract and the plan",
-    "sanity": "is each node's contract worth verifying?",
-    "compose": "derive system-level properties and prove their side conditions",
-    "obligations": "write every proof obligation",
-    "export": "generate each method's input from the contract",
-    "discharge": "run each method's tool and record the evidence",
-    "certify": "the kernel establishes again what the calculus proved",
-    "report": "render the assurance reports from the ledger",
-    "verify": "everything, and the policy's gates",
+    "check": ("read contracts and plans, and report what is wrong in them", "read contract and plan of {0}"),
+    "sanity": ("check that contracts are worth verifying", "check that the contract of {1} is worth verifying"),
+    "compose": (
+        "derive properties of systems from their nodes' contracts, and discharge the side conditions",
+        "derive properties of {0} from its nodes' contracts, and discharge the side conditions",
+    ),
+    "obligations": ("list every proof obligation", "list every proof obligation of {0}"),
+    "export": ("generate each method's files from the contract", "generate the files of method {2} for {1}"),
+    "discharge": ("run each method and record the evidence", "run method {2} on {1} and record the evidence"),
+    "certify": ("have the kernel check the calculus' proofs", "have the kernel check the proofs about {0}"),
+    "report": ("render the reports from the ledger; no tool runs", "render the reports of {0} from the ledger"),
+    "verify": ("run all stages, then check the policy's gates", "run all stages for {0}, then check the gates"),
 }
+"""What `doit list --all` says of a stage, and of a task (system, node, method)."""
 
 _OF_A_SYSTEM = ("check", "obligations", "certify", "report", "verify")
 """Those of which each system has one task."""
@@ -49,7 +54,13 @@ _OF_A_SYSTEM = ("check", "obligations", "certify", "report", "verify")
 def stages(state: State) -> Iterator[Task]:
     """All tasks for all systems of a workspace."""
     state.read = True
-    for stage, doc in STAGES.items():
+    for task in _tasks(state):
+        parts = (*str(task["name"]).split(":"), "", "")
+        yield {"doc": STAGES[task["basename"]][1].format(*parts), **task}
+
+
+def _tasks(state: State) -> Iterator[Task]:
+    for stage, (doc, _) in STAGES.items():
         yield {"basename": stage, "name": None, "doc": doc}
     found = {
         folder: _with_ledger(state, survey(folder, state.run.offered, state.run.fresh))
@@ -74,7 +85,7 @@ def stages(state: State) -> Iterator[Task]:
     for path in state.workspace.stray_plans() if len(systems) == len(found) else ():
         if path.resolve() not in taken_in:  # where a system cannot be read, it may be the one that takes it in
             name = path.parent.relative_to(state.workspace.root).as_posix()
-            yield from _rejected(name, Rejected(checking.not_verified(path)))
+            yield from _rejected(name, Rejected(not_verified(path)))
 
 
 def _mixed_up(name: str, folders: Sequence[Path]) -> Rejected:
@@ -108,28 +119,19 @@ def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
             if stage in ("check", "report", "verify")
             else partial(checking.refuse_quietly, name)
         )
-        yield {"basename": stage, "name": task_name(name), "actions": [action], "uptodate": [False]}
+        told = f"report why {name} cannot be read"
+        yield {"basename": stage, "name": task_name(name), "doc": told, "actions": [action], "uptodate": [False]}
 
 
 def _system(state: State, surveyed: Survey) -> Iterator[Task]:
-    name, workspace, plan = surveyed.system.name, state.workspace, surveyed.system.plan
-    shown = cache(workspace.relative)  # most tasks name the same few files
-    texts = map(shown, (plan.path, *plan.contract_files, *plan.included))
-    said, ledger = _Said(shown, tuple(texts)), (workspace.ledger(name),)
-    check = f"check:{name}"
+    name, workspace = surveyed.system.name, state.workspace
+    check, language = f"check:{name}", surveyed.work(LANGUAGE)
     done = []
     yield {
         "basename": "check",
         "name": name,
-        "actions": [
-            partial(_act, partial(checking.check, workspace, surveyed)),
-            _discharge(state, surveyed.work(LANGUAGE)),
-        ],
-        "uptodate": [
-            _Asked("the check is of contract and plan as they are", partial(checking.is_current, workspace, surveyed)),
-            _settled(state, surveyed.work(LANGUAGE)),
-        ],
-        **said((), (workspace.artifacts / name / "check.json",)),
+        "actions": [partial(_act, partial(checking.check, workspace, surveyed)), _discharge(state, language)],
+        "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(state, language)],
     }
     for work in surveyed.catalogue.works:
         match work.engine:
@@ -145,15 +147,10 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                 yield {
                     "basename": "export",
                     "name": title,
-                    "actions": [partial(_act, partial(exporting.export, workspace, work, key, state.run.beside))],
+                    "actions": [partial(_act, partial(exporting.export, workspace, work, key, state.run.processes))],
                     "task_dep": [check],
-                    "uptodate": [
-                        _Asked(
-                            "the files are what the slice gives", partial(exporting.is_current, workspace, work, key)
-                        )
-                    ],
-                    "clean": [_Cleaned("what was generated", partial(exporting.clean, workspace, work))],
-                    **said(work.files, (exporting.folder(workspace, work),)),
+                    "uptodate": [partial(exporting.is_current, workspace, work, key)],
+                    "clean": [partial(exporting.clean, workspace, work)],
                 }
         yield {
             "basename": basename,
@@ -161,8 +158,6 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             "actions": [_discharge(state, work)],
             "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
             "uptodate": [_settled(state, work)],
-            "clean": [_Cleaned("nothing", partial(_clean_nothing, title))],
-            **said(work.files, ledger),
         }
         done.append(f"{basename}:{title}")
     yield {
@@ -170,92 +165,25 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "name": name,
         "actions": [partial(_act, partial(write_obligations, workspace, surveyed))],
         "task_dep": [check],
-        "uptodate": [
-            _Asked("every obligation is listed", partial(write_obligations, workspace, surveyed, dry=True)),
-        ],
-        **said((), (workspace.artifacts / name / "obligations.json",)),
+        "uptodate": [partial(write_obligations, workspace, surveyed, dry=True)],
     }
-    reports = workspace.report(name)
-    assessment = Assessment(state, surveyed)
-    state.assessments.append(assessment)
-    yield {
-        "basename": "report",
-        "name": name,
-        "actions": [partial(_act, partial(report, assessment))],
-        "task_dep": [check],
-        # of the ledger as it stands: `doit report` runs no tool; `verify` renders once all evidence is in
-        "uptodate": [_NEVER],
-        "clean": [_Cleaned("its reports", partial(_clean_reports, workspace, name))],
-        **said(ledger, (reports,)),
-    }
-    yield {
-        "basename": "certify",
-        "name": name,
-        "actions": [partial(_act, partial(certify, assessment))],
-        "task_dep": [*done, f"obligations:{name}"],
-        # whoever asks is told what was established in this run, not in an earlier one
-        "uptodate": [_NEVER],
-        **said(ledger, ()),
-    }
-    yield {
-        "basename": "verify",
-        "name": name,
-        "doc": surveyed.system.plan.title,
-        "actions": [partial(gate, assessment)],
-        "task_dep": [f"certify:{name}"],
-        "uptodate": [_NEVER],
-        "clean": [_Cleaned("its reports", partial(_clean_reports, workspace, name))],
-        **said(ledger, (reports,)),
-    }
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """Is it up to date? With words for `doit info`."""
-
-    words: str
-    ask: Callable[[], bool]
-
-    def __call__(self) -> bool:
-        return self.ask()
-
-    def __repr__(self) -> str:
-        return self.words
-
-
-_NEVER = _Asked("it is done in every run that finds something to do", lambda: False)
-
-
-@dataclass(frozen=True, slots=True)
-class _Cleaned:
-    """What `doit clean` does, with words for its line."""
-
-    words: str
-    act: Callable[[bool], None]
-
-    def __call__(self, dryrun: bool) -> None:
-        self.act(dryrun)
-
-    def __repr__(self) -> str:
-        return f" {self.words}"  # doit leaves out the first character
-
-
-def _clean_nothing(title: str, dryrun: bool) -> None:
-    print(f"{title}: evidence is appended to the ledger and never removed")
-
-
-@dataclass(frozen=True, slots=True)
-class _Said:
-    """For `doit info`: inputs and targets. What is up to date is decided by content, not by these."""
-
-    shown: Callable[[Path], str]
-    """The path, relative to the workspace."""
-    texts: Sequence[str]
-    """Of contract and plan."""
-
-    def __call__(self, inputs: Iterable[Path], targets: Iterable[Path]) -> dict[str, Any]:
-        more, made = ([self.shown(path) for path in paths] for paths in (inputs, targets))
-        return {"meta": {"inputs": [*self.texts, *more], "targets": made}}
+    state.surveyed.append(surveyed)
+    clean = [partial(_clean_reports, workspace, name)]
+    # `report` renders the ledger as it is and runs no tool; `verify` renders once all evidence is in. Like `certify`,
+    # whose answer is of this run, they are done in every run that finds something to do.
+    for basename, needed, action in (
+        ("report", [check], partial(_act, partial(report, state, surveyed))),
+        ("certify", [*done, f"obligations:{name}"], partial(_act, partial(certify, state, surveyed))),
+        ("verify", [f"certify:{name}"], partial(gate, state, surveyed)),
+    ):
+        yield {
+            "basename": basename,
+            "name": name,
+            "actions": [action],
+            "task_dep": needed,
+            "uptodate": [False],
+            "clean": clean if basename != "certify" else [],
+        }
 
 
 def _clean_reports(workspace: Workspace, name: str, dryrun: bool) -> None:
@@ -265,16 +193,17 @@ def _clean_reports(workspace: Workspace, name: str, dryrun: bool) -> None:
     )
     if not dryrun:
         shutil.rmtree(place, ignore_errors=True)
+        for page in (workspace.artifacts / name).glob(f"*/{INDEX}"):
+            page.unlink()
 
 
 def _discharge(state: State, work: Work) -> Callable[[], TaskError | bool]:
     return partial(_act, partial(discharge, state.workspace, work, state.run))
 
 
-def _settled(state: State, work: Work) -> _Asked:
-    return _Asked(
-        "every obligation has current evidence", lambda: not open_obligations(state.workspace, work, state.run)
-    )
+def _settled(state: State, work: Work) -> Callable[[], bool]:
+    """Whether every obligation has current evidence."""
+    return lambda: not open_obligations(state.workspace, work, state.run)
 
 
 def _act(action: Callable[[], object]) -> TaskError | bool:

@@ -15,7 +15,7 @@ from avow.pipeline.shortcut import Shortcut
 
 if TYPE_CHECKING:
     from avow.assurance.model import Case
-    from avow.pipeline.assess import Assessment
+    from avow.pipeline.workload import Survey
 
 
 @dataclass(slots=True)
@@ -25,7 +25,7 @@ class State:
     workspace: Workspace
     run: Run = field(default_factory=new_run)
     results: Results = field(default_factory=Results)
-    assessments: list[Assessment] = field(default_factory=list)
+    surveyed: list[Survey] = field(default_factory=list)
     """Every system that could be read; none where nothing had to be."""
     changed: list[str] = field(default_factory=list)
     """The systems whose report was written anew."""

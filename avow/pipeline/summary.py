@@ -16,7 +16,6 @@ from avow.base.files import read_regular
 from avow.base.plain import count
 from avow.base.rendering import printable
 from avow.base.tuning.shown import GATE_REASON
-from avow.base.verdict import said
 from avow.pipeline.results import Result
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
@@ -35,7 +34,7 @@ def print_summary(
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("system")
     for at, word in enumerate(shown):
-        head = said(word) if at else f"claims {said(word)}"
+        head = word if at else f"claims {word}"
         table.add_column(head, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
     table.add_column("verdict")
     for r in sorted(results, key=lambda r: r.system):
@@ -119,7 +118,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
     lines = [
         "## Assurance",
         "",
-        f"| system | {' | '.join([*map(said, shown), 'verdict'])} |",
+        f"| system | {' | '.join([*shown, 'verdict'])} |",
         "|---|" + "--:|" * len(shown) + "---|",
     ]
     for r in sorted(results, key=lambda r: r.system):

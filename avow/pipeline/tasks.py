@@ -16,11 +16,12 @@ from avow.base.module_path import leave_here
 from avow.base.tuning.running import BYTE_CODE_ROOM, COLLECTED
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
-from avow.pipeline.run_info import FRESH, new_run
+from avow.pipeline.run_info import new_run
+from avow.pipeline.settings import FRESH
 from avow.pipeline.state import State
 
 if TYPE_CHECKING:
-    from avow.pipeline.executors import Elsewhere
+    from avow.pipeline.remote import Remote
 
 Task = dict[str, Any]
 
@@ -30,11 +31,11 @@ class Pipeline:
 
     `asked` is doit's command line without the program's name: it tells whether only verification is wanted, so that a
     run with nothing to do reads no contract. `answer` gets the results as JSON; all else goes to standard error then.
-    `elsewhere`: where works are sent that can be done on other machines.
+    `remote`: where jobs are sent that can run on other machines.
     """
 
     def __init__(
-        self, root: Path, asked: Sequence[str], answer: IO[str] | None = None, elsewhere: Elsewhere | None = None
+        self, root: Path, asked: Sequence[str], answer: IO[str] | None = None, remote: Remote | None = None
     ) -> None:
         leave_here()
         sys.dont_write_bytecode = not _has_room()  # else a container's run compiles all of it every time
@@ -45,8 +46,7 @@ class Pipeline:
             print(f"doit keeps no memory here for `{asked[0]}`: the ledger says what is settled.", file=sys.stderr)
             print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
             raise SystemExit(2)
-        self._shown = asked[1:] if asked[:1] == ["info"] else ()
-        self._state = State(Workspace(root), new_run(elsewhere), answer=answer)
+        self._state = State(Workspace(root), new_run(remote), answer=answer)
         self._wanted = wanted(asked)
 
     def config(self) -> dict[str, Any]:
@@ -84,14 +84,7 @@ class Pipeline:
         if any(name.partition(":")[0] not in ("report", "check") for name in self._wanted) or not self._wanted:
             trust_plugins()
 
-        known = set()
-        for task in stages(state):
-            known |= {task["basename"], f"{task['basename']}:{task['name']}"}
-            yield task
-        for name in self._shown:
-            if not name.startswith("-") and name not in known:
-                print(f"error: there is no task {name}; `doit list --all` shows them", file=sys.stderr)
-                raise SystemExit(2)
+        yield from stages(state)
 
 
 def _has_room() -> bool:
@@ -116,16 +109,16 @@ def execute(
     tasks: Sequence[str],
     jobs: int = 2,
     answer: IO[str] | None = None,
-    elsewhere: Elsewhere | None = None,
+    remote: Remote | None = None,
 ) -> int:
-    """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`, `elsewhere`: as `Pipeline` has
+    """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`, `remote`: as `Pipeline` has
     them."""
     from doit.cmd_base import ModuleTaskLoader
     from doit.doit_cmd import DoitMain
 
     os.chdir(root)
     asked = ["run", "-n", str(jobs), *tasks]
-    run = Pipeline(root, asked, answer, elsewhere)
+    run = Pipeline(root, asked, answer, remote)
     return int(DoitMain(ModuleTaskLoader({"DOIT_CONFIG": run.config(), "task_avow": run.tasks})).run(asked) or 0)
 
 

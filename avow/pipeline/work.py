@@ -11,40 +11,36 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from avow.backend_kit.linked import beside, models, unrun
-from avow.backend_kit.protocol import Backend, Job, Limits
-from avow.backend_kit.registry import backend, names
+from avow.backend_kit.linked import beside
+from avow.backend_kit.protocol import Job, Limits
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_or_missing, sha256
 from avow.base.records import dataclass
-from avow.base.remembered import Shelf, by_identity
-from avow.base.tools import libraries, package_digest, program_digest
-from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
+from avow.base.remembered import Shelf
+from avow.base.tools import libraries
+from avow.calculus.composition import Composition, composed
+from avow.calculus.obligations import all_tasks
+from avow.calculus.variables import Frame
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.finite import Ranges
-from avow.formulas.formula import digest, node_digest, sort_digest
+from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
-from avow.language.definitions import show_clause
+from avow.pipeline.blobs import encode
 from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import method_options, surroundings
-from avow.pipeline.run_info import asked_seconds
+from avow.pipeline.methods import Offered, guarantee, method_backend, method_job, tool_identities
+from avow.pipeline.settings import asked_seconds
+from avow.pipeline.slices import SanitySlice, Slice, compose_slice, method_slice, sanity_slice
+from avow.sanity.claims import claims, node_key, recall
 from avow.system.plan import Method, System
-
-if TYPE_CHECKING:
-    from avow.calculus.composition import Composition
-    from avow.calculus.variables import Frame
-    from avow.pipeline.slices import SanitySlice, Slice
 
 LANGUAGE = "language"
 SANITY = "sanity"
 COMPOSE = "compose"
 ENGINES = (LANGUAGE, SANITY, COMPOSE)
 """The core's own engines; the plan cannot name a method so."""
-
-
-Offered = Mapping[str, tuple[str, str]] | None
-"""Where works go to other machines: tool → version and program's digest there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +97,6 @@ def _language_work(system: System) -> Work:
 
 def _sanity_work(whole: Frame, node: Node) -> Work:
     """Is this node's contract worth verifying? `whole` is its system's frame: made once for all nodes."""
-    from avow.pipeline.slices import sanity_slice
 
     cut = sanity_slice(whole, node)
     obligations, keys = sanity_claims(cut)
@@ -110,8 +105,6 @@ def _sanity_work(whole: Frame, node: Node) -> Work:
 
 def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str, str]]:
     """The obligations that a slice is of, and their keys."""
-    from avow.pipeline.blobs import encode
-    from avow.sanity.claims import claims, node_key
 
     node, meaning = cut.node, node_key(cut.node)
     of_the_node = [(claim, meaning) for claim in claims(node)]
@@ -138,15 +131,12 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
 @functools.cache
 def _no_values() -> str:
     """What a scenario says of a node to whose inputs it gives none."""
-    from avow.pipeline.blobs import encode
 
     return encode(({}, Ranges()), Path()).decode()
 
 
 def compose_work(composition: Composition) -> Work:
     """The calculus' side conditions, start-up and persistence, and the requirements that have a formula."""
-    from avow.calculus.obligations import all_tasks
-    from avow.pipeline.slices import compose_slice
 
     system = composition.frame.system
     tasks = all_tasks(composition)
@@ -162,12 +152,12 @@ def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
         method_work(system, system.contract.node(plan.node), method, offered)
         for plan in system.plan.nodes
         for method in plan.methods
+        if method.guarantees  # else nothing of the node is written
     )
 
 
 def method_work(system: System, node: Node, method: Method, offered: Offered = None) -> Work:
     """`offered`: the tools of the machines that works are sent to, if they are."""
-    from avow.pipeline.slices import method_slice
 
     tool = method_backend(system, method)
     job = method_job(system, node, method)
@@ -248,75 +238,10 @@ def planned_method(work: Work) -> Method:
     return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
 
 
-def tool_identities(tool: Backend, offered: Offered = None) -> tuple[tuple[str, str, str], ...]:
-    """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing. With
-    `offered`, of what can be sent there: the tools there."""
-    if offered is not None and is_portable(tool):
-        return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
-    found = ((t, package_digest(t.package) if t.package else program_digest(t.places)) for t in tool.tools())
-    return tuple((t.name, t.version or "", mark) for t, mark in found)
-
-
 def programs(works: Iterable[Work]) -> tuple[str, ...]:
     """Where the outside tools are that these works use."""
     used = (method_backend(work.system, planned_method(work)) for work in works if not work.is_engine)
     return tuple(dict.fromkeys(place for backend in used for tool in backend.tools() for place in tool.places))
-
-
-def is_portable(tool: Backend) -> bool:
-    """Whether its works can be sent elsewhere: an installed backend whose answers depend on what is sent alone."""
-    return tool.portable and tool.name in names()
-
-
-def method_backend(system: System, method: Method) -> Backend:
-    return backend(method.backend, system.plan.plugins)
-
-
-def method_job(system: System, node: Node, method: Method, tool: Backend | None = None) -> Job:
-    """`tool` is the method's backend, where it is at hand: one under test need not be installed."""
-    claimed = (tool or method_backend(system, method)).claims
-    names = [c for c in claimed if _can_be_claimed(system, node, c)]
-    claims = tuple(_program_claim(system, node, name) for name in names)
-    return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
-
-
-def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:
-    """A program agrees with a model where the plan has one; where none can be run, the answer says why."""
-    return name is not ProgramClaim.LINKED or bool(models(system, node.name) or unrun(system, node.name))
-
-
-_CLAIMED = {
-    ProgramClaim.FAULTLESS: "runs without fault wherever its assumptions hold",
-    ProgramClaim.LINKED: "answers as the model that was verified in its place",
-}
-
-
-@by_identity(50_000)
-def _program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
-    """Something of the node's program: its meaning hangs on the node's ports and assumptions."""
-    ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
-    assumed = sorted(digest(clause.formula) for clause in node.assumptions)
-    meaning = sha256(json.dumps([name, ports, assumed]))
-    claim = f"The program of {node.name} {_CLAIMED[name]}"
-    return Obligation(system.name, node.name, Kind.PROGRAM, name, claim, "", meaning, (), node.span)
-
-
-@by_identity(50_000)
-def guarantee(system: System, node: Node, name: str) -> Obligation:
-    """This node's implementation or model meets this guarantee, whenever its assumptions hold."""
-    clause = node.clause(name)
-    sentence = clause.sentence or f"{node.name} meets guarantee {name}"
-    return Obligation(
-        system.name,
-        node.name,
-        Kind.GUARANTEE,
-        name,
-        sentence,
-        show_clause(clause, node),
-        node_digest(node, clause),
-        (f"{node.name}.{name}",),
-        clause.span,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,8 +263,6 @@ class Catalogue:
 def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = None) -> Catalogue:
     """`offered`: as `method_work` has it. `shelf`: where it is kept what follows from the nodes' texts. Raises Rejected
     for an unknown backend, and where the plan's formulas are wrong."""
-    from avow.calculus.composition import composed
-    from avow.sanity.claims import recall
 
     if shelf is not None:
         recall(system.contract, shelf)

@@ -1,5 +1,5 @@
-"""One unit of work in a process of its own: ``python -m avow.pipeline.worker REQUEST RESPONSE``, or a fork that does
-the same (`avow.pipeline.forks`).
+"""A job in a process of its own: ``python -m avow.pipeline.worker FOLDER``, or a fork that does the same
+(`avow.pipeline.processes`).
 
 A solver that crashes, eats the memory or never returns takes this process with it and nothing else: the pipeline turns
 that into a verdict. Two workers use two cores, whatever Python's lock says.
@@ -25,15 +25,17 @@ from avow.base.codec import from_json, to_json
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
+from avow.calculus import providers
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
-from avow.calculus.kept_answers import keeping
+from avow.calculus.entailment import keeping
 from avow.calculus.obligations import settle_each
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import REMARKS, RETRY
 from avow.pipeline import recheck
-from avow.pipeline.asking import ANSWERS, CHANGED, read_answers, write_answers
 from avow.pipeline.blobs import Garbled, decode
+from avow.pipeline.dispatch import ANSWERS, CHANGED, read_answers, write_answers
+from avow.pipeline.methods import method_backend, method_job, tool_identities
 from avow.pipeline.requests import (
     Request,
     Response,
@@ -45,18 +47,9 @@ from avow.pipeline.requests import (
     response_bytes,
 )
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
-from avow.pipeline.work import (
-    COMPOSE,
-    SANITY,
-    Work,
-    compose_work,
-    method_backend,
-    method_job,
-    method_work,
-    planned_method,
-    sanity_claims,
-    tool_identities,
-)
+from avow.pipeline.work import COMPOSE, SANITY, Work, compose_work, method_work, planned_method, sanity_claims
+from avow.sanity import results
+from avow.sanity.analysis import outcomes
 from avow.solving.checking import z3_version
 from avow.solving.limits import effort_told, from_seconds
 from avow.system.plan import System
@@ -66,13 +59,12 @@ class Refused(Exception):  # noqa: N818 - it names what happened
     """What was asked is not what the keys are of; says why."""
 
 
-def entry(arguments: Sequence[str]) -> int:
-    """The whole work of the process; its exit code."""
+def entry(place: Path) -> int:
+    """Execute the job whose request lies in the folder, and write its response there; the process' exit code."""
     process.adopt_orphans()
     trust_plugins()
     try:
-        asked = Path(arguments[0]).read_bytes()
-        write(Path(arguments[1]), answer(asked).decode())
+        (place / "response").write_bytes(answer((place / "request").read_bytes()))
     except Exception:
         traceback.print_exc()
         return 1
@@ -80,7 +72,7 @@ def entry(arguments: Sequence[str]) -> int:
 
 
 def answer(asked: bytes) -> bytes:
-    """Do the work, in this process. Raises whatever an engine raises."""
+    """Execute the job in this process. Raises whatever an engine raises."""
     request, digest = read_request(asked), request_digest(asked)
     with tempfile.TemporaryDirectory(prefix="avow-work-") as place:
         root = Path(request.root) if request.root else Path(place, request.home)
@@ -88,14 +80,15 @@ def answer(asked: bytes) -> bytes:
             lay_out(request.files, root)
             report = _execute(request, root)
         except Refused as refused:
-            return response_bytes(Response(digest, None, str(refused), platform.node()))
+            return response_bytes(Response(digest, failure=str(refused), worker=platform.node()))
         if process.ended_by_others() or request.limits.asked:
             report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
         process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
         told = json.dumps(to_json(report), default=str).replace(f"{place}/", "")
         spent = os.times()
         cpu = spent.user + spent.system + spent.children_user + spent.children_system
-    return response_bytes(Response(digest, from_json(Report, json.loads(told)), "", platform.node(), round(cpu, 3)))
+    report = from_json(Report, json.loads(told))
+    return response_bytes(Response(digest, report, worker=platform.node(), cpu=round(cpu, 3)))
 
 
 def _asked_again(outcome: Outcome) -> Outcome:
@@ -196,10 +189,6 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
 
 def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits: Limits) -> Report:
     """Settle sanity claims of one node by the solver."""
-    from avow.calculus import providers
-    from avow.sanity import results
-    from avow.sanity.analysis import outcomes
-
     bounds = results.Bounds(seed=limits.seed)
     if limits.asked:
         bounds = replace(bounds, effort=from_seconds(limits.seconds))
@@ -234,4 +223,4 @@ def _place(span: Span | None, root: Path) -> str:
 
 if __name__ == "__main__":
     process.guard(tied=True)
-    sys.exit(entry(sys.argv[1:]))
+    sys.exit(entry(Path(sys.argv[1])))

@@ -18,7 +18,11 @@ from avow.base.workspace import Workspace
 from avow.evidence.obligation import Kind, Obligation
 from avow.pipeline.engine_code import reading_digest
 from avow.pipeline.export import whole_digest
-from avow.pipeline.work import Catalogue, Offered, Work, catalogue
+from avow.pipeline.methods import Offered
+from avow.pipeline.plan_check import of_rest
+from avow.pipeline.work import Catalogue, Work, catalogue
+from avow.report.layout import json_text
+from avow.system.faults import in_order
 from avow.system.load import load_system
 from avow.system.plan import System
 
@@ -58,9 +62,6 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
                 shelf.recall(whole_digest, node)
             shelf.keep()
     except Rejected as rejected:
-        from avow.pipeline.check import of_rest
-        from avow.system.faults import in_order
-
         return Rejected(*in_order((*rejected.diagnostics, *of_rest(folder))))
     files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
     texts = [__version__, *map(digest_file, files)]
@@ -98,15 +99,18 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
 
 @by_identity(1)
 def _listed(workspace: Workspace, surveyed: Survey) -> str:
-    from avow.report.layout import json_text
+    return json_text(to_json(listing(workspace, surveyed)))
 
+
+def listing(workspace: Workspace, surveyed: Survey) -> Listing:
+    """Every obligation of the system."""
     methods: dict[str, list[str]] = {}
     for work in surveyed.catalogue.works:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
     shown = functools.cache(lambda file: workspace.relative(Path(file)))
     listed = tuple(_listed_claim(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations)
-    return json_text(to_json(Listing(surveyed.system.name, listed)))
+    return Listing(surveyed.system.name, listed)
 
 
 def _listed_claim(shown: Callable[[str], str], o: Obligation, methods: Sequence[str]) -> ListedClaim:

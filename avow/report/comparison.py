@@ -16,7 +16,7 @@ _KINDS = {
     "gate": ("Gates of the policy", "of the gates changed", ""),
     "worse": ("Lost: claims that stand worse", "worse", "bad"),
     "removed": ("Gone: claims that are not made any more", "gone", "open"),
-    "supposition": ("Supposed now, without being shown", "supposed now", "open"),
+    "assumption": ("Assumed now, without being shown", "assumed now", "open"),
     "meaning": ("Changed meaning: another claim under the same name", "changed meaning", "open"),
     "added": ("New claims", "new", "fair"),
     "better": ("Gained: claims that stand better", "better", "good"),

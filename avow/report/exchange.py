@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import escape, quoteattr
 
-from avow.assurance.answers import EARLIER
+from avow.assurance.answers import EARLIER, Level
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
@@ -43,13 +43,18 @@ def _result_of(case: Case) -> str:
     return "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
 
 
+def _passes(case: Case, view: ObligationView) -> bool:
+    """Whether a claim passes; that of a requirement does only where the requirement itself is shown."""
+    return view.standing.supports and all(r.level.holds for r in case.requirements if view.id in r.obligations)
+
+
 # -- JUnit XML ------------------------------------------------------------------------------------------------------
 
 
 def render_junit(case: Case) -> str:
-    """A suite for the gates and one a node. What is refuted fails; what is merely not shown is skipped, never passed:
-    whether that matters is for the gates to say."""
-    suites = [_gates_suite(case)]
+    """A suite for the gates, one for the requirements, and one for each node. What is refuted fails; what is merely not
+    shown is skipped, never passed: whether that matters is for the gates to say."""
+    suites = [_gates_suite(case), *([_requirements_suite(case)] if case.requirements else [])]
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     suites += [_suite(case, node, [v for v in case.obligations if v.obligation.node == node]) for node in nodes]
     total = [sum(numbers) for numbers in zip(*(suite[1] for suite in suites), strict=True)]
@@ -70,11 +75,25 @@ def _gates_suite(case: Case) -> tuple[str, list[int]]:
     return f'<testsuite name="gates" {_numbers(counts)}>\n{result}{"".join(rows)}</testsuite>\n', counts
 
 
+def _requirements_suite(case: Case) -> tuple[str, list[int]]:
+    rows, counts = [], [len(case.requirements), 0, 0, 0]
+    for r in case.requirements:
+        inside, message = "", f"{r.stands}: {r.answer}"
+        if r.level is Level.REFUTED and not case.strict:
+            counts[1] += 1
+            inside = f'<failure type="refuted" message={_attribute(message)}>{escape(clean(message))}</failure>'
+        elif not r.level.holds:
+            counts[3] += 1
+            inside = f"<skipped message={_attribute(message)}/>"
+        rows.append(_testcase(f"{case.system}.requirements", r.id, 0.0, inside))
+    return f'<testsuite name="requirements" {_numbers(counts)}>\n{"".join(rows)}</testsuite>\n', counts
+
+
 def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str, list[int]]:
     rows = []
     counts = [0, 0, 0, 0]
     for view in views:
-        message = f"{view.standing.word}: {headline(view)}"
+        message = f"{view.standing.value}: {headline(view)}"
         text = escape(clean(message))
         inside = ""
         if tone(view.status) == "bad" and not view.handled and not view.advice:
@@ -83,7 +102,7 @@ def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str,
         elif view.status is Status.ERROR:
             counts[2] += 1
             inside = f'<error type="error" message={_attribute(message)}>{text}</error>'
-        elif not view.standing.supports:
+        elif not _passes(case, view):
             counts[3] += 1
             handled = f"{view.handled}; " if view.handled else ""
             inside = f"<skipped message={_attribute(handled + message)}/>"
@@ -163,13 +182,13 @@ def _rule_text(view: ObligationView) -> str:
 
 def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any]:
     o = view.obligation
-    kind, level = _sarif_level(view)
+    kind, level = _sarif_level(view, case)
     result: dict[str, Any] = {
         "ruleId": _rule(view),
         "ruleIndex": rules.index(_rule(view)),
         "kind": kind,
         "level": level,
-        "message": {"text": f"{short(o.id)} is {view.standing.word}. {o.claim.rstrip('.')}. {headline(view)}"},
+        "message": {"text": f"{short(o.id)} is {view.standing.value}. {o.claim.rstrip('.')}. {headline(view)}"},
         "partialFingerprints": {"avowObligation/v1": sha256(o.id)},
         "properties": {
             "obligation": o.id,
@@ -189,9 +208,9 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
     return result
 
 
-def _sarif_level(view: ObligationView) -> tuple[str, str]:
+def _sarif_level(view: ObligationView, case: Case) -> tuple[str, str]:
     if view.standing.supports:
-        return "pass", "none"
+        return ("pass" if _passes(case, view) else "open"), "none"
     if view.advice:
         return "informational", "none"
     if tone(view.status) == "bad":
@@ -210,7 +229,7 @@ def render_attestation(case: Case) -> str:
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     for node in nodes:
         views = [view for view in case.obligations if view.obligation.node == node and not view.advice]
-        good = all(view.standing.supports for view in views)
+        good = all(_passes(case, view) for view in views)
         bad = any(tone(view.status) == "bad" and not view.handled for view in views)
         every.append(
             _statement(case, node, views, "FAILED" if bad else "PASSED" if good and not case.earlier else "WARNED")
@@ -227,7 +246,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}
     for view in views:
         bad = tone(view.status) == "bad" and not view.handled and not view.advice
-        groups["passedTests" if view.standing.supports else "failedTests" if bad else "warnedTests"].append(view.id)
+        groups["passedTests" if _passes(case, view) else "failedTests" if bad else "warnedTests"].append(view.id)
     return {
         "_type": "https://in-toto.io/Statement/v1",
         "subject": [{"name": name, "digest": {"sha256": mark}} for name, mark in sorted(subjects.items())],

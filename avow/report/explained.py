@@ -1,4 +1,4 @@
-"""What a report's names and marks mean, in a few lines each: requirements, suppositions, nodes, gates, weakenings,
+"""What a report's names and marks mean, in a few lines each: requirements, assumptions, nodes, gates, deficits,
 derivations and words; elements of the argument, digests, files, runs, codes, ports, methods. `avow.report.terminal`
 tells obligations."""
 
@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from avow.assurance import answers
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
 from avow.assurance.modules import requirement_modules
@@ -18,7 +19,7 @@ from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.report.answers_page import WORDS, full_reason
 from avow.report.exchange import render_json
-from avow.report.gsn import gsn
+from avow.report.goals import argument
 from avow.report.wording import MEANINGS
 
 
@@ -27,21 +28,21 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
     for module in requirement_modules(case):
         r = module.requirement
         if r.id == name:
-            lines = [r.words, f"{r.how}. {module.because}"]
+            lines = [r.words, module.because]
             lines += [f"formula: {r.formal}"] if r.formal else []
             weakest = r.weakest_evidence
             lines += [f"weakest evidence: {weakest.title}, {weakest.words} ({short(weakest.claim)})"] if weakest else []
             lines += [f"rests on {title}: {words}" for _, title, words in module.away]
             lines += [f"composition: {module.conditions}"] if module.conditions else []
-            lines += [f"supposes {', '.join(module.supposes)}"] if module.supposes else []
+            lines += [f"assumes {', '.join(module.supposes)}"] if module.supposes else []
             lines += [f"not shown, because of: {listed([short(n) for n in module.failing])}"] if module.failing else []
             yield f"requirement {r.id}", lines
-    for s in case.suppositions:
+    for s in case.assumptions:
         if name in (s.number, s.key):
             lines = [s.words, full_reason(s), s.term, f"needed by {listed(s.needing)}", f"from {listed(s.where)}"]
-            yield f"supposition {s.number} ({s.sort}), {s.key}", [line for line in lines if line]
+            yield f"assumption {s.number} ({s.sort}), {s.key}", [line for line in lines if line]
     for node in case.nodes:
-        if name in (node.name, node.title):
+        if name in (node.name, node.title, f"{case.system}/{node.name}"):
             basis = next((b for b in case.answers.bases if b.node == node.name), None)
             lines = [f"criticality {node.criticality}", f"guarantees: {basis.words if basis else 'none'}"]
             lines += [f"assumes {clause}: {said}" for clause, said in node.assumptions]
@@ -52,12 +53,12 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
         if name in (gate.id, gate.title):
             lines = [f"{gate.state}: {gate.reason}", *(f"next: {s.text}" for s in gate.suggestions[:3])]
             yield f"gate {gate.id}: {gate.title}", lines
-    for w in case.weakenings:
+    for w in case.deficits:
         if name in (w.key, w.words):
-            yield f"weakening {w.key}: {w.count} {w.words}", [w.why, listed([short(claim) for claim in w.claims], 20)]
+            yield f"deficit {w.key}: {w.count} {w.words}", [w.why, listed([short(claim) for claim in w.claims], 20)]
     for d in case.derivations:
         if d.derivation.name == name:
-            lines = [*d.derivation.text.splitlines(), f"{d.status.word}: {d.derivation.conclusion}"]
+            lines = [*d.derivation.text.splitlines(), f"{d.status.value}: {d.derivation.conclusion}"]
             yield f"derivation {name} (rule {d.derivation.rule})", lines
     words = [(word, meaning) for word, meaning in WORDS if name.casefold() in word.split(", ")]
     for word, meaning in words:
@@ -88,9 +89,12 @@ def identified(case: Case, name: str) -> Iterator[Told]:
         yield f"run {name}", [f"begun {case.run.started}, {case.run.seconds:g} s, Avow {case.run.avow_version}"]
     if name == case.system:
         yield f"system {name}", [case.title, case.answers.told, case.answers.beside]
+    for level, meaning in answers.MEANINGS.items():
+        if name == level:
+            yield f"the word {level}", [meaning]
     for status in Status:
-        if name in (status.value, status.word):
-            yield f"the word {status.word}", [MEANINGS[status]]
+        if name in (status.value, status.value):
+            yield f"the word {status.value}", [MEANINGS[status]]
 
 
 def entries(case: Case) -> Iterator[Entry]:
@@ -118,7 +122,7 @@ def _of_record(entry: Entry) -> Told:
 
 def _line(entry: Entry) -> str:
     e = entry.evidence
-    return f"record {entry.number + 1}: {short(e.obligation)} {Status(e.verdict).word} by {e.method}, {e.started[:16]}"
+    return f"record {entry.number + 1}: {short(e.obligation)} {Status(e.verdict).value} by {e.method}, {e.started[:16]}"
 
 
 def _of_digest(case: Case, name: str) -> Iterator[Told]:
@@ -156,9 +160,11 @@ def _of_code(name: str) -> Iterator[Told]:
 
 def _of_argument(case: Case, name: str) -> Iterator[Told]:
     kind = _SHAPES.get(name.rstrip("0123456789"))
-    for module in gsn(case) if kind is not None else ():
-        if name in module:
-            yield f"{kind} {name} of the argument, {module['module']['name']}", module[name]["text"].splitlines()
+    for module in argument(case) if kind is not None else ():
+        for element in module.elements:
+            if element.name == name:
+                lines = [element.label, element.text, *element.text_of_defeaters()]
+                yield f"{kind} {name} of the argument, {module.name}", [line for line in lines if line]
 
 
 def _of_files(case: Case, name: str) -> Iterator[Told]:
@@ -191,7 +197,7 @@ def _of_contract(case: Case, name: str) -> Iterator[Told]:
                 yield f"guarantee {clause} of {node.name}", [said]
     for given in case.environment:
         if name in (given.port, given.port.partition(".")[2]):
-            lines = [f"supposed: {given.assume}" if given.assume else "nothing is supposed of it", given.because]
+            lines = [f"assumed: {given.assume}" if given.assume else "nothing is assumed of it", given.because]
             yield f"{given.port}, from the environment", [line for line in lines if line]
 
 
@@ -199,7 +205,7 @@ def _of_methods(case: Case, name: str) -> Iterator[Told]:
     for method in case.methods:
         if method.name == name:
             state = "" if method.available else f"its tool is missing: {method.install}"
-            lines = [method.title, f"at best {Status(method.strength).word}: {method.green_means}", state]
+            lines = [method.title, f"at best {Status(method.strength).value}: {method.green_means}", state]
             yield f"method {name}", [line for line in lines if line]
     for tool in case.tools:
         if tool.name == name:

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from avow.assurance.model import Case
 from avow.assurance.modules import node_modules, requirement_modules
-from avow.assurance.relied import shade, stands
+from avow.assurance.relied import shade
 from avow.base.records import dataclass
 from avow.report.wording import anchor, clean
 
@@ -28,7 +28,7 @@ _WIDTHS = {
     **dict.fromkeys("ABCDEFGHIJKLNOPQRSTUVXYZ", 788),
 }
 """Thousandths of the font's size, rounded up by group; any other character is as wide as it is high."""
-_STYLE = (
+STYLE = (
     "text{font:12px 'DejaVu Sans',system-ui,sans-serif;fill:#1b1f27}.b{fill:#f4f6f9;stroke:#3c4654;stroke-width:1.5}"
     ".green{stroke:#14622c}.amber{stroke:#744600}.red{stroke:#9c1616}.asm{stroke-dasharray:4 3}"
     ".away{stroke-width:3}.h{font-weight:bold}.stem{stroke:#3c4654;stroke-width:1.5}"
@@ -58,51 +58,50 @@ def draw(case: Case) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {y}" width="{WIDTH}" height="{y}" role="img" '
         f"aria-label={quoteattr(clean(f'The argument for {case.title}, module by module'))}>"
     )
-    return f"{head}<style>{_STYLE}</style>{''.join(parts)}</svg>\n"
+    return f"{head}<style>{STYLE}</style>{''.join(parts)}</svg>\n"
 
 
 def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
     for module in requirement_modules(case):
         r = module.requirement
-        link = f"index.html#{anchor('requirement:' + r.id)}"
+        link = f"argument.html#{anchor('requirement:' + r.id)}"
         below = [
-            Box(title, words, "away", f"index.html#{anchor('node:' + node)}") for node, title, words in module.away
+            Box(title, words, "away", f"argument.html#{anchor('node:' + node)}") for node, title, words in module.away
         ]
         if module.conditions:
             below.append(Box("Composition", module.conditions, "sol", "claims.html#obligations"))
         if module.supposes:
-            below.append(Box("supposes", ", ".join(module.supposes), "asm", "index.html#suppositions"))
-        yield Box(f"{r.id}: {r.how}", r.words, f"goal {r.tone}", link), module.strategy, below
+            below.append(Box("assumes", ", ".join(module.supposes), "asm", "argument.html#assumptions"))
+        yield Box(f"{r.id}: {r.level}", r.words, f"goal {r.tone}", link), module.strategy, below
     bases = {basis.node: basis for basis in case.answers.bases}
     for node in node_modules(case):
-        link = f"index.html#{anchor('node:' + node.node.name)}"
+        link = f"argument.html#{anchor('node:' + node.node.name)}"
         root = Box(node.node.title, f"What {node.node.title} guarantees", "goal", link)
         if len(node.guarantees) > _MOST:
             yield root, "", [Box(part, "", "goal", link) for part in bases[node.node.name].words.split(", ")]
             continue
         below = []
         for view in node.guarantees:
-            below.append(
-                Box(stands(view), view.obligation.claim, f"goal {shade(view)}", f"index.html#{anchor(view.id)}")
-            )
+            place = f"argument.html#{anchor(view.id)}"
+            below.append(Box(view.standing.value, view.obligation.claim, f"goal {shade(view)}", place))
         yield root, "", below
 
 
 def _panel(parts: list[str], y: int, root: Box, strategy: str, children: Sequence[Box]) -> int:
     """One module from `y` on; where the next one begins."""
     left, wide = WIDTH // 6, WIDTH * 2 // 3
-    y = _box(parts, left, y, wide, root)
+    y = draw_box(parts, left, y, wide, root)
     if strategy:
         y = _stem(parts, y)
-        y = _box(parts, left, y, wide, Box("", strategy, "str"))
+        y = draw_box(parts, left, y, wide, Box("", strategy, "str"))
     if children:
         y = _stem(parts, y)
         column = (WIDTH - GAP * (COLUMNS + 1)) // COLUMNS
         for at in range(0, len(children), COLUMNS):
             row = children[at : at + COLUMNS]
-            height = max(_height(box, column) for box in row)
+            height = max(height_of(box, column) for box in row)
             for place, box in enumerate(row):
-                _box(parts, GAP + place * (column + GAP), y, column, box, height)
+                draw_box(parts, GAP + place * (column + GAP), y, column, box, height)
             y += height + GAP
     return y + 3 * GAP
 
@@ -112,9 +111,10 @@ def _stem(parts: list[str], y: int) -> int:
     return y + GAP
 
 
-def _box(parts: list[str], x: int, y: int, width: int, box: Box, height: int = 0) -> int:
+def draw_box(parts: list[str], x: int, y: int, width: int, box: Box, height: int = 0) -> int:
+    """Appends a box, as high as its text needs or as `height` says; returns the y coordinate of its lower edge."""
     heads, lines = _texts(box, width)
-    height = height or _height(box, width)
+    height = height or height_of(box, width)
     radius = ' rx="12"' if "asm" in box.kind or "sol" in box.kind else ""
     body = [f'<rect class="b {box.kind}"{radius} x="{x}" y="{y}" width="{width}" height="{height}"/>']
     for at, line in enumerate((*heads, *lines)):
@@ -130,7 +130,8 @@ def _texts(box: Box, width: int) -> tuple[list[str], list[str]]:
     return wrap(box.head, room * 0.93), wrap(box.text, room)
 
 
-def _height(box: Box, width: int) -> int:
+def height_of(box: Box, width: int) -> int:
+    """Pixels that the box needs at that width."""
     return 2 * _PAD + _LINE * sum(map(len, _texts(box, width)))
 
 

@@ -57,9 +57,7 @@ def render_markdown(case: Case) -> str:
         *_remarks(case),
         "## Guarantees",
         _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in case.guarantees)),
-        "## Hypotheses and environment",
-        "\n".join(f"- {escaped(h.text)} ({escaped(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses)
-        or "None.",
+        "## Environment",
         _table(
             ("environment input", "assumed", "because"),
             ((escaped(e.port), escaped(e.assume) or "nothing", escaped(e.because)) for e in case.environment),
@@ -115,7 +113,7 @@ def _row(view: ObligationView) -> tuple[str, ...]:
     return (
         escaped(short(view.id)),
         escaped(view.criticality),
-        view.standing.word,
+        view.standing.value,
         escaped(methods),
         escaped(where(view)),
     )
@@ -125,7 +123,7 @@ def _answer(evidence: Evidence) -> str:
     status = worth(evidence)
     bound = bound_text(evidence.bound) if status in _BOUNDED else ""
     remarks = "; ".join(part for part in (bound, mutation(evidence)) if part)
-    return f"{evidence.method} {status.word}{f' ({remarks})' if remarks else ''}"
+    return f"{evidence.method} {status.value}{f' ({remarks})' if remarks else ''}"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

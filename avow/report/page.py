@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, __version__
 from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
-from avow.assurance.answers import Tone
+from avow.assurance.answers import MEANINGS, Tone
 from avow.assurance.argument import Arguments, Element
 from avow.assurance.model import Case, ObligationView, OpenItem
 from avow.assurance.naming import derivation_claim, requirement_claim, short
@@ -35,11 +35,9 @@ from avow.base.tuning.shown import (
     OBLIGATIONS_IN_FULL,
     ROWS_UNFOLDED,
 )
-from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
-from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
 from avow.report.wording import history
 
@@ -88,9 +86,9 @@ def environment() -> Environment:
     found.globals |= {
         "MARKS": wording.MARKS,
         "MEANINGS": wording.MEANINGS,
+        "LEVELS": MEANINGS,
         "Status": Status,
         "Tone": Tone,
-        "said": said,
         "anchor": wording.anchor,
         "ticks": _ticks,
         "banner_tone": wording.banner_tone,
@@ -146,7 +144,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             matrix=matrix if rows <= GUARANTEE_ROWS else [],
             condensed=_condensed(matrix) if rows > GUARANTEE_ROWS else [],
             outline_of=_outlines(case),
-            graph=_graph(case),
+            graph=svg_image(case.graph_svg),
             places=places,
             failed=[gate for gate in case.gates if not gate.passed],
             open_items=listed,
@@ -167,7 +165,6 @@ def render_page(case: Case, json_digest: str = "") -> str:
             full=_in_full(views),
             brief=lambda view: _brief(view, places),
             json_digest=json_digest,
-            cae=list(cae_rows(case)),
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=ROWS_UNFOLDED,
         )
@@ -283,7 +280,7 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
     """An obligation in a few lines; built by hand, as there may be ten thousand of them."""
     o = view.obligation
     status = view.standing
-    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status.word}</span>'
+    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status.value}</span>'
     methods = escape(" ".join(method for method, _ in view.planned))
     marks = f'data-node="{escape(o.node)}" data-kind="{o.kind}" data-status="{status}" data-methods="{methods}"'
     said = "".join(
@@ -373,11 +370,11 @@ def _outlines(case: Case) -> dict[str, list[tuple[int, Element]]]:
     return found
 
 
-def _graph(case: Case) -> str:
-    """The dataflow picture as an image: whatever it contains, it cannot run."""
-    if not case.graph_svg:
+def svg_image(text: str) -> str:
+    """A picture as the source of an image: nothing that it contains can run. Empty where there is no picture."""
+    if not text:
         return ""
-    return "data:image/svg+xml;base64," + base64.b64encode(case.graph_svg.encode("utf-8", "replace")).decode()
+    return "data:image/svg+xml;base64," + base64.b64encode(text.encode("utf-8", "replace")).decode()
 
 
 def _justified(case: Case) -> list[tuple[ObligationView, Any]]:

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
-from avow.assurance.answers import SupposedLine, Supposition
+from avow.assurance.answers import Assumption, SupposedLine
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.modules import RequirementModule, requirement_modules
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.backend_kit.timeline import in_words, picture, timelines
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
 from avow.base.plain import listed
 from avow.base.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import example
+from avow.report import PDF, example
 from avow.report.answers_page import full_reason, others, worded
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
@@ -28,21 +31,28 @@ _GATES = {"passes": "good", "fails": "bad", "not asked": "plain"}
 """Colours."""
 
 
-class NoTypst(Exception):  # noqa: N818 - it says what is missing
-    """The extra is not installed."""
-
-
 def render_pdf(case: Case) -> bytes:
-    """Raises NoTypst where the extra is missing, RuntimeError where Typst fails."""
+    """Same case, same bytes. Raises Rejected (``CLI023``) where Typst is missing or fails."""
     try:
-        import typst
+        import typst  # an optional package
+
+        source = resources.files("avow.report").joinpath("templates/report.typ").read_bytes()
+        data: bytes = typst.compile(
+            source, format="pdf", sys_inputs={"case": json.dumps(_data(case))}, ignore_system_fonts=True, timestamp=0
+        )
     except ImportError as error:
-        raise NoTypst("typst is not installed: pip install typst") from error
-    source = resources.files("avow.report").joinpath("templates/report.typ").read_bytes()
-    data: bytes = typst.compile(
-        source, format="pdf", sys_inputs={"case": json.dumps(_data(case))}, ignore_system_fonts=True, timestamp=0
-    )
+        raise Rejected(Diagnostic("CLI023", "typst is not installed", hint="pip install typst")) from error
+    except Exception as error:  # typst's own exception types differ between versions
+        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise Rejected(Diagnostic("CLI023", f"typst fails: {said}")) from error
     return data
+
+
+def write_pdf(case: Case, folder: Path) -> Path:
+    """Write `folder`/report.pdf. Raises OSError, and Rejected as `render_pdf`."""
+    path = folder / PDF
+    write(path, render_pdf(case))
+    return path
 
 
 def _data(case: Case) -> dict[str, Any]:
@@ -62,8 +72,8 @@ def _data(case: Case) -> dict[str, Any]:
         "proofs": f"proofs {case.grade.word}",
         "facts": [*facts, *case.digests],
         "first": _first(case),
-        "suppositions": [_supposition(s) for s in case.suppositions],
-        "weakenings": [[str(w.count), w.words, w.why] for w in case.weakenings],
+        "assumptions": [_assumption(s) for s in case.assumptions],
+        "deficits": [[str(w.count), w.words, w.why] for w in case.deficits],
         "modules": [_module(module) for module in requirement_modules(case)],
         "gates": [
             {
@@ -106,7 +116,6 @@ def _data(case: Case) -> dict[str, Any]:
             for d in case.derivations
         ],
         "obligations": [_obligation(case, view) for view in views],
-        "hypotheses": [f"{h.text} ({', '.join(map(short, h.claims[:6]))})" for h in case.hypotheses],
         "environment": [(e.port, e.assume or "nothing is assumed", e.because) for e in case.environment],
         "findings": [
             f"{f.how}: {f.pattern} {f.verdict}. {f.reason} {f.who} {f.date}".strip()
@@ -141,8 +150,9 @@ def _first(case: Case) -> dict[str, Any]:
         "verdict": f"{a.tone.mark} {a.verdict}",
         "tone": a.tone.value,
         "counts": a.beside,
-        "by_how": [
-            [f"{number} {how}", ", ".join(r.id for r in case.requirements if r.how is how)] for how, number in a.by_how
+        "by_level": [
+            [f"{number} {level}", ", ".join(r.id for r in case.requirements if r.level is level)]
+            for level, number in a.by_level
         ]
         if many
         else [],
@@ -150,9 +160,10 @@ def _first(case: Case) -> dict[str, Any]:
             [
                 r.id,
                 r.words,
-                {"word": f"{r.tone.mark} {r.how}", "tone": r.tone.value},
+                {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
                 f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
                 str(len(r.supposes)),
+                r.rate.brief if r.rate and r.rate.bound and r.level.holds else "",
             ]
             for r in case.listed
         ],
@@ -161,7 +172,7 @@ def _first(case: Case) -> dict[str, Any]:
         "more_nodes": a.more_nodes,
         "objects": f"{a.objects}." if a.objects else "",
         "weakest": a.refuted or _weakest(case),
-        "weakened_by": f"Weakening: {a.weakened_by}." if a.weakened_by else "",
+        "weakened_by": f"Deficit: {a.weakened_by}." if a.weakened_by else "",
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
         "supposed": [[line.about, *_supposed(case, line)] for line in a.supposed],
         "owned": _owned(case),
@@ -174,7 +185,7 @@ def _first(case: Case) -> dict[str, Any]:
 
 
 def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
-    """The line's suppositions in words, and the numbers of those that the page has no room for."""
+    """The line's assumptions in words, and the numbers of those that the page has no room for."""
     first = f"{line.number} {line.says}"
     if not worded(case):
         return first, line.more
@@ -194,8 +205,8 @@ def _weakest(case: Case) -> str:
     return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
 
 
-def _supposition(supposition: Supposition) -> list[str]:
-    s = supposition
+def _assumption(assumption: Assumption) -> list[str]:
+    s = assumption
     reason = full_reason(s)
     return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), listed(s.needing), s.term]
 
@@ -204,12 +215,12 @@ def _module(module: RequirementModule) -> dict[str, Any]:
     r = module.requirement
     lines = [f"{title}: {words}" for _, title, words in module.away]
     lines += [f"composition: {module.conditions}"] if module.conditions else []
-    lines += [f"supposes {', '.join(module.supposes)}"] if module.supposes else []
+    lines += [f"assumes {', '.join(module.supposes)}"] if module.supposes else []
     return {
         "id": r.id,
         "text": r.words,
         "formula": in_lines(r.formal),
-        "status": {"word": f"{r.tone.mark} {r.how}", "tone": r.tone.value},
+        "status": {"word": f"{r.tone.mark} {r.level}", "tone": r.tone.value},
         "because": module.because,
         "strategy": module.strategy,
         "lines": lines,
@@ -265,7 +276,7 @@ def _row(view: ObligationView) -> dict[str, Any]:
 
 
 def _chip(status: Status) -> dict[str, str]:
-    return {"word": status.word, "tone": tone(status)}
+    return {"word": status.value, "tone": tone(status)}
 
 
 def _word(kind: str) -> dict[str, str]:

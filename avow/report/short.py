@@ -22,24 +22,24 @@ def terminal_lines(case: Case) -> list[str]:
     lines = [title + verdict]
     lines += _cut_lines(a.beside, 2)
     lines += ["1 Claimed"]
-    lines += [_cut(f"  {r.tone.mark} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in case.listed]
+    lines += [_cut(f"  {r.tone.mark} {r.id} {_standing(r)}: {_one(r)}") for r in case.listed]
     if len(case.listed) < len(case.requirements):
         lines += [f"  the worst of {len(case.requirements)}"]
     shown = a.based_on[:4]
     more = f"; and {len(a.bases) - len(shown)} more nodes" if len(a.bases) > len(shown) else ""
     lines += ["2 Based on", *_cut_lines("; ".join(f"{b.title} {b.words}" for b in shown) + more, 2)]
     lines += ["3 Weakest evidence", *_cut_lines(_weakest_words(case), 3)]
-    lines += [f"4 Supposed{f' ({a.owned} with owner and date)' if a.owned else ': nothing'}"]
+    lines += [f"4 Assumed{f' ({a.owned} with owner and date)' if a.owned else ': nothing'}"]
     lines += [_cut(f"  {line.about}: {line.says}") for line in a.supposed]
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
     lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
     lines += [_cut(f"  {mark} {words}".rstrip()) for mark, words in a.changed]
-    known = _cut_lines(f"weakening: {a.weakened_by}", 3) if a.weakened_by else []
+    known = _cut_lines(f"deficit: {a.weakened_by}", 3) if a.weakened_by else []
     if len(lines) + len(known) < LINES:
-        at = next(n for n, line in enumerate(lines) if line.startswith("4 Supposed"))
+        at = next(n for n, line in enumerate(lines) if line.startswith("4 Assumed"))
         lines = [*lines[:at], *known, *lines[at:]]
     over = len(lines) - (LINES - 1)
-    if over > 0:  # a sort of suppositions, or two, whose number stands in the verdict
+    if over > 0:  # a sort of assumptions, or two, whose number stands in the verdict
         at = next(n for n, line in enumerate(lines) if line.startswith("5 Changed"))
         lines = [*lines[: at - over - 1], "  …", *lines[at:]]
     return [*lines, _cut(f"next: {_next(case)}")]
@@ -56,9 +56,11 @@ def comment(case: Case) -> str:
         escaped(a.changed_against) or "No report has been signed yet.",
         "\n".join(f"- {mark} {escaped(_few(words))}" for mark, words in a.changed if mark),
         f"Weakest evidence: {escaped(_few(_weakest_words(case)))}",
-        "<details><summary>Requirements and suppositions</summary>",
-        "\n".join(f"- {r.tone.mark} **{escaped(r.id)}** {r.how}: {escaped(_one(r))}" for r in case.requirements[:40]),
-        "\n".join(f"- {s.number} {escaped(s.words)}" for s in case.suppositions[:40]),
+        "<details><summary>Requirements and assumptions</summary>",
+        "\n".join(
+            f"- {r.tone.mark} **{escaped(r.id)}** {r.stands}: {escaped(_one(r))}" for r in case.requirements[:40]
+        ),
+        "\n".join(f"- {s.number} {escaped(s.words)}" for s in case.assumptions[:40]),
         "</details>",
     ]
     return "\n\n".join(line for line in lines if line) + "\n"
@@ -71,11 +73,11 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield escaped(f"{a.beside} · {a.signed}")
     yield "## 1 What is claimed?"
     rows = [
-        f"| **{escaped(r.id)}** {escaped(_one(r))} | {r.tone.mark} {r.how} "
+        f"| **{escaped(r.id)}** {escaped(_one(r))} | {r.tone.mark} {r.stands} "
         f"| {escaped(_weakest(r))} | {len(r.supposes)} |"
         for r in case.requirements
     ]
-    head = "| requirement | how it stands | weakest evidence | supposes |\n| --- | --- | --- | --- |\n"
+    head = "| requirement | how it stands | weakest evidence | assumptions |\n| --- | --- | --- | --- |\n"
     yield head + "\n".join(rows) if rows else "No requirement is named."
     yield escaped(a.legend)
     yield "## 2 What is it based on?"
@@ -84,19 +86,24 @@ def markdown_head(case: Case) -> Iterator[str]:
         yield escaped(f"{a.objects}.")
     yield "## 3 What is the weakest evidence?"
     yield escaped(_weakest_words(case))
-    yield "## 4 What is supposed, not shown?"
+    yield "## 4 What is assumed, not shown?"
     owners = f": {escaped(a.owners)}" if a.owners else ""
     owned = f"{a.owned} with owner and date{owners}.\n\n" if a.owned else ""
     yield owned + (
-        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {escaped(s.words)}; {escaped(s.term)}" for s in case.suppositions)
+        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {escaped(s.words)}; {escaped(s.term)}" for s in case.assumptions)
         or "Nothing."
     )
     yield "## 5 What changed since the last signed report?"
     if a.changed_against:
         yield escaped(a.changed_against)
     yield "\n".join(f"- {mark} {escaped(words)}" if mark else escaped(words) for mark, words in a.changed)
-    yield "## Weakenings"
-    yield "\n".join(f"- {w.count} {escaped(w.words)}. {escaped(w.why)}" for w in case.weakenings) or "None."
+    yield "## Deficits"
+    yield "\n".join(f"- {w.count} {escaped(w.words)}. {escaped(w.why)}" for w in case.deficits) or "None."
+
+
+def _standing(r: RequirementView) -> str:
+    """For a short line: the rate, if there is one, else the weakest evidence."""
+    return r.stands if r.rate and r.rate.bound else f"{r.level}, {_weakest(r)}"
 
 
 def _weakest(r: RequirementView) -> str:

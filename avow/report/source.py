@@ -15,11 +15,11 @@ from pygments.lexer import Lexer
 from pygments.lexers.data import YamlLexer
 from pygments.token import Comment, Keyword, Name, Number, Operator, String, _TokenType
 
+from avow.assurance.answers import Tone
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.base.diagnostics import Span
 from avow.base.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 from avow.evidence.obligation import Kind
-from avow.evidence.status import Status
 from avow.language.pygments_lexer import RclLexer
 from avow.report.wording import MARKS, anchor, clean, tone
 
@@ -86,17 +86,19 @@ def _pointing(case: Case) -> Iterator[tuple[Span, str]]:
             yield view.obligation.span, _mark(view) if view.obligation.kind is Kind.GUARANTEE else ""
     for r in case.requirements:
         if r.span is not None:
-            yield r.span, _note(f"requirement:{r.id}", r.status, r.id)
+            shade = {Tone.GREEN: "good", Tone.AMBER: "fair", Tone.RED: "bad", Tone.GREY: "open"}[r.tone]
+            yield r.span, _note(f"requirement:{r.id}", shade, r.tone.mark, f"{r.id} {r.level}")
 
 
 def _mark(view: ObligationView) -> str:
-    return _note(view.id, view.standing, view.obligation.name)
+    said = f"{view.obligation.name} {view.standing.value}"
+    return _note(view.id, tone(view.standing), MARKS[view.standing], said)
 
 
-def _note(claim: str, status: Status, name: str) -> str:
+def _note(claim: str, shade: str, mark: str, text: str) -> str:
     return (
-        f'<a class="came {tone(status)}" href="#{anchor(claim)}"><span aria-hidden="true">{MARKS[status]}</span> '
-        f"{escape(clean(name))} {status.word}</a>"
+        f'<a class="came {shade}" href="#{anchor(claim)}"><span aria-hidden="true">{mark}</span> '
+        f"{escape(clean(text))}</a>"
     )
 
 

@@ -73,7 +73,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
         out.print(f"\n[dim]{len(old)} older record(s), which no longer count:[/]")
         for item in old[:10]:
             e = item.entry.evidence
-            out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {Status(e.verdict).word} ({item.currency})[/]")
+            out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {Status(e.verdict).value} ({item.currency})[/]")
     if view.suggestion:
         out.print(f"\nnext: {escape(view.suggestion.text)}")
     needed_by = [r.id for r in case.requirements if view.id in r.rests_on or view.id in r.below]
@@ -95,7 +95,7 @@ def _show_changes(example: Counterexample, out: Console) -> None:
 
 
 def _status(status: Status) -> str:
-    return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status.word}[/]"
+    return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status.value}[/]"
 
 
 def _show_counterexample(example: Counterexample, out: Console) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
+from avow.assurance import naming
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.base.plain import count
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS
@@ -22,13 +23,14 @@ _SHOWN = {
     Status.MONITORED: ("◐", "fair", "on a recorded or live trace"),
     Status.REVIEWED: ("◔", "fair", "by a person who said what was read and concluded"),
     Status.JUSTIFIED: ("◔", "fair", "a person's dated reason, in place of evidence"),
-    Status.LINKED: ("↳", "fair", "a person says that what stands below it, which holds, amounts to it"),
+    Status.ARGUED: ("↳", "fair", "a person says that what stands below it, which holds, amounts to it"),
     Status.PARTIAL: (
         "◑",
         "open",
         "partial correctness: proved of every run that ends; that all of them do is not shown",
     ),
-    Status.VACUOUS: ("∅", "open", "it passed, but its trigger was never met: it supports nothing"),
+    Status.UNWRITTEN: ("✎", "open", "a draft's placeholder: what the node promises is still to be written"),
+    Status.VACUOUS: ("∅", "open", "it passed and says nothing: its trigger was never met, or every design meets it"),
     Status.UNKNOWN: ("?", "open", "the method gave up"),
     Status.NOT_RUN: ("–", "open", "the tool is not here"),
     Status.ERROR: ("!", "open", "the tool failed, or its answer could not be read"),
@@ -63,17 +65,7 @@ def anchor(claim: str) -> str:
 
 def rerun(view: ObligationView, evidence: Evidence) -> str:
     """The command that asks this method again, from the workspace's folder."""
-    o = view.obligation
-    match o.kind:
-        case Kind.SANITY:
-            task = f"sanity:{o.system}:{o.node}"
-        case Kind.COMPOSITION | Kind.REQUIREMENT:
-            task = f"compose:{o.system}"
-        case Kind.WELL_FORMED:
-            task = f"check:{o.system}"
-        case Kind.GUARANTEE | Kind.PROGRAM:
-            task = f"discharge:{o.system}:{o.node}:{evidence.method}"
-    return f"AVOW_FRESH=1 doit {shlex.quote(task)}"
+    return naming.rerun(view.obligation, evidence.method)
 
 
 def tool_command(evidence: Evidence) -> str:
@@ -148,7 +140,7 @@ def verdict_line(case: Case) -> str:
     """The case in a sentence."""
     failed = sum(not gate.passed for gate in case.gates)
     if not failed and case.strict:
-        answered = sum(r.status.supports for r in case.requirements)
+        answered = sum(r.level.holds for r in case.requirements)
         asked = f"; {answered} of {len(case.requirements)} requirements are shown to hold" if case.requirements else ""
         found = count(sum(f.how == "expected" for f in case.findings), "expected finding")
         return f"Examined, not relied upon: there are exactly the {found}, and no others{asked}."
@@ -171,8 +163,8 @@ def banner_tone(case: Case) -> str:
     """Green is for a case that supports what is asked: known-bad material, expected or accepted, is none."""
     if not case.good:
         return "bad"
-    examined = case.strict and not all(r.status.supports for r in case.requirements)
-    return "open" if examined or case.answers.warned else "good"
+    held = all(r.level.holds for r in case.requirements)  # one that nobody has validated does not, and fails no gate
+    return "good" if held and not case.answers.warned else "open"
 
 
 _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")

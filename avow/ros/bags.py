@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,12 +33,11 @@ SUFFIXES = (".bag", ".db3", ".mcap")
 
 
 class NoBag(Exception):  # noqa: N818 - it is what was found wrong
-    """What is no bag that can be read, and why. `missing`: the package that reads bags is."""
+    """The file is not a bag that can be read; the message says why."""
 
-    def __init__(self, message: str, hint: str | None = None, *, missing: bool = False) -> None:
+    def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
         self.hint = hint
-        self.missing = missing
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +101,20 @@ def is_bag(path: Path) -> bool:
     return path.is_dir() or path.suffix in SUFFIXES
 
 
+def digest_trace(path: Path) -> str:
+    """SHA-256 of a trace: of the file, or of the names and contents of a bag folder's files. Raises OSError."""
+    whole = hashlib.sha256()
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    for file in files:
+        if path.is_dir():
+            whole.update(file.relative_to(path).as_posix().encode() + b"\0")
+        with file.open("rb") as stream:
+            if len(files) == 1 and not path.is_dir():
+                return hashlib.file_digest(stream, "sha256").hexdigest()
+            whole.update(hashlib.file_digest(stream, "sha256").digest())
+    return whole.hexdigest()
+
+
 def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
     """Raises NoBag, also for a bag whose types nothing defines."""
     with _opened(path, origin) as reader:
@@ -136,27 +149,30 @@ def messages(
             if not wanted(c.topic) and any(map(wanted, parts_of(c.topic, canonical(c.msgtype))))
         }
         plain = plainer(reader.typestore.fielddefs)
-        kind, wanted = functools.cache(lambda said: as_message(said, "")[0]), functools.cache(wanted)
+
+        def about(connection: Any) -> tuple[str, str, bool, str]:
+            """What is the same for all messages of a connection."""
+            heard = connection.topic in parted or wanted(connection.topic)
+            by = getattr(connection.ext, "callerid", None) or ""
+            return connection.topic, as_message(connection.msgtype, "")[0], heard, by
+
+        known: dict[int, tuple[str, str, bool, str]] = {}
         for connection, time, raw in reader.messages():
-            event: Mapping[str, Any] = {}
-            topic = connection.topic
+            if connection.id not in known:
+                known[connection.id] = about(connection)
+            topic, kind, heard, by = known[connection.id]
+            event = plain(reader.deserialize(raw, kind)) if heard else {}
             if topic in parted:
-                topic, found = calls.part(topic, plain(reader.deserialize(raw, kind(connection.msgtype))))
-                event = found
-            elif wanted(topic):
-                event = plain(reader.deserialize(raw, kind(connection.msgtype)))
-            yield enveloped(event, topic, time / 1e9, getattr(connection.ext, "callerid", None) or ""), len(raw)
+                topic, event = calls.part(topic, event)
+            yield enveloped(event, topic, time / 1e9, by), len(raw)
 
 
 @contextmanager
 def _opened(path: Path, origin: Origin) -> Iterator[Any]:
-    try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.serde import SerdeError
-        from rosbags.typesys import TypesysError
-    except ImportError:
-        text = "reading bags needs the package rosbags"
-        raise NoBag(text, "pip install 'avow[bags]'", missing=True) from None
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import TypesysError
+
     try:
         with _reader(AnyReader, path, origin) as reader:
             yield reader
@@ -205,6 +221,9 @@ def _types(origin: Origin) -> Any:
     return store
 
 
+_SCALARS = frozenset((float, int, str, bool))
+
+
 def plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
     """Deserialised messages as the JSON that ROSMonitoring would write of them; floats as they are. Fields have their
     own names, also those that are words of Python's, to which rosbags puts an underscore."""
@@ -212,6 +231,8 @@ def plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
 
     def plain(message: Any) -> Any:
         kind = type(message)
+        if kind in _SCALARS:
+            return message
         fields = names.get(kind)
         if fields is None:
             declared = getattr(kind, "__dataclass_fields__", {})  # first the fields, then the constants

@@ -83,8 +83,8 @@ def _once(names: Iterable[str]) -> tuple[str, ...]:
 
 _SERVICE = (("Request",), ("Response",))
 _ACTION = (("Goal",), ("Result", "Feedback"))
-_OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "roscpp", "nodelet")
-"""Packages of the services that every node of ROS has."""
+_OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "lifecycle_msgs", "roscpp", "nodelet")
+"""Packages of the services that every node of ROS, or every lifecycle node, has."""
 
 
 def is_service_part(topic: str) -> bool:

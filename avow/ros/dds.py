@@ -50,8 +50,12 @@ def settings(host: str) -> str:
 
 
 def domain_of(text: str) -> int:
-    """``dds`` (ROS_DOMAIN_ID, else 0) or ``dds:42``. Raises ValueError."""
-    said = text.removeprefix("dds").removeprefix(":") or os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    """``dds`` or ``ros2`` (ROS_DOMAIN_ID, else 0), ``dds:42``. Raises ValueError."""
+    said = (
+        text.removeprefix("dds").removeprefix("ros2").removeprefix(":")
+        or os.environ.get("ROS_DOMAIN_ID", "").strip()
+        or "0"
+    )
     if not (said.isascii() and said.isdigit() and len(said) <= 3 and int(said) <= LAST_DOMAIN):
         raise ValueError(f"{said!r} is no DDS domain: 0 to {LAST_DOMAIN}")
     return int(said)

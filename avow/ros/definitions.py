@@ -83,6 +83,11 @@ class Message:
     def field(self, name: str) -> Field | None:
         return next((f for f in self.fields if f.name == name), None)
 
+    def text(self) -> str:
+        """The definition as a ``.msg`` text that `parse_message` reads, without limits on lengths."""
+        constants = (f"{kind} {name}={value}\n" for name, kind, value in self.constants)
+        return "".join((*constants, *(f"{inner.wire} {inner.name}\n" for inner in self.fields)))
+
 
 class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
     """A text that defines no message; `line` counts from 1."""
@@ -108,18 +113,19 @@ class Definitions:
 
     def missing(self, message: Message) -> tuple[str, ...]:
         """The types that a message is made of and that nothing defines."""
+        return tuple(name for name in self.within(message) if name not in self.messages)
+
+    def within(self, message: Message) -> tuple[str, ...]:
+        """The types that a message is made of, at any depth."""
         found: dict[str, None] = {}
-        stack, seen = [message], {message.name}
+        stack = [message]
         while stack:
             for inner in stack.pop().fields:
                 wire = inner.wire.item if isinstance(inner.wire, Array) else inner.wire
-                if not isinstance(wire, Nested) or wire.name in seen:
+                if not isinstance(wire, Nested) or wire.name in (*found, message.name):
                     continue
-                seen.add(wire.name)
-                nested = self.messages.get(wire.name)
-                if nested is None:
-                    found[wire.name] = None
-                else:
+                found[wire.name] = None
+                if (nested := self.messages.get(wire.name)) is not None:
                     stack.append(nested)
         return tuple(found)
 

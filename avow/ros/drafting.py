@@ -37,7 +37,7 @@ class Seen:
     least: float = math.inf
     greatest: float = -math.inf
     odd: Counter[str] = field(default_factory=Counter)
-    """NaN and infinities."""
+    """NaN, infinities and empty arrays."""
     words: dict[str, None] = field(default_factory=dict)
 
     def note(self, value: Any) -> None:
@@ -45,10 +45,17 @@ class Seen:
         if isinstance(value, str):
             if len(self.words) <= DRAFTED_WORDS:
                 self.words[value[:40]] = None
+        elif isinstance(value, list):
+            if not value:
+                self.odd["empty"] += 1
         elif isinstance(value, float) and not math.isfinite(value):
             self.odd["NaN" if math.isnan(value) else "inf"] += 1
         elif isinstance(value, int | float):
             self.least, self.greatest = min(self.least, value), max(self.greatest, value)
+
+    def says_nothing(self) -> bool:
+        """Whether there was never a reading."""
+        return self.count > 0 and self.odd.total() == self.count
 
     def __str__(self) -> str:
         parts = []
@@ -71,8 +78,8 @@ class Drafted:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a draft is made of. `origin`: in words; `traces`: paths in the system's folder; `graph`: that of the graph's
-    text, where there is one."""
+    """What a draft is made of. `origin`: in words; `traces`: paths in the folder, each with its digest; `graph`:
+    that of the graph's text, where there is one."""
 
     name: str
     origin: str
@@ -81,11 +88,13 @@ class Given:
     keywords: frozenset[str]
     ros2: bool = False
     distro: str | None = None
-    traces: tuple[str, ...] = ()
+    traces: Mapping[str, str] = field(default_factory=dict)
     graph: str | None = None
+    messages: Mapping[str, str] = field(default_factory=dict)
+    """Type → its definition, of those for which the draft has a file."""
     seen: Mapping[tuple[str, Path], Seen] = field(default_factory=dict)
-    counts: Mapping[str, int] = field(default_factory=dict)
-    publishers_known: bool = True
+    unsaid: frozenset[str] = frozenset()
+    """Nodes of which the record does not say that they publish what they are drafted with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +105,21 @@ class _Port:
     type_name: str
     mapping: str
     comment: str
+
+
+UNNAMED = "/robot"
+"""The node that is drafted with what no name tells apart."""
+
+
+def by_names(topics: Iterable[str], heard: Iterable[str]) -> dict[str, list[str]]:
+    """The nodes that a record suggests which does not say who publishes, each with its topics: the node (of those that
+    the record names in its log) under whose name a topic stands, else what comes before the topic's last part."""
+    nodes = sorted(heard, key=len, reverse=True)
+    found: dict[str, list[str]] = {}
+    for topic in topics:
+        said = next((node for node in nodes if topic.startswith(f"{node}/")), "")
+        found.setdefault(said or named(topic).rpartition("/")[0] or UNNAMED, []).append(topic)
+    return found
 
 
 def draft(given: Given) -> Drafted:
@@ -119,6 +143,10 @@ class _Draft:
     elements: set[str] = field(default_factory=set)
     ports: dict[str, tuple[_Port, ...]] = field(default_factory=dict)
     """Topic → what it carries."""
+    silent: dict[str, list[str]] = field(default_factory=dict)
+    """Topic → the fields that were never a reading, and what they were: they become no ports."""
+    told: bool = False
+    """Whether the traces have been written out."""
 
     def made(self) -> Drafted:
         nodes, dropped = self.nodes()
@@ -158,6 +186,10 @@ class _Draft:
             return
         leaves = [leaf for leaf in self.given.known.leaves(message) if self.sort(leaf[1]) is not None]
         for path, wire, holder in leaves[:DRAFTED_FIELDS]:
+            seen = self.given.seen.get((topic, path))
+            if seen is not None and seen.says_nothing():
+                self.silent.setdefault(topic, []).append(f"{'.'.join(path)} ({seen})")
+                continue
             name = short if len(leaves) == 1 else f"{short}_{'_'.join(path)}"
             yield self.port(topic, self.free(name), path, wire, holder)
 
@@ -227,11 +259,13 @@ class _Draft:
         heard = [t for t in node.subscribes if not is_plumbing(t) and t not in published]
         own = [t for t in node.subscribes if t in published]
         lines = [f"node {name} {{"]
-        if not self.given.publishers_known:
-            lines.insert(
-                0, "// This record does not say who publishes: make a node of each, and move its topics there."
-            )
+        if node.name in self.given.unsaid:
+            by = "the names of these topics suggest this node" if node.name != UNNAMED else "nor do these topics' names"
+            lines.insert(0, f"// The record does not say who publishes: {by}. Correct it, or draft with --from-graph.")
         lines += [f"  // {topic}: it hears what it publishes itself, which wants a delayed connection" for topic in own]
+        for topic in (*heard, *published):
+            if topic in self.silent:
+                lines.append(f"  // {topic}, left out for want of a reading: {', '.join(self.silent[topic])}")
         lines += self.side("inputs", heard) + self.side("outputs", published)
         topics = [*self.topics(heard, "in"), *self.topics(published, "out")]
         lines.append("  topics(" + ("\n    " + ",\n    ".join(topics) + "\n  )" if topics else " )"))
@@ -265,6 +299,7 @@ class _Draft:
         lines = [
             f"# Drafted from {_line(given.origin)}: for you to correct.",
             f"system: {given.name}",
+            *(["messages: [msg]"] if given.messages else []),
             "",
             "ros:",
             *([f"  distro: {given.distro}"] if given.distro else []),
@@ -302,16 +337,24 @@ class _Draft:
         lines = [f"  {name}:", "    criticality: medium"]
         if not entries:
             return [*lines, "    methods: []"]
+        lines += ["    mapping:", *(f"      {key}: {value}" for key, value in entries.items())]
         lines += ["    methods:", "      - rosmonitoring:", f"          ros_version: ros{2 if self.given.ros2 else 1}"]
         if self.given.traces:
-            lines.append(f"          traces: [{', '.join(json.dumps(t) for t in self.given.traces)}]")
+            lines.append(f"          traces: {self.recordings()}")
         if any(key.startswith("in.") for key in entries) and any(key.startswith("out.") for key in entries):
             lines += [
                 "          # Which input did an answer answer? Until this is said, what is judged is no evidence:",
                 f"          # answers: {self.answers(node)}",
             ]
-        lines.append("          mapping:")
-        return [*lines, *(f"            {key}: {value}" for key, value in entries.items())]
+        return lines
+
+    def recordings(self) -> str:
+        """The traces: in full the first time, then by reference."""
+        if self.told:
+            return "*recordings"
+        self.told = True
+        told = (f"{{path: {json.dumps(path)}, sha256: {digest}}}" for path, digest in self.given.traces.items())
+        return f"&recordings [{', '.join(told)}]"
 
     def answers(self, node: Listed) -> str:
         """By stamp where all that it hears and says is stamped."""
@@ -371,7 +414,7 @@ def watch(known: Definitions, types: Mapping[str, str]) -> tuple[dict[tuple[str,
         message = known.get(kind)
         if message is None or known.missing(message) or is_plumbing(topic):
             continue
-        leaves = [path for path, wire, _ in known.leaves(message) if isinstance(wire, Scalar)]
+        leaves = [path for path, wire, _ in known.leaves(message) if isinstance(wire, Scalar | Array)]
         paths[topic] = leaves[:DRAFTED_FIELDS]
         seen |= {(topic, path): Seen() for path in paths[topic]}
 

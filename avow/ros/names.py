@@ -25,6 +25,8 @@ class Placed:
     span: Span | None = field(default=None, compare=False, repr=False)
     named: bool = field(default=False, compare=False, repr=False)
     """Whether somebody has said its name; else it is supposed."""
+    launched: bool = field(default=False, compare=False, repr=False)
+    """Whether a launch file says so."""
 
     @property
     def namespace(self) -> str:

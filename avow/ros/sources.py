@@ -61,18 +61,13 @@ def definitions(paths: Iterable[Path], distro: str | None) -> tuple[Definitions,
                 faults.append(Diagnostic("ROS102", text, _at(path, 1), hint="keep one of the two"))
     known: dict[str, Message] = dict(STANDARD)
     if distro is not None:
-        try:
-            known.update(distribution(distro))
-        except ImportError:
-            hint = "pip install 'avow[bags]'"
-            text = f"the message types of {distro} are read from the package rosbags, which is not installed"
-            faults.append(Diagnostic("ROS103", text, hint=hint))
+        known.update(distribution(distro))
     return Definitions({**known, **found}), tuple(faults)
 
 
 @functools.lru_cache(maxsize=4)
 def distribution(distro: str) -> Mapping[str, Message]:
-    """The message types of a distribution's common packages. Raises ImportError where rosbags is not installed."""
+    """The message types of a distribution's common packages."""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores(DISTRIBUTIONS[distro]))
@@ -128,9 +123,6 @@ def _of_file(path: Path, faults: list[Diagnostic]) -> tuple[Message, ...]:
         return parse_parts(text, name, kind, str(path)) if kind != "msg" else (parse_message(text, name, str(path)),)
     except WrongDefinition as wrong:
         faults.append(Diagnostic("ROS101", f"{name}: {wrong}", _at(path, wrong.line)))
-    except ImportError:
-        text = ".idl files are read by the package rosbags, which is not installed"
-        faults.append(Diagnostic("ROS103", text, _at(path, 1), hint="pip install 'avow[bags]'"))
     except (OSError, ValueError) as error:
         faults.append(Diagnostic("ROS101", f"{name} cannot be read: {error}", _at(path, 1)))
     return ()

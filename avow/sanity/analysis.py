@@ -30,17 +30,18 @@ from avow.sanity.claims import Claim, Property, claims, triggers
 from avow.sanity.conflicts import conflicts, contradictions
 from avow.sanity.over_runs import OverRuns
 from avow.sanity.realizability import possible, realizable
-from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
+from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing, never_demanded
 from avow.sanity.witness_search import Group, Realizability, groups
 from avow.solving.limits import spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
-from avow.solving.translation import translating_once
+from avow.solving.translation import new_session
 
 Given = Mapping[Variable, Value]
 
 
+@new_session()
 def analyse(
     node: Node,
     *,
@@ -61,11 +62,10 @@ def analyse(
     results = []
     asked = claims(node)
     told = [k for k, claim in enumerate(asked) if wanted is None or claim.name in wanted]
-    with translating_once():
-        for claim in asked[: max(told, default=-1) + 1]:
-            start = time.monotonic()
-            finding = analysis.settle(claim)
-            results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
+    for claim in asked[: max(told, default=-1) + 1]:
+        start = time.monotonic()
+        finding = analysis.settle(claim)
+        results.append(SanityResult.of(node.name, claim, finding, time.monotonic() - start))
     return tuple(results[k] for k in told)
 
 
@@ -275,24 +275,25 @@ class _Analysis:
         impossible = []
         undecided: Finding | None = None
         broken = self._example(f"not-tautological-{name}")  # a guarantee is broken only where it is demanded
-        for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
+        asked = triggers(self.guarantees[name])
+        for trigger in asked:
             if _meets(broken, (*self.assumptions.values(), trigger)):
                 continue
             finding = self._possible(
                 {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
             )
             if finding.verdict is Verdict.REFUTED:
-                impossible.append((number, finding))
+                impossible.append((trigger, finding))
             elif finding.verdict is Verdict.ERROR:
                 return finding
             elif finding.verdict is not Verdict.PROVED:
                 undecided = finding
         if impossible:
-            first = impossible[0][1]
+            trigger, first = impossible[0]
             empty = self._other("assumptions-satisfiable").verdict is Verdict.REFUTED
             because = "assumptions-satisfiable" if empty else self._if_refuted(f"not-tautological-{name}")
             clauses = tuple(c for c in first.clauses if c in self.assumptions)
-            text = "what it demands is never demanded: its condition cannot come about"
+            text = never_demanded(trigger, among=len(asked))
             text += f" (given {listing(clauses)})" if clauses else ""
             return Finding(Verdict.REFUTED, text, (name, *clauses), because=because, engine=first.engine)
         return undecided or Finding(Verdict.PROVED)

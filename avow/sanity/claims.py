@@ -109,9 +109,9 @@ def claims(node: Node) -> tuple[Claim, ...]:
     sentence = f"For all inputs that {node.name} assumes, some output meets every guarantee."
     answered = f"∀ {ins} · ({a}) → ∃ {outs} · {g}" if ins and outs else f"({a}) → {g}"
     ask(Property.REALIZABLE, None, sentence, answered, assumed + guaranteed)
-    for clause in (c for c in node.guarantees if c.pace is None):
+    for clause in (c for c in node.guarantees if c.pace is None and not c.unwritten):
         ask_of(clause)
-    for port in node.outputs:
+    for port in () if node.unwritten else node.outputs:
         excluded = f"The guarantees of {node.name} exclude some value of out.{port.name}."
         ask(Property.CONSTRAINED, port, excluded, g, guaranteed)
         ask(Property.DETERMINED, port, f"The inputs of {node.name} determine out.{port.name}.", g, guaranteed)
@@ -151,7 +151,7 @@ def _of_clause(node: Node, clause: Clause) -> dict[Property, str]:
         asked[Property.NOT_VACUOUS] = f"What triggers guarantee {clause.name} of {node.name} can happen."
     if len(others) > 1:
         asked[Property.NOT_REDUNDANT] = f"{whose} does not follow from the others."
-    if clause.kind is ClauseKind.ASSUMPTION:
+    if clause.kind is ClauseKind.ASSUMPTION and not node.unwritten:
         asked[Property.NEEDED] = f"{whose} rules out inputs for which no output meets the guarantees."
     return asked
 

@@ -1,9 +1,8 @@
 """Why a contract is not realizable: which guarantees conflict, where, and what each demands there.
 
 A conflict is a set of guarantees that no output meets together at some allowed input, while every smaller set can be
-met at all of them. Every one is looked for (`minimal_sets`); where the search was cut short, that is said.
-A guarantee that cannot be met by itself at some input would hide its conflicts at others: those that come up are listed
-too. What is shown of an input is what matters: the comparisons that make the conflict, and the inputs they speak of.
+met at all of them. Avow looks for every one (`minimal_sets`) and says where the search was cut short. Of an input it
+shows what matters: the comparisons that make the conflict, and the inputs in them.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from avow.language.sorts import BoolSort, DataSort, FunctionSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import realizable
-from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
+from avow.sanity.witness_search import Formulas, Given, Group, Realizability, groups
 from avow.solving.limits import effort_left, spent, until
 from avow.solving.questions import solve
 from avow.solving.replay import replay
-from avow.solving.translation import Unsupported
+from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
 
 
@@ -69,8 +68,10 @@ def conflicts(
             complete = complete and other.verdict is not Verdict.UNKNOWN
         if at is not None:
             search = _Search(tuple(inputs), group, assumptions, until(effort), seed, [at])
-            complete = search.run() and complete
-            found += search.conflicts()
+            labels = tuple(group.guarantees)
+            sets = minimal_sets(labels, search.core, most=CONFLICTS, ended=search.ended)
+            complete = complete and sets.complete
+            found += (search.explained(tuple(label for label in labels if label in chosen)) for chosen in sets.sets)
     found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
     return tuple(found), complete
 
@@ -88,31 +89,11 @@ class _Search:
     """Allowed inputs for which no output meets all of the group."""
     refuted: dict[frozenset[str], Given] = field(default_factory=dict)
     """Sets of guarantees that no output meets, and where."""
-    found: list[frozenset[str]] = field(default_factory=list)
 
-    def run(self) -> bool:
-        """Whether every conflict was found."""
-        labels = tuple(self.group.guarantees)
-        sets = minimal_sets(labels, self._core, most=CONFLICTS, ended=self._ended)
-        self.found += sets.sets
-        alone = [label for label in labels if frozenset((label,)) in self.found]
-        for pair in (frozenset((label, other)) for label in alone for other in labels if label != other):
-            if not self._ended() and pair not in self.found:
-                self._beside(pair)
-        for at in self.shown if alone else ():
-            self._learn(at)
-        return sets.complete
-
-    def conflicts(self) -> list[Conflict]:
-        labels = tuple(self.group.guarantees)
-        ordered = [tuple(label for label in labels if label in chosen) for chosen in self.found]
-        ordered.sort(key=lambda clauses: (len(clauses), [labels.index(label) for label in clauses]))
-        return [self._explain(clauses, self.refuted[frozenset(clauses)]) for clauses in ordered]
-
-    def _ended(self) -> bool:
+    def ended(self) -> bool:
         return spent() > self.deadline
 
-    def _core(self, chosen: frozenset[str]) -> frozenset[str] | None:
+    def core(self, chosen: frozenset[str]) -> frozenset[str] | None:
         """Of these guarantees some that no output meets at some allowed input; None if all can always be met."""
         for at in self.shown:
             if (core := self._core_at(at, chosen)) is not None:
@@ -144,29 +125,8 @@ class _Search:
         mentioned = frozenset[Variable]().union(*map(free_variables, formulas.values()))
         return formulas, tuple(v for v in self.group.outputs if v in mentioned)
 
-    def _beside(self, pair: frozenset[str]) -> None:
-        """Look for an input at which each of the two can be met, and not both."""
-        formulas, outputs = self._part(pair)
-        limit = min(CONFLICT_SEARCH_EFFORT, effort_left(self.deadline))
-        search = Search(self.inputs, Group(formulas, outputs), self.assumptions, {}, limit, self.seed)
-        try:
-            answer = search.refute([{label: formula} for label, formula in formulas.items()], limit)
-        except (Unsupported, z3.Z3Exception):  # what is not found is only not shown
-            return
-        if answer is not None and answer.verdict is Verdict.REFUTED:
-            self.shown.append(answer.inputs)
-
-    def _learn(self, at: Given) -> None:
-        """The sets that are minimal at this input, but for those that hold others of several guarantees."""
-        sets = minimal_sets(
-            tuple(self.group.guarantees), lambda c: self._core_at(at, c), most=CONFLICTS, ended=self._ended
-        )
-        for chosen in sets.sets:
-            if chosen not in self.found and not any(len(other) > 1 and other < chosen for other in self.found):
-                self.refuted[chosen] = at
-                self.found.append(chosen)
-
-    def _explain(self, clauses: tuple[str, ...], at: Given) -> Conflict:
+    def explained(self, clauses: tuple[str, ...]) -> Conflict:
+        at = self.refuted[frozenset(clauses)]
         demands = tuple(
             f"guarantee {label} {_demand(self.group.guarantees[label], self.group.outputs, at, self.seed)}"
             for label in clauses
@@ -348,7 +308,7 @@ class _Known:
     """The sets about which something is known, as clauses over a Boolean for each label."""
 
     def __init__(self, labels: Sequence[str]) -> None:
-        context = z3.Context()
+        context = Translator().context
         self._solver = z3.Solver(ctx=context)
         self._chosen = {label: z3.Bool(f"{k}", context) for k, label in enumerate(labels)}
 

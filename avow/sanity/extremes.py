@@ -11,49 +11,38 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
 from avow.formulas.formula import free_variables, substitute
+from avow.language import terms as t
 from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, RealSort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Implies,
-    In,
-    Negative,
-    Not,
-    Quantified,
-    Quantifier,
-    SequenceRange,
-    SequenceTerm,
-    Term,
-    Variable,
-)
 
 
 @dataclass(frozen=True, slots=True)
 class Extreme:
     """`constant` is the first (last) of the positions that meet the guard at which `measure` is least (greatest)."""
 
-    constant: Variable
-    position: Variable
-    guard: Term
-    measure: Term
+    constant: t.Variable
+    position: t.Variable
+    guard: t.Term
+    measure: t.Term
     greatest: bool
     last: bool
 
-    def axiom(self) -> Term:
+    def axiom(self) -> t.Term:
         """That it is, if some position meets the guard."""
         at = {self.position: self.constant}
         here = substitute(self.measure, at)
         low, high = (self.measure, here) if self.greatest else (here, self.measure)
         one, two = (self.constant, self.position) if self.last else (self.position, self.constant)
-        best = Implies(
-            self.guard, And((Compare("<=", low, high), Implies(Compare("<", one, two), Compare("<", low, high))))
+        best = t.Implies(
+            self.guard,
+            t.And((t.Compare("<=", low, high), t.Implies(t.Compare("<", one, two), t.Compare("<", low, high)))),
         )
-        some = Quantified(Quantifier.EXISTS, (self.position,), self.guard)
-        return Implies(some, And((substitute(self.guard, at), Quantified(Quantifier.FORALL, (self.position,), best))))
+        some = t.Quantified(t.Quantifier.EXISTS, (self.position,), self.guard)
+        return t.Implies(
+            some, t.And((substitute(self.guard, at), t.Quantified(t.Quantifier.FORALL, (self.position,), best)))
+        )
 
-    def exists(self, taken: Set[Variable]) -> bool:
+    def exists(self, taken: Set[t.Variable]) -> bool:
         """Whether there is such a position, whatever the inputs: it is chosen after what is `taken`, and finitely many
         positions are to be chosen from."""
         known = taken | free_variables(self.guard) | free_variables(self.measure)
@@ -66,37 +55,38 @@ class Extreme:
         )
 
 
-def bounded(position: Variable, guard: Term) -> bool:
+def bounded(position: t.Variable, guard: t.Term) -> bool:
     """Whether finitely many natural numbers at most meet a guard, by one of its parts."""
     if position.sort != NATURAL:
         return False
     match guard:
-        case And(items=items):
+        case t.And(items=items):
             return any(bounded(position, item) for item in items)
         case (
-            Compare(operator="<" | "<=", left=left, right=bound) | Compare(operator=">" | ">=", left=bound, right=left)
+            t.Compare(operator="<" | "<=", left=left, right=bound)
+            | t.Compare(operator=">" | ">=", left=bound, right=left)
         ):
             return left == position and position not in free_variables(bound)
         case (
-            Not(body=Compare(operator=">" | ">=", left=left, right=bound))
-            | Not(body=Compare(operator="<" | "<=", left=bound, right=left))
+            t.Not(body=t.Compare(operator=">" | ">=", left=left, right=bound))
+            | t.Not(body=t.Compare(operator="<" | "<=", left=bound, right=left))
         ):
             return left == position and position not in free_variables(bound)
-        case In(item=item, collection=SequenceRange() | SequenceTerm() as collection):
+        case t.In(item=item, collection=t.SequenceRange() | t.SequenceTerm() as collection):
             return item == position and position not in free_variables(collection)
         case _:  # it may be so all the same
             return False
 
 
-def measures(position: Variable, demand: Term, outputs: Set[Variable]) -> Iterator[tuple[Term, bool, bool]]:
+def measures(position: t.Variable, demand: t.Term, outputs: Set[t.Variable]) -> Iterator[tuple[t.Term, bool, bool]]:
     """The numbers at a position with which a demand, whose negations are pushed in, compares an output, whether the
     greatest one is decisive, and whether the last one is: a guess, which only suggests."""
     parts = list(subterms(demand))
-    denied = {part.body for part in parts if isinstance(part, Not)}
-    found: list[tuple[Term, bool]] = []
+    denied = {part.body for part in parts if isinstance(part, t.Not)}
+    found: list[tuple[t.Term, bool]] = []
     for atom in parts:
         match atom:
-            case Compare(operator="<" | "<=" | ">" | ">=" as operator, left=left, right=right):
+            case t.Compare(operator="<" | "<=" | ">" | ">=" as operator, left=left, right=right):
                 if free_variables(atom) & outputs:
                     less = (operator[0] == "<") != (atom in denied)
                     found += [*_numbers(position, left, outputs, less), *_numbers(position, right, outputs, not less)]
@@ -106,7 +96,9 @@ def measures(position: Variable, demand: Term, outputs: Set[Variable]) -> Iterat
     yield from ((measure, greatest, last) for measure, greatest in dict.fromkeys(found))
 
 
-def _numbers(position: Variable, side: Term, outputs: Set[Variable], greatest: bool) -> Iterator[tuple[Term, bool]]:
+def _numbers(
+    position: t.Variable, side: t.Term, outputs: Set[t.Variable], greatest: bool
+) -> Iterator[tuple[t.Term, bool]]:
     """The largest terms in one that are numbers, know the position and no output."""
     known = free_variables(side)
     if position not in known:
@@ -114,6 +106,6 @@ def _numbers(position: Variable, side: Term, outputs: Set[Variable], greatest: b
     if not known & outputs and isinstance(side.sort, RealSort | IntegerSort | NaturalSort):
         yield side, greatest
         return
-    flips = isinstance(side, Negative) or (isinstance(side, Arithmetic) and side.operator == "-")
+    flips = isinstance(side, t.Negative) or (isinstance(side, t.Arithmetic) and side.operator == "-")
     for child in side.children:
         yield from _numbers(position, child, outputs, greatest != (flips and child == side.children[-1]))

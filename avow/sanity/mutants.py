@@ -21,29 +21,16 @@ from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, normalise
 from avow.formulas.values import Value
 from avow.formulas.written import show_values
+from avow.language import terms as t
 from avow.language.contract import Node
 from avow.language.definedness import with_value
 from avow.language.printer import show_term
 from avow.language.sorts import REAL, EnumSort, RealSort
-from avow.language.terms import (
-    And,
-    Builtin,
-    Compare,
-    Conditional,
-    EnumValue,
-    Iff,
-    Implies,
-    Literal,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Role,
-    Term,
-    Variable,
-)
+from avow.sanity.realizability import realizable
+from avow.solving.questions import entails, solve
+from avow.solving.translation import new_session
 
-_TAKEN_FOR = {Builtin.MIN: Builtin.MAX, Builtin.MAX: Builtin.MIN}
+_TAKEN_FOR = {t.Builtin.MIN: t.Builtin.MAX, t.Builtin.MAX: t.Builtin.MIN}
 _FLIPPED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 
 
@@ -52,10 +39,10 @@ class Mutant:
     """`change` says in words what was done; `formula` is the whole formula, changed in one place."""
 
     change: str
-    formula: Term
+    formula: t.Term
 
 
-def mutants(formula: Term) -> tuple[Mutant, ...]:
+def mutants(formula: t.Term) -> tuple[Mutant, ...]:
     """Every mutant of a formula, in reading order, each meaning once, the original's meaning not at all."""
     seen = {normalise(formula)}
     found = []
@@ -68,13 +55,12 @@ def mutants(formula: Term) -> tuple[Mutant, ...]:
     return tuple(found)
 
 
+@new_session()
 def telling(
-    formula: Term, assumptions: tuple[Term, ...], limit: int, effort: int = 2_000, others: tuple[Term, ...] = ()
+    formula: t.Term, assumptions: tuple[t.Term, ...], limit: int, effort: int = 2_000, others: tuple[t.Term, ...] = ()
 ) -> tuple[Mutant, ...]:
     """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula; nor
     from it and the `others`, the node's further guarantees: what keeps the contract keeps such a mutant."""
-    from avow.solving.questions import entails
-
     kept = [
         m
         for m in mutants(formula)
@@ -88,79 +74,84 @@ def telling(
     return tuple(kept[k * len(kept) // limit] for k in range(limit))
 
 
-def _negated(formula: Term) -> Term:
+def _negated(formula: t.Term) -> t.Term:
     """The negation under the universal quantifiers: ``forall x | not F`` denies the claim everywhere, not somewhere."""
-    if isinstance(formula, Quantified) and formula.quantifier.value == "forall":
-        return Quantified(formula.quantifier, formula.variables, _negated(formula.body), formula.span)
-    if isinstance(formula, Implies):
-        return Implies(formula.left, Not(formula.right), formula.span)
-    return Not(formula)
+    if isinstance(formula, t.Quantified) and formula.quantifier.value == "forall":
+        return t.Quantified(formula.quantifier, formula.variables, _negated(formula.body), formula.span)
+    if isinstance(formula, t.Implies):
+        return t.Implies(formula.left, t.Not(formula.right), formula.span)
+    return t.Not(formula)
 
 
-def _everywhere(formula: Term) -> Iterator[Mutant]:
+def _everywhere(formula: t.Term) -> Iterator[Mutant]:
     """Mutants made at each place, by an explicit stack: formulas may be deep."""
-    stack: list[tuple[Term, Callable[[Term], Term]]] = [(formula, lambda t: t)]
+    stack: list[tuple[t.Term, Callable[[t.Term], t.Term]]] = [(formula, lambda item: item)]
     while stack:
         term, put = stack.pop()
         for change, new in _here(term):
             yield Mutant(change, put(new))
         parts = term.children
-        if isinstance(term, Operation) and term.operator in (Builtin.MOD, Builtin.DIV):
+        if isinstance(term, t.Operation) and term.operator in (t.Builtin.MOD, t.Builtin.DIV):
             stack.append((parts[0], _at(term, parts, 0, put)))  # its divisor stays positive
             continue
         for place in reversed(range(len(parts))):
             stack.append((parts[place], _at(term, parts, place, put)))
 
 
-def _at(term: Term, parts: tuple[Term, ...], place: int, put: Callable[[Term], Term]) -> Callable[[Term], Term]:
+def _at(
+    term: t.Term, parts: tuple[t.Term, ...], place: int, put: Callable[[t.Term], t.Term]
+) -> Callable[[t.Term], t.Term]:
     return lambda new: put(term.rebuild((*parts[:place], new, *parts[place + 1 :])))
 
 
-def _here(term: Term) -> Iterator[tuple[str, Term]]:
+def _here(term: t.Term) -> Iterator[tuple[str, t.Term]]:
     match term:
-        case Literal(value=bool()) | Literal(value=str()):
+        case t.Literal(value=bool()) | t.Literal(value=str()):
             return
-        case Literal(value=value, sort=sort) if isinstance(value, int | Fraction):
+        case t.Literal(value=value, sort=sort) if isinstance(value, int | Fraction):
             step: int | Fraction = max(1, abs(int(value)) // 10)
             for new in (value + step, value - step):
                 if isinstance(sort, RealSort) or new >= 0 or value < 0:
                     yield f"{value} becomes {new}", _literal(new, term)
-        case EnumValue(name=name, sort=EnumSort(members=members) as sort) if len(members) > 1:
+        case t.EnumValue(name=name, sort=EnumSort(members=members) as sort) if len(members) > 1:
             other = members[(members.index(name) + 1) % len(members)]
-            yield f"{name} becomes {other}", EnumValue(other, sort, term.span)
-        case Compare(operator=operator, left=left, right=right):
+            yield f"{name} becomes {other}", t.EnumValue(other, sort, term.span)
+        case t.Compare(operator=operator, left=left, right=right):
             flipped = _FLIPPED[operator]
-            yield f"{operator} becomes {flipped}", Compare(flipped, left, right, term.span)
-        case And(items=items) if len(items) > 1:
+            yield f"{operator} becomes {flipped}", t.Compare(flipped, left, right, term.span)
+        case t.And(items=items) if len(items) > 1:
             for place in range(len(items)):
                 rest = (*items[:place], *items[place + 1 :])
                 yield f"part {place + 1} of a conjunction is dropped", conjunction(rest)
-        case Or(items=items) if len(items) > 1:
+        case t.Or(items=items) if len(items) > 1:
             for place in range(len(items)):
                 rest = (*items[:place], *items[place + 1 :])
                 yield (
                     f"part {place + 1} of a disjunction is dropped",
-                    rest[0] if len(rest) == 1 else Or(rest, term.span),
+                    rest[0] if len(rest) == 1 else t.Or(rest, term.span),
                 )
-        case Not(body=body):
+        case t.Not(body=body):
             yield "a negation is dropped", body
-        case Operation(operator=operator, arguments=arguments) if operator in _TAKEN_FOR:
+        case t.Operation(operator=operator, arguments=arguments) if operator in _TAKEN_FOR:
             other_operator = _TAKEN_FOR[operator]
-            yield f"{operator} becomes {other_operator}", Operation(other_operator, arguments, term.sort, term.span)
-        case Operation(operator=Builtin.XOR, arguments=(left, right)):
-            yield "xor becomes <=>", Iff(left, right, term.span)
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            yield "the branches of an `if` change places", Conditional(condition, otherwise, then, term.sort, term.span)
-        case Implies(right=right):  # notices a conclusion that a table maps to what always holds
+            yield f"{operator} becomes {other_operator}", t.Operation(other_operator, arguments, term.sort, term.span)
+        case t.Operation(operator=t.Builtin.XOR, arguments=(left, right)):
+            yield "xor becomes <=>", t.Iff(left, right, term.span)
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise):
+            yield (
+                "the branches of an `if` change places",
+                t.Conditional(condition, otherwise, then, term.sort, term.span),
+            )
+        case t.Implies(right=right):  # notices a conclusion that a table maps to what always holds
             yield "a condition is dropped", right
         case _:  # no near miss of its own: its parts have some
             return
 
 
-def _literal(value: int | Fraction, old: Literal) -> Term:
+def _literal(value: int | Fraction, old: t.Literal) -> t.Term:
     if isinstance(old.sort, RealSort):
-        return Literal(Fraction(value), REAL, old.span)
-    return Literal(int(value), old.sort, old.span)
+        return t.Literal(Fraction(value), REAL, old.span)
+    return t.Literal(int(value), old.sort, old.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,12 +178,10 @@ class Difference:
         return f"the contract also allows {_listed(self.answer)}{place}, which breaks it, and others, which do not"
 
 
+@new_session()
 def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
     """What distinguishes the mutant of one of the node's guarantees from the node's contract; at most so much
     effort for each of two questions."""
-    from avow.sanity.realizability import realizable
-    from avow.solving.questions import entails, solve
-
     told = Difference(mutant.change, show_term(mutant.formula))
     assumptions = {f"assumed {c.name}": c.formula for c in node.assumptions}
     guarantees = {c.name: c.formula for c in node.guarantees}
@@ -210,17 +199,17 @@ def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
 
 
 def _shown(
-    told: Difference, values: Mapping[Variable, Value], formulas: list[Term], forced: bool = False
+    told: Difference, values: Mapping[t.Variable, Value], formulas: list[t.Term], forced: bool = False
 ) -> Difference:
     """With the inputs of which the formulas speak, and the outputs of which the mutant (the first of them) does."""
-    inputs = frozenset[Variable]().union(*map(free_variables, formulas))
+    inputs = frozenset[t.Variable]().union(*map(free_variables, formulas))
     outputs = free_variables(formulas[0])
 
-    def of(role: Role, spoken: frozenset[Variable]) -> tuple[tuple[str, str], ...]:
+    def of(role: t.Role, spoken: frozenset[t.Variable]) -> tuple[tuple[str, str], ...]:
         names = {v.qualified for v in spoken if v.role is role}
         return show_values({v: value for v, value in values.items() if v.qualified in names})
 
-    return replace(told, at=of(Role.INPUT, inputs), answer=of(Role.OUTPUT, outputs), forced=forced)
+    return replace(told, at=of(t.Role.INPUT, inputs), answer=of(t.Role.OUTPUT, outputs), forced=forced)
 
 
 def _listed(values: tuple[tuple[str, str], ...]) -> str:

@@ -16,14 +16,19 @@ from avow.formulas.formula import conjunction, disjunction, free_variables, nega
 from avow.formulas.temporal.cells import Remembering
 from avow.formulas.temporal.clock import one_step
 from avow.language.contract import ClauseKind, Node
+from avow.language.subterms import histories
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
-from avow.sanity.results import Bounds, Finding, listing
-from avow.sanity.viability import Viability, steps_of, told_apart, viable
+from avow.sanity.results import Bounds, Finding, listing, never_demanded
+from avow.sanity.viability import Viability, lasting, steps_of, told_apart, viable
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted, doubted
 
 _TRIGGER = "trigger"
+
+
+STEPS_OF_INDUCTION = 2
+"""A condition that is false at so many steps, one after another, is asked to be false at the next."""
 
 
 @dataclass(slots=True)
@@ -81,7 +86,7 @@ class OverRuns:
             case Property.REALIZABLE:
                 return self._realizable()
             case Property.ASSUMPTIONS_SATISFIABLE:
-                return self._possible(self.assumptions, "no input meets {} at any step of a run")
+                return self._satisfiable()
             case Property.CONSISTENT:
                 together = {**self.assumptions, **self.guarantees}
                 return self._possible(together, "no inputs and outputs meet {} at any step of a run")
@@ -105,6 +110,19 @@ class OverRuns:
         if self._viable is None:
             self._viable = viable(one_step(self.node), effort=2 * self.bounds.effort, seed=self.bounds.seed)
         return self._viable
+
+    def _satisfiable(self) -> Finding:
+        found = self._possible(self.assumptions, "no input meets {} at any step of a run")
+        if found.verdict is not Verdict.PROVED or not any(histories(c.formula) for c in self.node.assumptions):
+            return found
+        for_ever = lasting(self.node, effort=2 * self.bounds.effort, seed=self.bounds.seed)
+        match for_ever.verdict:
+            case Verdict.PROVED:
+                return found
+            case Verdict.REFUTED:
+                text = "every run of inputs comes to a step at which no input meets {}"
+                return Finding(Verdict.REFUTED, text.format(listing(tuple(self.assumptions))), tuple(self.assumptions))
+        return Finding(for_ever.verdict, f"whether inputs can meet them for ever is open: {for_ever.reason}")
 
     def _realizable(self) -> Finding:
         found = self.viability
@@ -150,8 +168,15 @@ class OverRuns:
 
     def _not_vacuous(self, name: str) -> Finding:
         asked = [negation(c.formula) for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
-        for trigger in asked:
-            found = self._possible({**self.assumptions, "its trigger": trigger}, "{} cannot hold together in any run")
+        written = triggers(self.node.clause(name).formula)
+        for trigger, shown in zip(asked, written, strict=True):
+            found = self._possible({**self.assumptions, "its trigger": trigger}, "")
+            if found.verdict is Verdict.REFUTED:
+                clauses = tuple(c for c in found.clauses if c in self.assumptions)
+                given = f" (given {listing(clauses)})" if clauses else ""
+                return replace(
+                    found, explanation=f"{never_demanded(shown, among=len(written))}{given}", clauses=clauses
+                )
             if found.verdict is not Verdict.PROVED:
                 return found
         return Finding(Verdict.PROVED)
@@ -195,6 +220,16 @@ class OverRuns:
         if found.verdict is not Verdict.PROVED:
             return found
         if any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now)):
+            lasting = self.viability.lasting
+            if lasting is not None:  # of both values it is known whether the node can go on after them
+                after = substitute(lasting, {cell.before: cell.now for cell in self.remembering.cells})
+                stays = {"memory": lasting, "goes on": after, "goes on again": substitute(after, again)}
+                both = together | stays
+                answer = solve(both, effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
+                if answer.status == "unsat":
+                    return Finding(*((Verdict.ERROR, CONTRADICTED) if doubted(answer, both) else (Verdict.PROVED,)))
+                if answer.status == "sat":
+                    return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name} for ever")
             return Finding(
                 Verdict.UNKNOWN, f"two values of out.{name} are possible at a step, and one may matter later"
             )
@@ -250,6 +285,27 @@ class OverRuns:
             named = tuple(label for label in ever.core if label != "memory")
             return Finding(Verdict.REFUTED, excluded.format(listing(named)), named)
         return Finding(Verdict.UNKNOWN, open_still)
+
+    def never_met(self, name: str) -> bool:
+        """Whether it is shown that some condition of a guarantee comes about at no step of any run: it is false at the
+        first steps, and by induction at every later one."""
+        asked = [negation(c.formula) for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
+        return any(self._never({**self.assumptions, "its trigger": trigger}) for trigger in asked)
+
+    def _never(self, formulas: Mapping[str, Term]) -> bool:
+        whole = conjunction(formulas.values())
+        for length in range(STEPS_OF_INDUCTION):
+            if not self._excluded({**self._run(length), "here": self._at(whole, length)}):
+                return False
+        first = {f"first {cell.name}" for cell in self.remembering.cells}
+        length = STEPS_OF_INDUCTION
+        going = {label: fact for label, fact in self._run(length).items() if label not in first}
+        going |= {f"not yet {step}": negation(self._at(whole, step)) for step in range(length)}
+        return self._excluded({**going, "here": self._at(whole, length)})
+
+    def _excluded(self, facts: Mapping[str, Term]) -> bool:
+        answer = solve(facts, effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
+        return answer.status == "unsat" and not doubted(answer, facts)
 
     def _run(self, length: int) -> Mapping[str, Term]:
         """That a run of so many steps keeps the contract, and what it leaves."""

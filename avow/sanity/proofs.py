@@ -29,21 +29,8 @@ from avow.formulas.formula import conjunction, free_variables, negation, substit
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.traversal import depth
 from avow.formulas.values import Value
+from avow.language import terms as t
 from avow.language.sorts import INTEGER, NATURAL, REAL
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Implies,
-    Literal,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-    Widen,
-)
 from avow.sanity.witness_candidates import Candidates, Definition
 from avow.sanity.witnesses import Fixed, Witness, applied, meanings_of
 from avow.solving.checking import check
@@ -52,7 +39,7 @@ from avow.solving.replay import replay
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
 
-Formulas = Mapping[str, Term]
+Formulas = Mapping[str, t.Term]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +47,11 @@ class Proof:
     """For all `inputs`, one of the `alternatives` (over inputs and constants) meets the guarantees as `shown`; without
     alternatives, some values of the `outputs` do. `axioms` are those of `constants` that it needs."""
 
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
+    inputs: tuple[t.Variable, ...]
+    outputs: tuple[t.Variable, ...]
     shown: Formulas
     alternatives: tuple[Witness, ...]
-    axioms: tuple[Term, ...]
+    axioms: tuple[t.Term, ...]
     constants: Candidates
 
 
@@ -72,7 +59,7 @@ def confirmed(
     proofs: Sequence[Proof],
     assumptions: Formulas,
     guarantees: Formulas,
-    given: Mapping[Variable, Value],
+    given: Mapping[t.Variable, Value],
     *,
     effort: int,
     seed: int = 0,
@@ -94,10 +81,10 @@ def confirmed(
 
 
 def refutes(
-    inputs: Mapping[Variable, Value],
+    inputs: Mapping[t.Variable, Value],
     assumptions: Formulas,
     guarantees: Formulas,
-    outputs: Iterable[Variable],
+    outputs: Iterable[t.Variable],
     *,
     effort: int,
     seed: int = 0,
@@ -118,62 +105,64 @@ def implied(stronger: Formulas, weaker: Formulas, *, effort: int, seed: int = 0)
     return all(one == other or _implies(one, other, effort, seed) for one, other in pairs)
 
 
-def _implies(one: Term, other: Term, effort: int, seed: int) -> bool:
-    def proved(left: Term, right: Term) -> bool:
+def _implies(one: t.Term, other: t.Term, effort: int, seed: int) -> bool:
+    def proved(left: t.Term, right: t.Term) -> bool:
         return entails([left], right, effort=effort, seed=seed).verdict is Verdict.PROVED
 
     pushed = push_negations(other) if depth(other) <= REWRITTEN_DEPTH else other
     return proved(pushed, other) if _is_instance(one, pushed) else proved(one, other)
 
 
-def _is_instance(one: Term, other: Term) -> bool:
+def _is_instance(one: t.Term, other: t.Term) -> bool:
     """Whether a formula is another with some values in the place of what there `exists`: then it implies it."""
     match one, other:
-        case (And(items=ones), And(items=others)) | (Or(items=ones), Or(items=others)) if len(ones) == len(others):
+        case (t.And(items=ones), t.And(items=others)) | (t.Or(items=ones), t.Or(items=others)) if len(ones) == len(
+            others
+        ):
             return all(map(_is_instance, ones, others))
         case (
-            Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body),
-            Quantified(quantifier=Quantifier.FORALL, variables=same, body=weaker),
+            t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body),
+            t.Quantified(quantifier=t.Quantifier.FORALL, variables=same, body=weaker),
         ) if variables == same:
             return _is_instance(body, weaker)
-        case _, Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if one != other:
+        case _, t.Quantified(quantifier=t.Quantifier.EXISTS, variables=variables, body=body) if one != other:
             return any(
                 all(_is_one_of(part, variables, body) for part in parts)
-                for parts in ((one,), one.items if isinstance(one, Or) else ())
+                for parts in ((one,), one.items if isinstance(one, t.Or) else ())
                 if parts
             )
         case _:  # nothing is put in any place
             return one == other
 
 
-def _is_one_of(one: Term, variables: tuple[Variable, ...], body: Term) -> bool:
-    values: dict[Variable, Term] = {}
+def _is_one_of(one: t.Term, variables: tuple[t.Variable, ...], body: t.Term) -> bool:
+    values: dict[t.Variable, t.Term] = {}
     _align(one, body, set(variables), values)
     sorted_right = all(v.sort == value.sort for v, value in values.items())
     return sorted_right and len(values) == len(variables) and _is_instance(one, substitute(body, values))
 
 
-def _align(one: Term, body: Term, variables: set[Variable], values: dict[Variable, Term]) -> None:
+def _align(one: t.Term, body: t.Term, variables: set[t.Variable], values: dict[t.Variable, t.Term]) -> None:
     """What stands in a term where another has these variables; a guess, to be tried."""
-    if isinstance(body, Variable) and body in variables:
+    if isinstance(body, t.Variable) and body in variables:
         values.setdefault(body, one)
     elif type(one) is type(body) and len(one.children) == len(body.children):
         for part, other in zip(one.children, body.children, strict=True):
             _align(part, other, variables, values)
 
 
-def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], effort: int, seed: int) -> bool:
+def _met(proof: Proof, assumptions: Formulas, given: Mapping[t.Variable, Value], effort: int, seed: int) -> bool:
     """No allowed input, and constants as the axioms have them, at which every alternative fails."""
     shown = tuple(proof.shown.values())
     if not proof.alternatives:
-        bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in proof.outputs}
+        bound = {v: t.Variable(t.Role.BOUND, f"some {v.name}", v.sort) for v in proof.outputs}
         never = negation(substitute(conjunction(shown), bound))
         if bound:
-            never = Quantified(Quantifier.FORALL, tuple(bound.values()), never)
+            never = t.Quantified(t.Quantifier.FORALL, tuple(bound.values()), never)
         formulas = (*assumptions.values(), never)
         return solve(formulas, effort=effort, seed=seed, given=given, variables=proof.inputs).status == "unsat"
     translator = Translator()
-    fixed: dict[Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
+    fixed: dict[t.Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
     # what is given says which elements an unspecified sort has; a value that the search has met does not
     facts = [*translator.opaque_facts(), *(translator.term(formula, fixed) for formula in proof.axioms)]
     facts += [z3.Not(_meets(translator, shown, alternative, fixed)) for alternative in proof.alternatives]
@@ -188,7 +177,7 @@ def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], e
 
 
 def _meets(
-    translator: Translator, shown: Iterable[Term], alternative: Witness, fixed: Mapping[Variable, Meaning]
+    translator: Translator, shown: Iterable[t.Term], alternative: Witness, fixed: Mapping[t.Variable, Meaning]
 ) -> Expr:
     terms = {
         output: _widened(value, output)
@@ -204,29 +193,31 @@ def _meets(
     )
 
 
-def _widened(value: object, output: Variable) -> Term:
-    assert isinstance(value, Term)
-    return Widen(value, REAL) if output.sort == REAL and value.sort in (INTEGER, NATURAL) else value
+def _widened(value: object, output: t.Variable) -> t.Term:
+    assert isinstance(value, t.Term)
+    return t.Widen(value, REAL) if output.sort == REAL and value.sort in (INTEGER, NATURAL) else value
 
 
-def _conservative(proof: Proof, given: Mapping[Variable, Value]) -> bool:
+def _conservative(proof: Proof, given: Mapping[t.Variable, Value]) -> bool:
     """Whether suitable constants exist, whatever the inputs: each axiom speaks of constants that are new with it."""
     found = proof.constants
     taken = {*proof.inputs, *proof.outputs, *given}
-    if any(constant.role is not Role.BOUND or constant in taken for constant in found.constants):
+    if any(constant.role is not t.Role.BOUND or constant in taken for constant in found.constants):
         return False
     blocks = iter(found.blocks)
-    seen = set[Variable]()
-    least = list[Term]()
+    seen = set[t.Variable]()
+    least = list[t.Term]()
     for axiom in found.axioms:
         extreme = found.extremes.get(axiom)
         match axiom:
-            case Implies() if extreme is not None:
+            case t.Implies() if extreme is not None:
                 if axiom != extreme.axiom() or not extreme.exists(seen):
                     return False
                 new = {extreme.constant}
-            case Implies(left=Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=guard), right=chosen):
-                block = tuple(v for v in next(blocks, ()) if isinstance(v, Variable))
+            case t.Implies(
+                left=t.Quantified(quantifier=t.Quantifier.EXISTS, variables=variables, body=guard), right=chosen
+            ):
+                block = tuple(v for v in next(blocks, ()) if isinstance(v, t.Variable))
                 sorts = [v.sort for v in block]
                 new = {*block}
                 if (
@@ -238,13 +229,13 @@ def _conservative(proof: Proof, given: Mapping[Variable, Value]) -> bool:
                 if chosen != substitute(guard, dict(zip(variables, block, strict=True))):
                     return False
                 if sorts == [NATURAL]:
-                    smallest = Implies(guard, Compare("<=", block[0], variables[0]))
-                    least.append(Quantified(Quantifier.FORALL, variables, smallest))
-            case And(
-                items=(Compare(operator="<=", left=Widen(term=Variable() as whole) as least_one, right=ground), _)
+                    smallest = t.Implies(guard, t.Compare("<=", block[0], variables[0]))
+                    least.append(t.Quantified(t.Quantifier.FORALL, variables, smallest))
+            case t.And(
+                items=(t.Compare(operator="<=", left=t.Widen(term=t.Variable() as whole) as least_one, right=ground), _)
             ):
-                above = Arithmetic("+", least_one, Literal(Fraction(1), REAL), REAL)
-                between = And((Compare("<=", least_one, ground), Compare("<", ground, above)))
+                above = t.Arithmetic("+", least_one, t.Literal(Fraction(1), REAL), REAL)
+                between = t.And((t.Compare("<=", least_one, ground), t.Compare("<", ground, above)))
                 if axiom != between or whole.sort != INTEGER or whole in seen | free_variables(ground):
                     return False
                 new = {whole}

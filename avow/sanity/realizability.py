@@ -27,6 +27,7 @@ from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Varia
 from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import budget, effort_left, spent
+from avow.solving.translation import same_session
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,7 @@ class Question:
         return Search(self.inputs, group, self.assumptions, self.given, effort, self.seed)
 
 
+@same_session()
 def realizable(
     inputs: Sequence[Variable],
     outputs: Sequence[Variable],

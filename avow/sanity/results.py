@@ -9,7 +9,8 @@ from avow.base.diagnostics import Severity
 from avow.base.records import dataclass
 from avow.base.verdict import Counterexample, Outcome, Verdict, bound
 from avow.formulas.values import Value
-from avow.language.terms import Variable
+from avow.language.printer import show_term
+from avow.language.terms import Term, Variable
 from avow.sanity.claims import Claim
 
 
@@ -115,11 +116,18 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
 
 
 _SUMMARY = {
-    Verdict.PROVED: "proved for all inputs",
+    Verdict.PROVED: "proved",
     Verdict.CHECKED: "holds within the scenario",
     Verdict.REFUTED: "does not hold",
     Verdict.UNKNOWN: "the solver could not decide it",
 }
+
+
+def never_demanded(condition: Term, *, among: int) -> str:
+    """That a guarantee's condition cannot come about; which one, where it has several."""
+    if among == 1:
+        return "what it demands is never demanded: its condition cannot come about"
+    return f"one of its {among} conditions cannot come about: {show_term(condition)}"
 
 
 def listing(labels: Sequence[str]) -> str:

@@ -14,7 +14,13 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from avow.base.optional import complete
-from avow.base.tuning.bounds import AHEAD_SIZE, GAME_ANSWERS, GAME_MEMORIES, INPUTS_AHEAD, VIABILITY_ROUNDS
+from avow.base.tuning.bounds import (
+    AHEAD_SIZE,
+    GAME_ANSWERS,
+    GAME_MEMORIES,
+    INPUTS_AHEAD,
+    VIABILITY_ROUNDS,
+)
 from avow.base.tuning.effort import DEFEAT_EFFORT
 from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.compiler import combinations
@@ -23,9 +29,11 @@ from avow.evaluation.running import Keeper
 from avow.formulas.formula import conjunction, disjunction, equation, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Remembering
+from avow.formulas.temporal.clock import one_step
 from avow.formulas.traversal import transform
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
+from avow.language.contract import ClauseKind, Node, Port
 from avow.language.sorts import Sort, TupleSort
 from avow.language.subterms import subterms
 from avow.language.terms import FALSE, TRUE, Apply, Conditional, Implies, Quantified, Quantifier, Role, Term, Variable
@@ -33,6 +41,7 @@ from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
 from avow.solving.questions import entails, solve
 from avow.solving.second import CONTRADICTED, contradicted
+from avow.solving.translation import same_session
 
 _Memory = tuple[Value, ...]
 _Move = tuple[Mapping[str, Value], tuple[tuple[Mapping[str, Value], _Memory], ...]]
@@ -50,6 +59,8 @@ class Viability:
     """The guarantees that conflict, where they are known."""
     reachable: Term | None = None
     """The memories that runs which keep the contract can reach; None where they are not known."""
+    lasting: Term | None = None
+    """Those that runs reach which can go on for ever; None where they are not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +188,7 @@ class Contradicted(Exception):  # noqa: N818 - it says what happened
     """cvc5 says the opposite of what Z3 does."""
 
 
+@same_session()
 def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> Viability:
     """Decide it, as far as it can be decided."""
     remembering = told_apart(remembering)
@@ -205,14 +217,29 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
         return Viability(Verdict.ERROR, CONTRADICTED)
 
 
+def lasting(node: Node, *, effort: int = 10_000, seed: int = 0) -> Viability:
+    """Whether there are inputs, step by step for ever, that meet a node's assumptions: as if they were the outputs of a
+    node that promises what is assumed."""
+    made = one_step(replace(node, guarantees=()))
+    ports = (*made.node.inputs, *made.node.outputs)
+    given = {p.variable: Variable(Role.OUTPUT, p.variable.qualified, p.sort) for p in ports}
+    promised = tuple(
+        replace(c, kind=ClauseKind.GUARANTEE, formula=substitute(c.formula, given)) for c in made.node.assumptions
+    )
+    outputs = tuple(Port(Role.OUTPUT, v.name, v.sort, str(v.sort)) for v in given.values())
+    world = replace(made.node, inputs=(), outputs=outputs, assumptions=(), guarantees=promised)
+    cells = tuple(replace(cell, now=substitute(cell.now, given)) for cell in made.cells)
+    return viable(replace(made, node=world, cells=cells), effort=effort, seed=seed)
+
+
 def _decided(contract: Contract) -> Viability:
     if any(cell.parameters for cell in contract.remembering.cells):  # no term writes such a memory down
         if contract.closed(TRUE):
             return Viability(Verdict.PROVED, "whatever was before")
         return Viability(Verdict.UNKNOWN, "something is remembered for each value of a quantified variable")
     game = _Game(contract)
-    if game.explored():
-        return game.answer()
+    if game.explored() and (played := game.answer()).verdict is not Verdict.UNKNOWN:
+        return played
     if contract.closed(TRUE):
         return Viability(Verdict.PROVED, "whatever was before")
     found = _defeated(contract, 1) or _approached(contract)
@@ -281,11 +308,20 @@ class _Game:
         if self.first not in self.lost:
             won = [memory for memory in self.moves if memory not in self.lost]
             if self.contract.closed(self.region(won)):
-                return Viability(Verdict.PROVED, reachable=reachable)
+                return Viability(Verdict.PROVED, reachable=reachable, lasting=self.region(self._lasting()))
             return Viability(Verdict.UNKNOWN, "a strategy was found, but the solver does not confirm it")
         if not self._confirmed():
             return Viability(Verdict.UNKNOWN, "the environment wins, but the solver does not confirm it")
         return Viability(Verdict.REFUTED, run=self._run(), reachable=reachable)
+
+    def _lasting(self) -> list[_Memory]:
+        """What is reached by answers after which the node can go on, whatever comes."""
+        found = {self.first: None}
+        for memory in (waiting := [self.first]):
+            left = {after: None for _, answers in self.moves[memory] for _, after in answers if after not in self.lost}
+            waiting += [after for after in left if after not in found]
+            found |= left
+        return list(found)
 
     def _lose(self) -> None:
         rounds, growing = 0, True

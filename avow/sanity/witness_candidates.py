@@ -16,43 +16,9 @@ from avow.base.tuning.sizes import REWRITTEN_DEPTH
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.traversal import depth
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    REAL,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    SetSort,
-    Sort,
-)
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    TRUE,
-    And,
-    Apply,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Iff,
-    Implies,
-    In,
-    Literal,
-    Negative,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    Variable,
-    Widen,
-)
 from avow.sanity.extremes import Extreme, bounded, measures
 
 
@@ -60,42 +26,44 @@ from avow.sanity.extremes import Extreme, bounded, measures
 class Definition:
     """A function by its defining term over `parameters` (role BOUND)."""
 
-    parameters: tuple[Variable, ...]
-    body: Term
+    parameters: tuple[t.Variable, ...]
+    body: t.Term
 
 
 @dataclass(slots=True)
 class Candidates:
     """What the guarantees suggest. `axioms` are true of suitable `constants`, whatever the inputs."""
 
-    outputs: tuple[Variable, ...]
-    constants: list[Variable] = field(default_factory=list)
-    axioms: list[Term] = field(default_factory=list)
-    least: list[Term] = field(default_factory=list)
+    outputs: tuple[t.Variable, ...]
+    constants: list[t.Variable] = field(default_factory=list)
+    axioms: list[t.Term] = field(default_factory=list)
+    least: list[t.Term] = field(default_factory=list)
     """Axioms too, that not every question needs: a natural number that is chosen is the least one that there is."""
-    extremes: dict[Term, Extreme] = field(default_factory=dict)
+    extremes: dict[t.Term, Extreme] = field(default_factory=dict)
     """What some of the axioms say: the position that is chosen is the first of the best."""
-    values: dict[Variable, list[Term]] = field(default_factory=dict)
-    lower: dict[Variable, list[Definition]] = field(default_factory=dict)
-    upper: dict[Variable, list[Definition]] = field(default_factory=dict)
-    branches: dict[Variable, list[tuple[Definition, Term]]] = field(default_factory=dict)
-    chosen: dict[Sort, list[Term]] = field(default_factory=dict)
+    values: dict[t.Variable, list[t.Term]] = field(default_factory=dict)
+    lower: dict[t.Variable, list[Definition]] = field(default_factory=dict)
+    upper: dict[t.Variable, list[Definition]] = field(default_factory=dict)
+    branches: dict[t.Variable, list[tuple[Definition, t.Term]]] = field(default_factory=dict)
+    chosen: dict[s.Sort, list[t.Term]] = field(default_factory=dict)
     """Constants with an axiom: the likeliest arguments."""
-    blocks: list[tuple[Term, ...]] = field(default_factory=list)
+    blocks: list[tuple[t.Term, ...]] = field(default_factory=list)
     """The same, in the groups in which they were chosen."""
-    pool: dict[Sort, list[Term]] = field(default_factory=dict)
-    floors: dict[Term, Variable] = field(default_factory=dict)
-    bounds: dict[Variable, list[Term]] = field(default_factory=dict)
+    pool: dict[s.Sort, list[t.Term]] = field(default_factory=dict)
+    floors: dict[t.Term, t.Variable] = field(default_factory=dict)
+    bounds: dict[t.Variable, list[t.Term]] = field(default_factory=dict)
     """What an output that is a real number is compared with."""
     effort: int = 200_000
     """What is left of it, in visits times conditions. `<=>` is read four ways, so a chain of them would double the work
     with every link; and what is not read is not suggested, which is sound."""
 
-    def mentions(self, term: Term) -> bool:
-        return any(part in self.outputs for part in subterms(term) if isinstance(part, Variable))
+    def mentions(self, term: t.Term) -> bool:
+        return any(part in self.outputs for part in subterms(term) if isinstance(part, t.Variable))
 
 
-def candidates(outputs: Sequence[Variable], assumptions: Iterable[Term], guarantees: Iterable[Term]) -> Candidates:
+def candidates(
+    outputs: Sequence[t.Variable], assumptions: Iterable[t.Term], guarantees: Iterable[t.Term]
+) -> Candidates:
     """Read the candidates off a contract's formulas."""
     found = Candidates(tuple(outputs))
     for formula in assumptions:
@@ -112,10 +80,10 @@ def candidates(outputs: Sequence[Variable], assumptions: Iterable[Term], guarant
 
 def _visit(
     found: Candidates,
-    term: Term,
-    known: Mapping[Variable, Term],
-    conditions: tuple[Term, ...],
-    open_variables: tuple[Variable, ...],
+    term: t.Term,
+    known: Mapping[t.Variable, t.Term],
+    conditions: tuple[t.Term, ...],
+    open_variables: tuple[t.Variable, ...],
 ) -> None:
     """`term` (negations pushed in) is demanded under `conditions`, for all `open_variables`.
 
@@ -125,19 +93,19 @@ def _visit(
     if found.effort <= 0:
         return
     if not found.mentions(term):
-        if isinstance(term, Quantified) and term.quantifier is not Quantifier.FORALL:
+        if isinstance(term, t.Quantified) and term.quantifier is not t.Quantifier.FORALL:
             inner = _choose(found, term.variables, [term.body], known)
             _visit(found, term.body, inner, conditions, open_variables)
-        elif isinstance(term, And):
+        elif isinstance(term, t.And):
             for item in term.items:
                 _visit(found, item, known, conditions, open_variables)
         _remember(found, term, known)
         return
     match term:
-        case And(items=items):
+        case t.And(items=items):
             for item in items:
                 _visit(found, item, known, conditions, open_variables)
-        case Or(items=items):
+        case t.Or(items=items):
             free = tuple(item for item in items if not found.mentions(item))
             bound = tuple(item for item in items if found.mentions(item))
             for item in free:
@@ -147,27 +115,27 @@ def _visit(
                     break
                 others = tuple(negation(o) for o in bound if o is not item)
                 _visit(found, item, known, (*conditions, *map(negation, free), *others), open_variables)
-        case Implies(left=left, right=right):
-            _visit(found, Or((negation(left), right)), known, conditions, open_variables)
-        case Iff(left=left, right=right):
+        case t.Implies(left=left, right=right):
+            _visit(found, t.Or((negation(left), right)), known, conditions, open_variables)
+        case t.Iff(left=left, right=right):
             for one, other in ((left, right), (right, left)):
                 _remember(found, other, known)
                 _visit(found, one, known, (*conditions, other), open_variables)
-                _visit(found, push_negations(Not(one)), known, (*conditions, negation(other)), open_variables)
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
+                _visit(found, push_negations(t.Not(one)), known, (*conditions, negation(other)), open_variables)
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise):
             _remember(found, condition, known)
             _visit(found, then, known, (*conditions, condition), open_variables)
             _visit(found, otherwise, known, (*conditions, negation(condition)), open_variables)
-        case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
-            for item in body.items if isinstance(body, And) else (body,):
+        case t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body):
+            for item in body.items if isinstance(body, t.And) else (body,):
                 guards = [negation(o) for o in _alternatives(item) if not found.mentions(o)]
                 for constant in _extremes(found, variables, guards, item, known):
                     _visit(found, item, {**known, variables[0]: constant}, conditions, (*open_variables, *variables))
                 inner = _choose(found, variables, guards, known)
                 _visit(found, item, inner, conditions, (*open_variables, *variables))
-        case Quantified(variables=variables, body=body):
-            for item in body.items if isinstance(body, Or) else (body,):
-                parts = item.items if isinstance(item, And) else (item,)
+        case t.Quantified(variables=variables, body=body):
+            for item in body.items if isinstance(body, t.Or) else (body,):
+                parts = item.items if isinstance(item, t.And) else (item,)
                 guards = [part for part in parts if not found.mentions(part)]
                 inner = _choose(found, variables, guards, known)
                 # The chosen constants stand for the variables in all that follows, definitions too.
@@ -178,35 +146,35 @@ def _visit(
             _atom(found, term, known, conditions, open_variables)
 
 
-def _alternatives(term: Term) -> tuple[Term, ...]:
+def _alternatives(term: t.Term) -> tuple[t.Term, ...]:
     match term:
-        case Or(items=items):
+        case t.Or(items=items):
             return items
-        case Implies(left=left, right=right):
-            return (push_negations(Not(left)), *_alternatives(right))
+        case t.Implies(left=left, right=right):
+            return (push_negations(t.Not(left)), *_alternatives(right))
         case _:  # no alternatives
             return (term,)
 
 
 def _choose(
-    found: Candidates, variables: Sequence[Variable], guards: Sequence[Term], known: Mapping[Variable, Term]
-) -> dict[Variable, Term]:
+    found: Candidates, variables: Sequence[t.Variable], guards: Sequence[t.Term], known: Mapping[t.Variable, t.Term]
+) -> dict[t.Variable, t.Term]:
     """A constant for each variable, such that the guards hold of them if they hold of anything."""
     inner = dict(known)
     fresh = {}
     for variable in variables:
-        constant = Variable(Role.BOUND, f"{variable.name} ({len(found.constants) + 1})", variable.sort)
+        constant = t.Variable(t.Role.BOUND, f"{variable.name} ({len(found.constants) + 1})", variable.sort)
         found.constants.append(constant)
         fresh[variable] = constant
     guard = substitute(conjunction(guards), dict(known))
-    if guard != TRUE:
+    if guard != t.TRUE:
         chosen = substitute(guard, fresh)
-        found.axioms.append(Implies(Quantified(Quantifier.EXISTS, tuple(variables), guard), chosen))
+        found.axioms.append(t.Implies(t.Quantified(t.Quantifier.EXISTS, tuple(variables), guard), chosen))
         found.blocks.append(tuple(fresh.values()))
-        if [variable.sort for variable in variables] == [NATURAL]:
+        if [variable.sort for variable in variables] == [s.NATURAL]:
             (variable,) = variables
-            smallest = Implies(guard, Compare("<=", fresh[variable], variable))
-            found.least.append(Quantified(Quantifier.FORALL, (variable,), smallest))
+            smallest = t.Implies(guard, t.Compare("<=", fresh[variable], variable))
+            found.least.append(t.Quantified(t.Quantifier.FORALL, (variable,), smallest))
         for constant in fresh.values():
             found.chosen.setdefault(constant.sort, []).append(constant)
     else:
@@ -216,8 +184,12 @@ def _choose(
 
 
 def _extremes(
-    found: Candidates, variables: Sequence[Variable], guards: Sequence[Term], item: Term, known: Mapping[Variable, Term]
-) -> Iterator[Variable]:
+    found: Candidates,
+    variables: Sequence[t.Variable],
+    guards: Sequence[t.Term],
+    item: t.Term,
+    known: Mapping[t.Variable, t.Term],
+) -> Iterator[t.Variable]:
     """Constants for the positions that are decisive where a demand of all of them compares outputs with numbers."""
     if len(variables) > 1:
         return
@@ -226,28 +198,28 @@ def _extremes(
     if not bounded(position, guard):
         return
     for measure, greatest, last in measures(position, item, frozenset(found.outputs)):
-        constant = Variable(Role.BOUND, f"{position.name} ({len(found.constants) + 1})", NATURAL)
+        constant = t.Variable(t.Role.BOUND, f"{position.name} ({len(found.constants) + 1})", s.NATURAL)
         found.constants.append(constant)
         choice = Extreme(constant, position, guard, substitute(measure, dict(known)), greatest, last)
         found.axioms.append(choice.axiom())
         found.extremes[found.axioms[-1]] = choice
-        found.chosen.setdefault(NATURAL, []).append(constant)
+        found.chosen.setdefault(s.NATURAL, []).append(constant)
         yield constant
 
 
-def _remember(found: Candidates, term: Term, known: Mapping[Variable, Term]) -> None:
+def _remember(found: Candidates, term: t.Term, known: Mapping[t.Variable, t.Term]) -> None:
     """Keep the ground terms in a term that knows no output: arguments for constructors."""
     for part in subterms(term):
-        if part.sort == BOOL or isinstance(part, Quantified | SetTerm | SequenceRange) or found.mentions(part):
+        if part.sort == s.BOOL or isinstance(part, t.Quantified | t.SetTerm | t.SequenceRange) or found.mentions(part):
             continue
-        if isinstance(part.sort, FunctionSort | SetSort):
+        if isinstance(part.sort, s.FunctionSort | s.SetSort):
             continue
         ground = substitute(part, dict(known))
-        if all(v.role is not Role.BOUND or v in found.constants for v in free_variables(ground)):
+        if all(v.role is not t.Role.BOUND or v in found.constants for v in free_variables(ground)):
             _add(found, ground)
 
 
-def _add(found: Candidates, term: Term) -> None:
+def _add(found: Candidates, term: t.Term) -> None:
     terms = found.pool.setdefault(term.sort, [])
     if term not in terms:
         terms.append(term)
@@ -255,28 +227,28 @@ def _add(found: Candidates, term: Term) -> None:
 
 def _atom(
     found: Candidates,
-    term: Term,
-    known: Mapping[Variable, Term],
-    conditions: tuple[Term, ...],
-    open_variables: tuple[Variable, ...],
+    term: t.Term,
+    known: Mapping[t.Variable, t.Term],
+    conditions: tuple[t.Term, ...],
+    open_variables: tuple[t.Variable, ...],
 ) -> None:
     """An atom or negated atom that knows an output."""
-    positive = not isinstance(term, Not)
-    atom = term.body if isinstance(term, Not) else term
+    positive = not isinstance(term, t.Not)
+    atom = term.body if isinstance(term, t.Not) else term
     match atom:
-        case Apply(function=Variable() as function, arguments=arguments) if function in found.outputs:
+        case t.Apply(function=t.Variable() as function, arguments=arguments) if function in found.outputs:
             definition = _definition(function, arguments, conditions, open_variables, known)
             if definition is not None:
                 side = found.lower if positive else found.upper
                 side.setdefault(function, []).append(definition)
-        case Compare(operator=operator, left=left, right=right):
+        case t.Compare(operator=operator, left=left, right=right):
             for one, other in ((left, right), (right, left)):
-                if isinstance(one, Apply) and one.function in found.outputs and operator == "==":
-                    assert isinstance(one.function, Variable)
+                if isinstance(one, t.Apply) and one.function in found.outputs and operator == "==":
+                    assert isinstance(one.function, t.Variable)
                     _branch(found, one.function, one.arguments, other, conditions, open_variables, known)
                 else:
                     _suggest(found, one, other, operator, known)
-        case In(item=Variable() as output, collection=SetTerm(items=items) | SequenceTerm(items=items)):
+        case t.In(item=t.Variable() as output, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
             for item in items:
                 _suggest(found, output, item, "==", known)
     for part in subterms(atom):
@@ -284,41 +256,41 @@ def _atom(
             _remember(found, part, known)
 
 
-def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: Mapping[Variable, Term]) -> None:
+def _suggest(found: Candidates, left: t.Term, right: t.Term, operator: str, known: Mapping[t.Variable, t.Term]) -> None:
     """From ``left ~ right``, where the left side holds one output: what that output could be."""
-    while not isinstance(left, Variable):
+    while not isinstance(left, t.Variable):
         match left:
-            case Widen(term=inner) if isinstance(right, Widen):
+            case t.Widen(term=inner) if isinstance(right, t.Widen):
                 left, right = inner, right.term
-            case Widen(term=inner) if isinstance(right, Literal) and Fraction(right.value).denominator == 1:
-                left, right = inner, Literal(int(Fraction(right.value)), INTEGER)
-            case Widen(term=inner):
+            case t.Widen(term=inner) if isinstance(right, t.Literal) and Fraction(right.value).denominator == 1:
+                left, right = inner, t.Literal(int(Fraction(right.value)), s.INTEGER)
+            case t.Widen(term=inner):
                 left, right = inner, _floor(found, right, known)
-            case Negative(term=inner):
-                left, right = inner, Negative(right, right.sort)
-            case Arithmetic(operator="+", left=one, right=other, sort=sort):
+            case t.Negative(term=inner):
+                left, right = inner, t.Negative(right, right.sort)
+            case t.Arithmetic(operator="+", left=one, right=other, sort=sort):
                 if found.mentions(one):
-                    left, right = one, Arithmetic("-", right, other, sort)
+                    left, right = one, t.Arithmetic("-", right, other, sort)
                 else:
-                    left, right = other, Arithmetic("-", right, one, sort)
-            case Arithmetic(operator="-", left=one, right=other, sort=sort):
+                    left, right = other, t.Arithmetic("-", right, one, sort)
+            case t.Arithmetic(operator="-", left=one, right=other, sort=sort):
                 if found.mentions(one):
-                    left, right = one, Arithmetic("+", right, other, sort)
+                    left, right = one, t.Arithmetic("+", right, other, sort)
                 else:
-                    left, right = other, Arithmetic("-", one, right, sort)
-            case Arithmetic(operator="*", left=one, right=other, sort=RealSort() as sort):
+                    left, right = other, t.Arithmetic("-", one, right, sort)
+            case t.Arithmetic(operator="*", left=one, right=other, sort=s.RealSort() as sort):
                 if found.mentions(one):
-                    left, right = one, Arithmetic("/", right, other, sort)
+                    left, right = one, t.Arithmetic("/", right, other, sort)
                 else:
-                    left, right = other, Arithmetic("/", right, one, sort)
-            case Arithmetic(operator="/", left=one, right=other, sort=sort) if found.mentions(one):
-                left, right = one, Arithmetic("*", right, other, sort)
+                    left, right = other, t.Arithmetic("/", right, one, sort)
+            case t.Arithmetic(operator="/", left=one, right=other, sort=sort) if found.mentions(one):
+                left, right = one, t.Arithmetic("*", right, other, sort)
             case _:  # not solved for an output: nothing is suggested
                 return
     if left not in found.outputs:
         return
     value = substitute(right, dict(known))
-    if any(v.role is Role.BOUND and v not in found.constants for v in free_variables(value)):
+    if any(v.role is t.Role.BOUND and v not in found.constants for v in free_variables(value)):
         return
     options = found.values.setdefault(left, [])
     near = [value]
@@ -330,106 +302,106 @@ def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: M
             options.append(option)
 
 
-def _floor(found: Candidates, value: Term, known: Mapping[Variable, Term]) -> Term:
+def _floor(found: Candidates, value: t.Term, known: Mapping[t.Variable, t.Term]) -> t.Term:
     """A constant for the greatest integer not greater than a number: there is one, but RCL has no term for it."""
     ground = substitute(value, dict(known))
     if ground not in found.floors:
-        constant = Variable(Role.BOUND, f"floor ({len(found.constants) + 1})", INTEGER)
-        whole = Widen(constant, REAL)
-        next_one = Arithmetic("+", whole, Literal(Fraction(1), REAL), REAL)
+        constant = t.Variable(t.Role.BOUND, f"floor ({len(found.constants) + 1})", s.INTEGER)
+        whole = t.Widen(constant, s.REAL)
+        next_one = t.Arithmetic("+", whole, t.Literal(Fraction(1), s.REAL), s.REAL)
         found.constants.append(constant)
-        found.axioms.append(And((Compare("<=", whole, ground), Compare("<", ground, next_one))))
+        found.axioms.append(t.And((t.Compare("<=", whole, ground), t.Compare("<", ground, next_one))))
         found.floors[ground] = constant
     return found.floors[ground]
 
 
-def _halfway(found: Candidates, output: Variable, bound: Term) -> list[Term]:
+def _halfway(found: Candidates, output: t.Variable, bound: t.Term) -> list[t.Term]:
     """Between two numbers that a number is compared with lies the one half way."""
-    if not isinstance(output.sort, RealSort):
+    if not isinstance(output.sort, s.RealSort):
         return []
     others = found.bounds.setdefault(output, [])
-    half = Literal(Fraction(1, 2), REAL)
-    sums = [Arithmetic("+", other, bound, REAL) for other in others if other != bound]
+    half = t.Literal(Fraction(1, 2), s.REAL)
+    sums = [t.Arithmetic("+", other, bound, s.REAL) for other in others if other != bound]
     others.append(bound)
     del others[NUMBERS_PAIRED:]
-    return [Arithmetic("*", half, both, REAL) for both in sums]
+    return [t.Arithmetic("*", half, both, s.REAL) for both in sums]
 
 
-def _neighbours(value: Term) -> list[Term]:
-    if not isinstance(value.sort, IntegerSort | NaturalSort | RealSort):
+def _neighbours(value: t.Term) -> list[t.Term]:
+    if not isinstance(value.sort, s.IntegerSort | s.NaturalSort | s.RealSort):
         return []
-    one = Literal(Fraction(1), REAL) if isinstance(value.sort, RealSort) else Literal(1, INTEGER)
-    sort = REAL if isinstance(value.sort, RealSort) else INTEGER
-    return [Arithmetic("+", value, one, sort), Arithmetic("-", value, one, sort)]
+    one = t.Literal(Fraction(1), s.REAL) if isinstance(value.sort, s.RealSort) else t.Literal(1, s.INTEGER)
+    sort = s.REAL if isinstance(value.sort, s.RealSort) else s.INTEGER
+    return [t.Arithmetic("+", value, one, sort), t.Arithmetic("-", value, one, sort)]
 
 
 # -- functions ---------------------------------------------------------------------------------------------------------
 
 
 def _definition(
-    function: Variable,
-    arguments: Sequence[Term],
-    conditions: Sequence[Term],
-    open_variables: Sequence[Variable],
-    known: Mapping[Variable, Term],
+    function: t.Variable,
+    arguments: Sequence[t.Term],
+    conditions: Sequence[t.Term],
+    open_variables: Sequence[t.Variable],
+    known: Mapping[t.Variable, t.Term],
 ) -> Definition | None:
     """The arguments at which a demand is made: where the open variables take values that meet the conditions."""
     sort = function.sort
-    assert isinstance(sort, FunctionSort)
+    assert isinstance(sort, s.FunctionSort)
     if any(function in free_variables(term) for term in (*arguments, *conditions)):
         return None
-    outer = {v: t for v, t in known.items() if v not in open_variables}
+    outer = {v: item for v, item in known.items() if v not in open_variables}
     conditions = [substitute(condition, outer) for condition in conditions]
     arguments = [substitute(argument, outer) for argument in arguments]
-    names = {v.name for term in (*arguments, *conditions) for v in subterms(term) if isinstance(v, Variable)}
+    names = {v.name for term in (*arguments, *conditions) for v in subterms(term) if isinstance(v, t.Variable)}
     names |= {v.name for v in open_variables}
     parameters = []
     for k, parameter_sort in enumerate(sort.parameters):
         name = f"p{k}"
         while name in names:
             name += "'"
-        parameters.append(Variable(Role.BOUND, name, parameter_sort))
+        parameters.append(t.Variable(t.Role.BOUND, name, parameter_sort))
     rest = list(open_variables)
-    equations: list[Term] = []
-    direct: dict[Variable, Term] = {}
+    equations: list[t.Term] = []
+    direct: dict[t.Variable, t.Term] = {}
     for parameter, argument in zip(parameters, arguments, strict=True):
-        if isinstance(argument, Variable) and argument in rest and _stands_for(parameter, argument):
+        if isinstance(argument, t.Variable) and argument in rest and _stands_for(parameter, argument):
             rest.remove(argument)
             direct[argument] = parameter
             if argument.sort != parameter.sort:
-                equations.append(Compare("<=", Literal(0, INTEGER), parameter))
+                equations.append(t.Compare("<=", t.Literal(0, s.INTEGER), parameter))
         else:
-            equations.append(Compare("==", parameter, argument))
+            equations.append(t.Compare("==", parameter, argument))
     body = conjunction(substitute(part, direct) for part in (*conditions, *equations))
     used = [variable for variable in rest if variable in free_variables(body)]
     if used:
-        body = Quantified(Quantifier.EXISTS, tuple(used), body)
+        body = t.Quantified(t.Quantifier.EXISTS, tuple(used), body)
     return Definition(tuple(parameters), body)
 
 
-def _stands_for(parameter: Variable, argument: Variable) -> bool:
+def _stands_for(parameter: t.Variable, argument: t.Variable) -> bool:
     """Whether a function's parameter may stand for a variable (an integer for a natural: where it is not negative)."""
-    return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (NATURAL, INTEGER)
+    return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (s.NATURAL, s.INTEGER)
 
 
 def _branch(
     found: Candidates,
-    function: Variable,
-    arguments: Sequence[Term],
-    value: Term,
-    conditions: Sequence[Term],
-    open_variables: Sequence[Variable],
-    known: Mapping[Variable, Term],
+    function: t.Variable,
+    arguments: Sequence[t.Term],
+    value: t.Term,
+    conditions: Sequence[t.Term],
+    open_variables: Sequence[t.Variable],
+    known: Mapping[t.Variable, t.Term],
 ) -> None:
     """``out.f(arguments) == value`` is demanded under the conditions."""
-    if value.sort == BOOL or function in free_variables(value):
+    if value.sort == s.BOOL or function in free_variables(value):
         return
     definition = _definition(function, arguments, conditions, open_variables, known)
     if definition is None:
         return
-    direct: dict[Variable, Term] = {v: t for v, t in known.items() if v not in open_variables}
+    direct: dict[t.Variable, t.Term] = {v: term for v, term in known.items() if v not in open_variables}
     for parameter, argument in zip(definition.parameters, arguments, strict=True):
-        if isinstance(argument, Variable) and argument in open_variables and _stands_for(parameter, argument):
+        if isinstance(argument, t.Variable) and argument in open_variables and _stands_for(parameter, argument):
             direct.setdefault(argument, parameter)
     result = substitute(value, direct)
     if any(v in open_variables for v in free_variables(result)):

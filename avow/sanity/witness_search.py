@@ -244,15 +244,15 @@ class Search:
 
     def _refute(self, limit: int) -> Realizability | None:
         # The first candidate is the likeliest: inputs that defeat it mostly defeat all, and are much easier to find.
-        return self.refute((), limit // 2, 1) or self.refute((), limit // 3)
+        return self._refuted(limit // 2, 1) or self._refuted(limit // 3)
 
-    def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
-        """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
-        if none are found with so much effort. `few`: only so many witnesses are to be defeated from the start."""
+    def _refuted(self, limit: int, few: int | None = None) -> Realizability | None:
+        """Inputs without an output; None if none are found with so much effort. `few`: only so many witnesses are to be
+        defeated from the start."""
         end = until(limit)
         known = len(self.witnesses)
         while spent() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
-            inputs = self._defeat(self.group.guarantees, possible, effort_left(end), few)
+            inputs = self._defeat(effort_left(end), few)
             if inputs is None:
                 return None
             before = len(self.witnesses)
@@ -261,27 +261,18 @@ class Search:
                 return answer
         return None
 
-    def _defeat(
-        self, guarantees: Formulas, possible: Sequence[Formulas], limit: int, few: int | None
-    ) -> dict[Variable, Value] | None:
-        """Allowed inputs at which no known witness meets the guarantees, though each of the `possible` sets of
-        guarantees can be met; not judged yet."""
+    def _defeat(self, limit: int, few: int | None) -> dict[Variable, Value] | None:
+        """Allowed inputs at which no known witness meets the guarantees; not judged yet."""
         translator = Translator()
         fixed = self._fixed(translator)
-        copies = [
-            {v: Variable(Role.OUTPUT, f"{v.name} ({k})", v.sort) for v in self.group.outputs}
-            for k in range(len(possible))
-        ]
-        constants = [*self.inputs, *self.found.constants, *(v for copy in copies for v in copy.values())]
+        constants = [*self.inputs, *self.found.constants]
         ordinary = [v for v in constants if not isinstance(v.sort, FunctionSort)]
         functions = [v for v in constants if isinstance(v.sort, FunctionSort)]
 
         def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
             whole = {**fixed, **meanings}
             facts = [translator.term(formula, whole) for formula in self.assumptions.values()]
-            for copy, formulas in zip(copies, possible, strict=True):
-                facts += [translator.term(substitute(formula, copy), whole) for formula in formulas.values()]
-            return facts + self._defeated(translator, guarantees.values(), whole, few, limit)
+            return facts + self._defeated(translator, self.group.guarantees.values(), whole, few, limit)
 
         values = search_tables(translator, build, ordinary, functions, effort=limit, seed=self.seed)
         if values is None:

@@ -23,44 +23,8 @@ from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth, transform
 from avow.formulas.values import Value
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    REAL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Apply,
-    Arithmetic,
-    Conditional,
-    Construct,
-    EnumValue,
-    Literal,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.sanity.witness_candidates import Candidates, Definition
 from avow.solving.translation import Expr, Meaning, Translator
 from avow.solving.z3_module import z3
@@ -73,17 +37,17 @@ class Fixed:
     value: Value
 
 
-Meant = Term | Definition | Fixed
+Meant = t.Term | Definition | Fixed
 
-Witness = Mapping[Variable, Meant]
+Witness = Mapping[t.Variable, Meant]
 """A meaning for every output."""
 
 
 def witnesses(found: Candidates) -> list[Witness]:
     """Combinations of candidates, the likeliest first; at most `WITNESSES`."""
-    choices: list[list[Term | Definition]] = []
+    choices: list[list[t.Term | Definition]] = []
     for output in found.outputs:
-        if isinstance(output.sort, FunctionSort):
+        if isinstance(output.sort, s.FunctionSort):
             choices.append(list(_functions(found, output, output.sort)))
         else:
             terms = dict.fromkeys([*found.values.get(output, ()), *_ground(found, output.sort)])
@@ -98,7 +62,7 @@ def witnesses(found: Candidates) -> list[Witness]:
     return result
 
 
-def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Term:
+def instantiate(found: Candidates, guarantee: t.Term, *, wide: bool = True) -> t.Term:
     """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms; if not
     `wide`, only at terms that were read together."""
     if depth(guarantee) > REWRITTEN_DEPTH:
@@ -109,9 +73,9 @@ def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Ter
 # -- functions -------------------------------------------------------------------------------------------------------
 
 
-def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Iterable[Term | Definition]:
-    parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
-    if sort.result == BOOL:
+def _functions(found: Candidates, function: t.Variable, sort: s.FunctionSort) -> Iterable[t.Term | Definition]:
+    parameters = tuple(t.Variable(t.Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
+    if sort.result == s.BOOL:
         lower, upper = found.lower.get(function, []), found.upper.get(function, [])
         least = Definition(parameters, disjunction(_at(d, parameters) for d in lower))
         most = Definition(parameters, conjunction(negation(_at(d, parameters)) for d in upper))
@@ -121,8 +85,8 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
             yield Definition(parameters, conjunction((least.body, most.body)))
         for definition in lower[:4]:
             yield Definition(parameters, _at(definition, parameters))
-        yield Definition(parameters, FALSE)
-        yield Definition(parameters, TRUE)
+        yield Definition(parameters, t.FALSE)
+        yield Definition(parameters, t.TRUE)
         return
     yield from dict.fromkeys(_partly_applied(found, parameters, sort))
     branches = found.branches.get(function, [])
@@ -130,7 +94,7 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
         whole = default  # the first case whose condition holds, else that
         for d, v in reversed(branches):
             value = substitute(v, dict(zip(d.parameters, parameters, strict=True)))
-            whole = Conditional(_at(d, parameters), value, whole, sort.result)
+            whole = t.Conditional(_at(d, parameters), value, whole, sort.result)
         yield Definition(parameters, whole)
     if branches:
         for value in _ground(found, sort.result)[:4]:
@@ -138,102 +102,108 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
     yield from _rising(found, parameters, sort)
 
 
-def _partly_applied(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
+def _partly_applied(
+    found: Candidates, parameters: tuple[t.Variable, ...], sort: s.FunctionSort
+) -> Iterable[Definition]:
     """Functions that are given, with their first arguments fixed as somewhere in the formulas: where an assumption says
     that there is a way by naming it (``in.way(in.start, in.goal, k)``), a plan may be just that."""
     count = len(parameters)
     for term in found.pool.get(sort.result, ()):
-        if not isinstance(term, Apply) or not isinstance(term.function.sort, FunctionSort) or found.mentions(term):
+        if not isinstance(term, t.Apply) or not isinstance(term.function.sort, s.FunctionSort) or found.mentions(term):
             continue
         if len(term.arguments) >= count and term.function.sort.parameters[-count:] == sort.parameters:
             yield Definition(parameters, replace(term, arguments=(*term.arguments[:-count], *parameters), span=None))
 
 
-def _rising(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
+def _rising(found: Candidates, parameters: tuple[t.Variable, ...], sort: s.FunctionSort) -> Iterable[Definition]:
     """Functions of a number that are different everywhere, and grow."""
-    numbers = RealSort | IntegerSort | NaturalSort
-    if [isinstance(s, numbers) for s in (*sort.parameters, sort.result)] != [True, True]:
+    numbers = s.RealSort | s.IntegerSort | s.NaturalSort
+    if [isinstance(part, numbers) for part in (*sort.parameters, sort.result)] != [True, True]:
         return
-    argument: Term = parameters[0]
-    if isinstance(sort.result, RealSort) and isinstance(argument.sort, IntegerSort | NaturalSort):
-        argument = Widen(argument, REAL)
-    if isinstance(argument.sort, RealSort) is not isinstance(sort.result, RealSort):
+    argument: t.Term = parameters[0]
+    if isinstance(sort.result, s.RealSort) and isinstance(argument.sort, s.IntegerSort | s.NaturalSort):
+        argument = t.Widen(argument, s.REAL)
+    if isinstance(argument.sort, s.RealSort) is not isinstance(sort.result, s.RealSort):
         return
     yield Definition(parameters, argument)
-    whole = REAL if isinstance(sort.result, RealSort) else INTEGER
-    few = [Literal(Fraction(k), REAL) if whole == REAL else Literal(k, INTEGER) for k in (1, 2)]
+    whole = s.REAL if isinstance(sort.result, s.RealSort) else s.INTEGER
+    few = [t.Literal(Fraction(k), s.REAL) if whole == s.REAL else t.Literal(k, s.INTEGER) for k in (1, 2)]
     for start in (*few, *_ground(found, sort.result)[:4]):
-        yield Definition(parameters, Arithmetic("+", argument, start, whole))
+        yield Definition(parameters, t.Arithmetic("+", argument, start, whole))
 
 
-def _at(definition: Definition, parameters: Sequence[Variable]) -> Term:
+def _at(definition: Definition, parameters: Sequence[t.Variable]) -> t.Term:
     return substitute(definition.body, dict(zip(definition.parameters, parameters, strict=True)))
 
 
 # -- ground terms ------------------------------------------------------------------------------------------------------
 
 
-def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
+def _ground(found: Candidates, sort: s.Sort, level: int = 0) -> list[t.Term]:
     """Terms of a sort, without outputs: those seen in the guarantees, and the simplest ones."""
     seen = [*found.chosen.get(sort, ()), *(term for term in found.pool.get(sort, ()) if not found.mentions(term))]
     match sort:
-        case BoolSort():
-            return [TRUE, FALSE]
-        case EnumSort(members=members):
-            return list(dict.fromkeys([*(EnumValue(m, sort) for m in members), *seen]))
-        case NaturalSort():
-            return list(dict.fromkeys([*seen, Literal(0, sort)]))
-        case IntegerSort():
-            naturals = found.pool.get(NaturalSort(), ())
-            return list(dict.fromkeys([*seen, *naturals, Literal(0, sort)]))
-        case RealSort():
-            return list(dict.fromkeys([*seen, Literal(Fraction(0), sort)]))
-        case StringSort():
-            return list(dict.fromkeys([*seen, Literal("", sort)]))
-        case DataSort(constructors=constructors) if level < 2:
-            made: list[Term] = []
+        case s.BoolSort():
+            return [t.TRUE, t.FALSE]
+        case s.EnumSort(members=members):
+            return list(dict.fromkeys([*(t.EnumValue(m, sort) for m in members), *seen]))
+        case s.NaturalSort():
+            return list(dict.fromkeys([*seen, t.Literal(0, sort)]))
+        case s.IntegerSort():
+            naturals = found.pool.get(s.NaturalSort(), ())
+            return list(dict.fromkeys([*seen, *naturals, t.Literal(0, sort)]))
+        case s.RealSort():
+            return list(dict.fromkeys([*seen, t.Literal(Fraction(0), sort)]))
+        case s.StringSort():
+            return list(dict.fromkeys([*seen, t.Literal("", sort)]))
+        case s.DataSort(constructors=constructors) if level < 2:
+            made: list[t.Term] = []
             for constructor in constructors:
                 pools = [_ground(found, parameter, level + 1) for parameter in constructor.parameters]
                 combinations = sorted(
                     product(*(list(enumerate(pool))[:WITNESS_ARGUMENTS] for pool in pools)), key=_spread
                 )
                 made.extend(
-                    Construct(constructor.name, tuple(term for _, term in combination), sort)
+                    t.Construct(constructor.name, tuple(term for _, term in combination), sort)
                     for combination in combinations[:12]
                 )
             return list(dict.fromkeys([*seen, *made]))
-        case TupleSort(items=items) if level < 2:
+        case s.TupleSort(items=items) if level < 2:
             pools = [_ground(found, item, level + 1) for item in items]
             tried = (list(enumerate(pool))[:WITNESS_ARGUMENTS] for pool in pools)
             combinations = sorted(product(*tried), key=_spread)
-            return list(dict.fromkeys([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
-        case SequenceSort():
-            return list(dict.fromkeys([*seen, SequenceTerm((), sort)]))
-        case OpaqueSort() if not seen:
+            return list(
+                dict.fromkeys([*seen, *(t.TupleTerm(tuple(value for _, value in c), sort) for c in combinations[:12])])
+            )
+        case s.SequenceSort():
+            return list(dict.fromkeys([*seen, t.SequenceTerm((), sort)]))
+        case s.OpaqueSort() if not seen:
             # Nothing in the contract names an element, but the sort is not empty: any constant is one.
-            constant = Variable(Role.BOUND, f"{sort.name} (some)", sort)
+            constant = t.Variable(t.Role.BOUND, f"{sort.name} (some)", sort)
             if constant not in found.constants:
                 found.constants.append(constant)
             return [constant]
-        case DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SetSort():  # nothing unspecified in it
+        case (
+            s.DataSort() | s.OpaqueSort() | s.FunctionSort() | s.TupleSort() | s.SetSort()
+        ):  # nothing unspecified in it
             return seen
         case _:
             assert_never(sort)
 
 
-def _spread(combination: tuple[tuple[int, Term], ...]) -> tuple[int, int]:
+def _spread(combination: tuple[tuple[int, t.Term], ...]) -> tuple[int, int]:
     """Arguments that were read together (neighbours in the pool) come first: ``move(x, y)`` before ``move(x, x)``."""
     positions = [position for position, _ in combination]
     steps = sum(abs(later - earlier - 1) for earlier, later in pairwise(positions))
     return steps, sum(positions)
 
 
-def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) -> Witness | None:
+def _resolve(choice: Mapping[t.Variable, t.Term | Definition], found: Candidates) -> Witness | None:
     """Put the chosen terms of other outputs where a candidate mentions them; None for a circle."""
     outputs = set(found.outputs)
     terms = {output: value for output, value in choice.items() if not isinstance(value, Definition)}
     mentioned = {output: free_variables(value) & outputs for output, value in terms.items()}
-    done: dict[Variable, Term] = {}
+    done: dict[t.Variable, t.Term] = {}
     while len(done) < len(terms):
         ready = [output for output in terms if output not in done and mentioned[output] <= done.keys()]
         if not ready:
@@ -241,7 +211,7 @@ def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) ->
         for output in ready:
             done[output] = substitute(terms[output], {other: done[other] for other in mentioned[output]})
     terms = done
-    witness: dict[Variable, Meant] = {}
+    witness: dict[t.Variable, Meant] = {}
     for output, value in choice.items():
         if not isinstance(value, Definition):
             witness[output] = terms[output]
@@ -252,15 +222,15 @@ def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) ->
     return witness
 
 
-def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:
+def _instantiate(found: Candidates, term: t.Term, wide: bool) -> t.Term:
     match term:
-        case And(items=items):
-            return And(tuple(_instantiate(found, item, wide) for item in items))
-        case Or(items=items):
-            return Or(tuple(_instantiate(found, item, wide) for item in items))
-        case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
-            return Quantified(Quantifier.FORALL, variables, _instantiate(found, body, wide))
-        case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if found.mentions(body):
+        case t.And(items=items):
+            return t.And(tuple(_instantiate(found, item, wide) for item in items))
+        case t.Or(items=items):
+            return t.Or(tuple(_instantiate(found, item, wide) for item in items))
+        case t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body):
+            return t.Quantified(t.Quantifier.FORALL, variables, _instantiate(found, body, wide))
+        case t.Quantified(quantifier=t.Quantifier.EXISTS, variables=variables, body=body) if found.mentions(body):
             inner = _instantiate(found, body, wide)
             places = _places(found, variables, wide)
             instances = [substitute(inner, dict(zip(variables, place, strict=True))) for place in places]
@@ -269,7 +239,7 @@ def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:
             return term
 
 
-def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> list[tuple[Term, ...]]:
+def _places(found: Candidates, variables: Sequence[t.Variable], wide: bool) -> list[tuple[t.Term, ...]]:
     sorts = [variable.sort for variable in variables]
     if not wide:
         return [block for block in found.blocks if [term.sort for term in block] == sorts]
@@ -281,15 +251,15 @@ def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> lis
 # -- meanings ----------------------------------------------------------------------------------------------------------
 
 
-def applied(formula: Term, witness: Witness) -> Term:
+def applied(formula: t.Term, witness: Witness) -> t.Term:
     """The formula with what a witness defines in the place of each application of it: what a quantified variable is
     equal to is then seen (`avow.formulas.one_point_rule`)."""
     defined = {output: value for output, value in witness.items() if isinstance(value, Definition)}
     if not defined:
         return formula
 
-    def at(part: Term) -> Term:
-        if not isinstance(part, Apply) or part.function not in defined:
+    def at(part: t.Term) -> t.Term:
+        if not isinstance(part, t.Apply) or part.function not in defined:
             return part
         definition = defined[part.function]
         return substitute(definition.body, dict(zip(definition.parameters, part.arguments, strict=True)))
@@ -298,10 +268,10 @@ def applied(formula: Term, witness: Witness) -> Term:
 
 
 def meanings_of(
-    translator: Translator, witness: Witness, inputs: Mapping[Variable, Meaning]
-) -> dict[Variable, Meaning]:
+    translator: Translator, witness: Witness, inputs: Mapping[t.Variable, Meaning]
+) -> dict[t.Variable, Meaning]:
     """The outputs' meanings under a witness."""
-    meanings: dict[Variable, Meaning] = {}
+    meanings: dict[t.Variable, Meaning] = {}
     for output, value in witness.items():
         match value:
             case Fixed():
@@ -310,7 +280,7 @@ def meanings_of(
                 continue
             case _:  # a term
                 term = translator.term(value, inputs)
-                meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
+                meanings[output] = z3.ToReal(term) if output.sort == s.REAL and z3.is_int(term) else term
     for output, value in witness.items():
         if isinstance(value, Definition):
             meanings[output] = _function(translator, value, {**inputs, **meanings})
@@ -318,7 +288,7 @@ def meanings_of(
 
 
 def _function(
-    translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
+    translator: Translator, definition: Definition, meanings: Mapping[t.Variable, Meaning]
 ) -> Callable[..., Expr]:
     def function(*arguments: Expr) -> Expr:
         return translator.term(definition.body, meanings, dict(zip(definition.parameters, arguments, strict=True)))

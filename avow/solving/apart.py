@@ -1,30 +1,49 @@
 """Solvers in processes of their own: a crash of one, or one that does not keep its time, is an unknown answer.
 
-Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.question_process`). There are
-scripts on which cvc5 does not keep its own limits (seen: sequences of tuples), and no call into a library can be ended
-from Python.
+``python -P -m avow.solving.apart PARENT`` reads questions as lines of JSON, ``[solver, script, limit]``, and writes a
+line for each, ``[answer, steps]``: to start Python and a solver costs more than most questions. There are scripts on
+which cvc5 does not keep its own limits (seen: sequences of tuples), and no call into a library can be ended from
+Python.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import os
 import re
+import select
+import subprocess
+import sys
+import threading
+import time
 from dataclasses import dataclass, field
 from importlib import metadata, util
 from typing import Any
 
+from avow.base import process
 from avow.base.tuning.effort import KERNEL_SECOND_STEPS
+from avow.base.tuning.sizes import ANSWERED_BY_ONE
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
-from avow.solving.question_process import Answering, NoAnswer, serve
+
+
+class NoAnswer(Exception):  # noqa: N818 - it says what it is
+    """The process ended without an answer."""
 
 
 @dataclass(slots=True)
 class Apart:
-    """A solver (`z3` or `cvc5`). `steps`: its own, for all questions together; what is asked later is `unknown`."""
+    """A solver (`z3` or `cvc5`). Its process is started at the first question, and anew after a question that it did
+    not answer and in a fork of this process. Safe to use from several threads. `steps`: its own, for all questions
+    together; what is asked later is `unknown`."""
 
     solver: str
     steps: float = math.inf
-    _process: Answering = field(default_factory=lambda: Answering("avow.solving.apart"))
+    _owner: int = 0
+    _asked: int = 0
+    _process: subprocess.Popen[bytes] | None = None
+    _lock: threading.Lock = field(default_factory=threading.Lock)
     _known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
     def __call__(self, script: str, limit: int = KERNEL_SECOND_STEPS) -> Said:
@@ -33,22 +52,82 @@ class Apart:
         if question not in self._known:
             if self.steps <= 0:
                 return Said.UNKNOWN
-            self._known[question], used = self._ask(script, int(min(limit, self.steps)))
+            self._known[question], used = self._said(script, int(min(limit, self.steps)))
             self.steps -= used
         return self._known[question]
 
-    def _ask(self, script: str, limit: int) -> tuple[Said, int]:
+    def _said(self, script: str, limit: int) -> tuple[Said, int]:
         try:
-            asked = script if self.solver == "z3" else f"{script}(check-sat)\n"
-            said, used = self._process.ask((self.solver, asked, limit), tuple[str, int], NET_MS / 1000)
+            said, used = self.ask(script if self.solver == "z3" else f"{script}(check-sat)\n", limit, NET_MS / 1000)
             return Said(said or Said.UNKNOWN), used
         except TimeoutError:
             return Said.LATE, limit
-        except (NoAnswer, ValueError):  # no word, or one that is no answer
+        except NoAnswer:
             return Said.UNKNOWN, limit
 
+    def ask(self, script: str, limit: int, seconds: float) -> tuple[str, int]:
+        """The answer to a script (empty where it cannot be read), and the steps that it took, of `limit`. Raises
+        NoAnswer, and TimeoutError after so many seconds."""
+        if self._owner != os.getpid():  # the process, and the lock, of the process that this one is a fork of
+            self._process, self._lock, self._owner = None, threading.Lock(), os.getpid()
+        with self._lock:
+            try:
+                said, used = json.loads(self._answer(_line([self.solver, script, limit]), time.monotonic() + seconds))
+                return said, used
+            except TimeoutError:
+                self._end()
+                raise
+            except (OSError, ValueError) as error:
+                self._end()
+                raise NoAnswer(str(error)) from error
+
     def close(self) -> None:
-        self._process.close()
+        """End the process; the next question starts another."""
+        with self._lock:
+            if self._owner == os.getpid():
+                self._end()
+
+    def _answer(self, asked: bytes, end: float) -> bytes:
+        if self._process is None or self._asked >= ANSWERED_BY_ONE or self._process.poll() is not None:
+            self._end()
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "avow.solving.apart", str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,
+            )
+            process.watch(self._process.pid)
+            self._asked = 0
+        self._asked += 1
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(asked)
+        self._process.stdin.flush()
+        said = b""
+        while not said.endswith(b"\n"):
+            left = end - time.monotonic()
+            if left <= 0 or not select.select([self._process.stdout], [], [], left)[0]:
+                raise TimeoutError
+            part = os.read(self._process.stdout.fileno(), 1 << 16)
+            if not part:
+                raise ValueError("it ended")
+            said += part
+        return said
+
+    def _end(self) -> None:
+        if self._process is None:
+            return
+        process.kill_tree(self._process.pid)
+        self._process.wait()
+        process.unwatch(self._process.pid)
+        for stream in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError):  # what it was to read can no longer be written
+                stream.close() if stream is not None else None
+        self._process = None
+
+
+def _line(message: object) -> bytes:
+    return json.dumps(message).encode() + b"\n"
 
 
 @dataclass(slots=True)
@@ -115,10 +194,15 @@ def _steps(solver: Any) -> int:
     return int(counted.get("value", 0))
 
 
-def _said(question: tuple[str, str, int]) -> tuple[str, int]:
-    solver, script, limit = question
-    return (ask_z3(script, limit), 0) if solver == "z3" else _ask_cvc5(script, limit)
+def _serve() -> None:
+    """The far end, until there are no more questions."""
+    process.die_with(int(sys.argv[1]))
+    for asked in sys.stdin.buffer:
+        solver, script, limit = json.loads(asked)
+        answer = (ask_z3(script, limit), 0) if solver == "z3" else _ask_cvc5(script, limit)
+        sys.stdout.buffer.write(_line(answer))
+        sys.stdout.buffer.flush()
 
 
 if __name__ == "__main__":
-    serve(_said, tuple[str, str, int])
+    _serve()

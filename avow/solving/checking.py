@@ -10,7 +10,7 @@ from typing import Literal as OneOf
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import SMALL_NUMBER
 from avow.base.tuning.effort import QUESTION_EFFORT, QUESTION_STEPS, SMALLER_MODEL_EFFORT
-from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps, watchdog
+from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
 from avow.solving.z3_module import z3
@@ -168,22 +168,18 @@ def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *as
     """Put what a solver holds to it: every question to Z3 goes through here. Its steps bound it and are counted
     (`avow.solving.limits`); the clock only ends what hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
-    with watchdog(net(effort), translator.context.interrupt) as interrupted:
-        result = solver.check(*assumptions)
+    result = solver.check(*assumptions)
     charge(translator, solver)
-    if interrupted.is_set():
-        # An interrupt that came too late to end the search would end what is asked of this context next.
-        z3.Solver(ctx=translator.context).check()
     if result == z3.sat:
         return Said("sat")
     if result == z3.unsat:
         return Said("unsat")
-    return Said("unknown", HANGS if interrupted.is_set() else _reason(solver))
+    return Said("unknown", _reason(solver))
 
 
 def configured(solver: Any, effort: float, seed: int | None) -> None:
     """Set a solver's limit and seed; None for one that has no seed."""
-    options: dict[str, object] = {"rlimit": steps(effort)}
+    options: dict[str, object] = {"rlimit": steps(effort), "timeout": net(effort)}
     if isinstance(solver, z3.Solver) and seed is not None:
         # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
         options |= {"random_seed": seed, "smt.arith.nl.grobner": False}
@@ -193,9 +189,9 @@ def configured(solver: Any, effort: float, seed: int | None) -> None:
 def charge(translator: Sorts, solver: Any = None) -> int:
     """Count what was done in the translator's context since it was last asked; any solver of the context can tell. How
     many steps that were."""
-    before = translator.steps
-    translator.steps = _steps_of(solver or z3.Solver(ctx=translator.context))
-    used = max(0, translator.steps - before)
+    before = translator.session.steps
+    count = translator.session.steps = _steps_of(solver or z3.Solver(ctx=translator.context))
+    used = max(0, count - before)
     spend(QUESTION_STEPS + used)
     return used
 
@@ -212,10 +208,12 @@ def _steps_of(solver: Any) -> int:
 def _reason(solver: Any) -> str:
     """Why it gave up, for people."""
     reason = str(solver.reason_unknown()).strip("()")
+    if reason == "timeout":
+        return HANGS
     return NO_ANSWER if reason in _USED_UP else f"the solver gave up: {reason}" if reason else "no answer"
 
 
-_USED_UP = ("canceled", "interrupted", "interrupted from keyboard", "timeout", "max. resource limit exceeded")
+_USED_UP = ("canceled", "interrupted", "interrupted from keyboard", "max. resource limit exceeded")
 
 
 def _ask_qsat(

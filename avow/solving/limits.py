@@ -12,14 +12,11 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
 import threading
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 
 from avow.base.plain import ALLOWS_MORE
-from avow.base.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
+from avow.base.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS
 
 _NO_ANSWER = "no answer with"
 NO_ANSWER = f"{_NO_ANSWER} the effort allowed"
@@ -100,104 +97,7 @@ def allowed(effort: int) -> int:
     return min(effort, effort_left(_spent.end))
 
 
-def _clock() -> Callable[[], float]:
-    """Processor time of this thread, to be read by another one; wall-clock time where the system cannot tell it."""
-    if not hasattr(time, "pthread_getcpuclockid"):
-        return time.monotonic
-    clock = time.pthread_getcpuclockid(threading.get_ident())
-    return lambda: time.clock_gettime(clock)
-
-
-@contextlib.contextmanager
-def watchdog(seconds: float, interrupt: Callable[[], None]) -> Iterator[threading.Event]:
-    """Call `interrupt`, again and again, while the block goes on beyond so many seconds of processor time
-    (`WALL_CLOCK` times as many by the clock); what is yielded is set once it was.
-
-    For what hangs: Z3 sometimes misses its limits altogether (seen: 84 s for 16 ms).
-    """
-    used = _clock()
-    watched = _Watched(used, used() + seconds, time.monotonic() + seconds * WALL_CLOCK, interrupt)
-    _kennel.dog.watch(watched, seconds)
-    try:
-        yield watched.interrupted
-    finally:
-        with watched.lock:  # from here on nothing is interrupted: it would be what is asked next
-            watched.done = True
-            watched.interrupt = _nothing  # the list of blocks must not keep alive what it holds
-
-
-def net(effort: float) -> float:
-    """Seconds of processor time after which a question of so much effort hangs."""
-    return HANGS_SECONDS + HANGS * effort / 1000
-
-
-def _nothing() -> None:
-    pass
-
-
-@dataclass(slots=True, eq=False)
-class _Watched:
-    """A block that is being watched."""
-
-    used: Callable[[], float]
-    cpu_end: float
-    wall_end: float
-    interrupt: Callable[[], None]
-    interrupted: threading.Event = field(default_factory=threading.Event)
-    lock: threading.Lock = field(default_factory=threading.Lock)
-    done: bool = False
-
-    def look(self) -> float | None:
-        """Interrupt it if it is beyond its limit. How many seconds it has at least, or None where it is done."""
-        with self.lock:
-            if self.done:
-                return None
-            left = min(self.cpu_end - self.used(), self.wall_end - time.monotonic())
-            if left <= 0:
-                self.interrupted.set()
-                self.interrupt()
-            return max(left, 0.02)
-
-
-class _Dog:
-    """One thread for all blocks: most are done long before their limit, and a thread for each would cost more than they
-    do. It sleeps until the first limit that it knows of may be reached, and looks again."""
-
-    def __init__(self) -> None:
-        self.condition = threading.Condition()
-        self.watched: list[_Watched] = []
-        self.wakes = math.inf
-        self.thread: threading.Thread | None = None
-
-    def watch(self, block: _Watched, limit: float) -> None:
-        with self.condition:
-            self.watched.append(block)
-            if self.thread is None or not self.thread.is_alive():
-                self.thread = threading.Thread(target=self.run, daemon=True, name="watchdog")
-                self.thread.start()
-            elif time.monotonic() + limit < self.wakes:
-                self.condition.notify()
-
-    def run(self) -> None:
-        with self.condition:
-            while True:
-                known = [(block, block.look()) for block in self.watched]
-                self.watched = [block for block, left in known if left is not None]
-                wait = min((left for _, left in known if left is not None), default=None)
-                self.wakes = math.inf if wait is None else time.monotonic() + wait
-                self.condition.wait(wait)
-
-
-class _Kennel:
-    """Holds the dog. A process that was forked has none of its parent's threads, and gets its own."""
-
-    def __init__(self) -> None:
-        self.renew()
-        if hasattr(os, "register_at_fork"):
-            os.register_at_fork(after_in_child=self.renew)
-
-    def renew(self) -> None:
-        self.dog = _Dog()
-
-
-_kennel = _Kennel()
+def net(effort: float) -> int:
+    """Milliseconds after which a question of so much effort hangs. Z3 sometimes misses its own limits altogether (seen:
+    84 s for 16 ms)."""
+    return int(1000 * HANGS_SECONDS + HANGS * effort)

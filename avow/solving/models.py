@@ -16,21 +16,7 @@ from typing import Any
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import TABLE_POINTS
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.language.terms import Variable
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
@@ -47,67 +33,64 @@ class Model:
 
     def value(self, variable: Variable) -> Value:
         """The value of a free variable. Raises Unsupported."""
-        if isinstance(variable.sort, FunctionSort):
+        if isinstance(variable.sort, s.FunctionSort):
             return self._function(variable, variable.sort)
-        return self._value(self._eval(self.translator.variable(variable)), variable.sort)
+        return self.read(self.translator.variable(variable), variable.sort)
 
     def values(self, variables: Iterable[Variable]) -> dict[Variable, Value]:
         """The values of some free variables. Raises Unsupported."""
         return {variable: self.value(variable) for variable in variables}
 
-    def read(self, expr: Expr, sort: Sort) -> Value:
+    def read(self, expr: Expr, sort: s.Sort) -> Value:
         """The value in this model of an expression of a sort. Raises Unsupported."""
-        return self._value(self._eval(expr), sort)
+        return self._value(self.evaluate(expr), sort)
 
     def evaluate(self, expr: Expr) -> Expr:
         """The solver's value of an expression in this model."""
-        return self._eval(expr)
-
-    def _eval(self, expr: Expr) -> Expr:
         return self.z3_model.eval(expr, model_completion=True)
 
-    def _value(self, expr: Expr, sort: Sort) -> Value:
+    def _value(self, expr: Expr, sort: s.Sort) -> Value:
         match sort:
-            case BoolSort():
+            case s.BoolSort():
                 if not (z3.is_true(expr) or z3.is_false(expr)):
                     raise Unsupported(f"a truth value that the solver left open: {expr}")
                 return bool(z3.is_true(expr))
-            case IntegerSort():
+            case s.IntegerSort():
                 return _integer(expr)
-            case NaturalSort():
+            case s.NaturalSort():
                 return max(0, _integer(expr))
-            case RealSort():
+            case s.RealSort():
                 return _fraction(expr)
-            case StringSort():
+            case s.StringSort():
                 return _string(expr)
-            case EnumSort(members=members):
+            case s.EnumSort(members=members):
                 index = self._constructor(expr, sort, len(members))
                 return Element(members[index])
-            case DataSort(constructors=constructors):
+            case s.DataSort(constructors=constructors):
                 index = self._constructor(expr, sort, len(constructors))
                 chosen = constructors[index]
                 fields = (self._value(expr.arg(k), p) for k, p in enumerate(chosen.parameters))
                 return Data(chosen.name, tuple(fields))
-            case TupleSort(items=items):
+            case s.TupleSort(items=items):
                 self._constructor(expr, sort, 1)
                 return tuple(self._value(expr.arg(k), item) for k, item in enumerate(items))
-            case SequenceSort(item=item):
+            case s.SequenceSort(item=item):
                 return SequenceValue(tuple(self._value(part, item) for part in _units(expr)))
-            case OpaqueSort(name=name):
+            case s.OpaqueSort(name=name):
                 universe = [u.sexpr() for u in self.z3_model.get_universe(self.translator.sort(sort)) or ()]
                 text = expr.sexpr()
                 return Opaque(name, universe.index(text) if text in universe else 0)
-            case FunctionSort() | SetSort():
+            case s.FunctionSort() | s.SetSort():
                 raise Unsupported("a function or set as part of another value")
 
-    def _constructor(self, expr: Expr, sort: Sort, count: int) -> int:
+    def _constructor(self, expr: Expr, sort: s.Sort, count: int) -> int:
         datatype = self.translator.sort(sort)
         for index in range(count):
             if z3.is_app(expr) and expr.decl().eq(datatype.constructor(index)):
                 return index
         raise Unsupported(f"a value that the solver left open: {expr}")
 
-    def _function(self, variable: Variable, sort: FunctionSort) -> FunctionValue:
+    def _function(self, variable: Variable, sort: s.FunctionSort) -> FunctionValue:
         interpretation = self.z3_model[self.translator.function(variable)]
         if not isinstance(interpretation, z3.FuncInterp) or not interpretation.f:
             return FunctionValue({}, default_value(sort.result))  # the model leaves it open: any function will do
@@ -120,56 +103,23 @@ class Model:
         default = self._otherwise(rest, sort, table)
         return FunctionValue({point: value for point, value in table.items() if value != default}, default)
 
-    def _otherwise(self, rest: Expr, sort: FunctionSort, table: dict[tuple[Value, ...], Value]) -> Value:
-        """The default, with the points that the rest's if-then-else tells apart added to the table."""
-        while rest is not None and z3.is_app_of(rest, z3.Z3_OP_ITE):
-            point = self._point(rest.arg(0), sort)
-            if point is None:
-                return self._sampled(rest, sort, table)
-            table.setdefault(point, self._value(self._eval(rest.arg(1)), sort.result))
-            rest = rest.arg(2)
+    def _otherwise(self, rest: Expr, sort: s.FunctionSort, table: dict[tuple[Value, ...], Value]) -> Value:
+        """The default. Where the rest tells arguments apart (``x == 1``, ``2 <= x``), its values at the points that are
+        named there are added to the table, and what its last branch yields is taken for the default."""
         if rest is None:
             return default_value(sort.result)
-        simple = self._eval(rest)
-        try:
-            return self._value(simple, sort.result)
-        except Unsupported:
-            return default_value(sort.result)
-
-    def _sampled(self, rest: Expr, sort: FunctionSort, table: dict[tuple[Value, ...], Value]) -> Value:
-        """The rest tells arguments apart by comparing them (``2 <= x``): its values at the points that are named there
-        are added to the table, and what its last branch yields is taken for the default."""
         places = _compared(rest, len(sort.parameters))
         if math.prod(map(len, places)) > TABLE_POINTS:
             return default_value(sort.result)
         try:
             for place in itertools.product(*places):
-                point = tuple(self._value(self._eval(a), p) for a, p in zip(place, sort.parameters, strict=True))
-                value = self._eval(z3.substitute_vars(rest, *place))
-                table.setdefault(point, self._value(value, sort.result))
+                point = tuple(self.read(a, p) for a, p in zip(place, sort.parameters, strict=True))
+                table.setdefault(point, self.read(z3.substitute_vars(rest, *place), sort.result))
             while z3.is_app_of(rest, z3.Z3_OP_ITE):
                 rest = rest.arg(2)
-            return self._value(self._eval(rest), sort.result)
+            return self.read(rest, sort.result)
         except Unsupported:
             return default_value(sort.result)
-
-    def _point(self, condition: Expr, sort: FunctionSort) -> tuple[Value, ...] | None:
-        fixed: dict[int, Expr] = {}
-        parts = condition.children() if z3.is_and(condition) else [condition]
-        for part in parts:
-            if not z3.is_eq(part):
-                return None
-            one, other = part.children()
-            variable, value = (one, other) if z3.is_var(one) else (other, one)
-            if not z3.is_var(variable):
-                return None
-            fixed[z3.get_var_index(variable)] = value
-        if set(fixed) != set(range(len(sort.parameters))):
-            return None
-        try:
-            return tuple(self._value(self._eval(fixed[k]), p) for k, p in enumerate(sort.parameters))
-        except Unsupported:
-            return None
 
 
 def _compared(expr: Expr, count: int) -> list[list[Expr]]:
@@ -184,36 +134,40 @@ def _compared(expr: Expr, count: int) -> list[list[Expr]]:
         stack.extend(part.children())
         if part.num_args() == 2 and z3.is_bool(part):
             for one, other in (part.children(), reversed(part.children())):
-                if z3.is_var(one) and not z3.is_var(other) and z3.is_const(other):
+                if z3.is_var(one) and _is_closed(other):
                     found[z3.get_var_index(one)][other.get_id()] = other
     return [list(values.values()) for values in found]
 
 
-def default_value(sort: Sort) -> Value:
+def _is_closed(expr: Expr) -> bool:
+    return bool(z3.is_app(expr)) and all(map(_is_closed, expr.children()))
+
+
+def default_value(sort: s.Sort) -> Value:
     """Some value of a sort: its simplest. Raises Unsupported."""
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return False
-        case IntegerSort() | NaturalSort():
+        case s.IntegerSort() | s.NaturalSort():
             return 0
-        case RealSort():
+        case s.RealSort():
             return Fraction(0)
-        case StringSort():
+        case s.StringSort():
             return ""
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return Element(members[0])
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             first = constructors[0]
             return Data(first.name, tuple(map(default_value, first.parameters)))
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return tuple(map(default_value, items))
-        case SequenceSort():
+        case s.SequenceSort():
             return SequenceValue(())
-        case OpaqueSort(name=name):
+        case s.OpaqueSort(name=name):
             return Opaque(name, 0)
-        case FunctionSort(result=result):
+        case s.FunctionSort(result=result):
             return FunctionValue({}, default_value(result))
-        case SetSort():
+        case s.SetSort():
             raise Unsupported("a set as a value")
 
 

@@ -15,31 +15,12 @@ from avow.base.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS, STEP
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
+from avow.language import terms as t
 from avow.language.operators import FLIPPED
 from avow.language.sorts import BOOL, INTEGER, REAL, BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Arithmetic,
-    Compare,
-    Conditional,
-    EnumValue,
-    Iff,
-    Implies,
-    Literal,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-    Widen,
-)
 from avow.solving.checking import charge, put
-from avow.solving.limits import watchdog
 from avow.solving.questions import entails, solve
-from avow.solving.translation import Expr, Translator, Unsupported
+from avow.solving.translation import Expr, Translator, Unsupported, same_session
 from avow.solving.z3_module import z3
 
 
@@ -47,25 +28,26 @@ from avow.solving.z3_module import z3
 class Remedy:
     """An assumption with which the goal follows. `weakest` says that no weaker one about these variables would do."""
 
-    assumption: Term
+    assumption: t.Term
     weakest: bool
 
 
+@same_session()
 def remedy(
-    hypotheses: Mapping[str, Term], goal: Term, about: Collection[Variable], *, effort: int = 5_000
+    hypotheses: Mapping[str, t.Term], goal: t.Term, about: Collection[t.Variable], *, effort: int = 5_000
 ) -> Remedy | None:
     """The weakest assumption about the variables `about` that makes the hypotheses imply the goal.
 
     None where there is none (it would contradict the hypotheses), or none can be found or read back in time. What is
     returned has been checked: with it the goal is proved, and it can hold together with the hypotheses.
     """
-    whole = Implies(conjunction(hypotheses.values()), goal)
+    whole = t.Implies(conjunction(hypotheses.values()), goal)
     others = sorted(free_variables(whole) - frozenset(about), key=lambda v: (v.qualified, repr(v.sort)))
     if not eliminable(whole):
         return None
-    renamed = {v: Variable(Role.BOUND, f"any {v.qualified}", v.sort) for v in others}
+    renamed = {v: t.Variable(t.Role.BOUND, f"any {v.qualified}", v.sort) for v in others}
     body = substitute(whole, renamed)
-    exact: Term = Quantified(Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
+    exact: t.Term = t.Quantified(t.Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
     try:
         raw = _eliminate(exact)
     except (Unsupported, z3.Z3Exception, RecursionError):  # what is too deep to be read back is no use to anyone
@@ -87,12 +69,12 @@ def remedy(
 ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
 
 
-def eliminable(term: Term) -> bool:
+def eliminable(term: t.Term) -> bool:
     """Whether all the term's free variables have sorts that `remedy` can do something with."""
     return all(isinstance(v.sort, ELIMINABLE) for v in free_variables(term))
 
 
-def eliminated(formula: Term) -> Term | None:
+def eliminated(formula: t.Term) -> t.Term | None:
     """A formula without quantifiers that should say the same; None where none is found. It is for the caller to have
     that confirmed: Z3's tactics have lost parts of a formula before."""
     try:
@@ -101,7 +83,7 @@ def eliminated(formula: Term) -> Term | None:
         return None
 
 
-def _eliminate(formula: Term) -> Term | None:
+def _eliminate(formula: t.Term) -> t.Term | None:
     translator = Translator()
     goal = z3.Goal(ctx=translator.context)
     goal.add(translator.term(formula))
@@ -111,13 +93,12 @@ def _eliminate(formula: Term) -> Term | None:
         z3.Tactic("ctx-simplify", ctx=translator.context),
         ctx=translator.context,
     )
-    solver, before = chain.solver(), translator.steps
+    solver, before = chain.solver(), translator.session.steps
     solver.add(goal.as_expr())
     put(translator, solver, ELIMINATION_STEPS / STEPS, None)  # to apply it has no limit of its own
-    if translator.steps - before >= ELIMINATION_STEPS:
+    if translator.session.steps - before >= ELIMINATION_STEPS:
         return None
-    with watchdog(ELIMINATION_SECONDS, translator.context.interrupt):
-        result = chain.apply(goal)
+    result = z3.TryFor(chain, 1000 * ELIMINATION_SECONDS, ctx=translator.context).apply(goal)
     charge(translator)
     free = {v.qualified: v for v in free_variables(formula)}
     reader = TermReader(translator, free)
@@ -125,15 +106,15 @@ def _eliminate(formula: Term) -> Term | None:
     return push_negations(disjunction(options))
 
 
-def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, effort: int) -> Term:
+def _simplified(term: t.Term, hypotheses: Mapping[str, t.Term], goal: t.Term, effort: int) -> t.Term:
     """Without the parts that the hypotheses make superfluous: alternatives that they exclude or that are stronger than
     another, conditions that they imply."""
     known = list(hypotheses.values())
     limit = min(effort, 1_000)
-    alternatives = list(term.items) if isinstance(term, Or) else [term]
-    kept: list[Term] = []
+    alternatives = list(term.items) if isinstance(term, t.Or) else [term]
+    kept: list[t.Term] = []
     for alternative in alternatives:
-        parts = list(alternative.items) if isinstance(alternative, And) else [alternative]
+        parts = list(alternative.items) if isinstance(alternative, t.And) else [alternative]
         if solve([*known, *parts], effort=limit).status == "unsat":
             continue
         for part in tuple(parts):
@@ -152,21 +133,21 @@ def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, effort: 
 class TermReader:
     """Z3 expressions, back to terms. Raises Unsupported for what has no counterpart."""
 
-    def __init__(self, translator: Translator, free: Mapping[str, Variable]) -> None:
+    def __init__(self, translator: Translator, free: Mapping[str, t.Variable]) -> None:
         self.free = free
-        self.members: dict[str, EnumValue] = {}
+        self.members: dict[str, t.EnumValue] = {}
         for variable in free.values():
             if isinstance(variable.sort, EnumSort):
                 datatype = translator.sort(variable.sort)
                 for k, member in enumerate(variable.sort.members):
-                    self.members[datatype.constructor(k).name()] = EnumValue(member, variable.sort)
+                    self.members[datatype.constructor(k).name()] = t.EnumValue(member, variable.sort)
 
-    def formula(self, expr: Expr) -> Term:
+    def formula(self, expr: Expr) -> t.Term:
         parts = expr.children() if z3.is_app(expr) else []
         if z3.is_true(expr):
-            return TRUE
+            return t.TRUE
         if z3.is_false(expr):
-            return FALSE
+            return t.FALSE
         if z3.is_not(expr):
             return negation(self.formula(parts[0]))
         if z3.is_and(expr):
@@ -174,10 +155,10 @@ class TermReader:
         if z3.is_or(expr):
             return disjunction(map(self.formula, parts))
         if z3.is_implies(expr):
-            return Implies(self.formula(parts[0]), self.formula(parts[1]))
+            return t.Implies(self.formula(parts[0]), self.formula(parts[1]))
         if z3.is_eq(expr) or z3.is_distinct(expr):
             if z3.is_bool(parts[0]):
-                same: Term = Iff(self.formula(parts[0]), self.formula(parts[1]))
+                same: t.Term = t.Iff(self.formula(parts[0]), self.formula(parts[1]))
                 return same if z3.is_eq(expr) else negation(same)
             return self._compare("==" if z3.is_eq(expr) else "!=", expr)
         for test, operator in ((z3.is_le, "<="), (z3.is_lt, "<"), (z3.is_ge, ">="), (z3.is_gt, ">")):
@@ -186,24 +167,24 @@ class TermReader:
         if z3.is_app_of(expr, z3.Z3_OP_DT_IS):
             member = self.members.get(expr.decl().params()[0].name())
             if member is not None:
-                return Compare("==", self.term(parts[0]), member)
+                return t.Compare("==", self.term(parts[0]), member)
         if z3.is_const(expr) and z3.is_bool(expr) and expr.decl().name() in self.free:
             return self.free[expr.decl().name()]
         raise Unsupported(f"the condition {expr}")
 
-    def _compare(self, operator: str, expr: Expr) -> Term:
+    def _compare(self, operator: str, expr: Expr) -> t.Term:
         left, right = (self.term(part) for part in expr.children())
         if isinstance(left.sort, RealSort) != isinstance(right.sort, RealSort):
             left, right = _widened(left), _widened(right)
-        if isinstance(right, Variable) and not isinstance(left, Variable):
+        if isinstance(right, t.Variable) and not isinstance(left, t.Variable):
             left, right, operator = right, left, FLIPPED.get(operator, operator)
-        return Compare(operator, left, right)
+        return t.Compare(operator, left, right)
 
-    def term(self, expr: Expr) -> Term:
+    def term(self, expr: Expr) -> t.Term:
         if z3.is_int_value(expr):
-            return Literal(int(expr.as_long()), INTEGER)
+            return t.Literal(int(expr.as_long()), INTEGER)
         if z3.is_rational_value(expr):
-            return Literal(Fraction(expr.numerator_as_long(), expr.denominator_as_long()), REAL)
+            return t.Literal(Fraction(expr.numerator_as_long(), expr.denominator_as_long()), REAL)
         if z3.is_const(expr):
             name = expr.decl().name()
             if name in self.free:
@@ -218,7 +199,7 @@ class TermReader:
             sort = REAL if z3.is_real(expr) else INTEGER
             if sort == REAL:
                 then, otherwise = _widened(then), _widened(otherwise)
-            return Conditional(self.formula(condition), then, otherwise, sort)
+            return t.Conditional(self.formula(condition), then, otherwise, sort)
         for test, operator in ((z3.is_add, "+"), (z3.is_sub, "-"), (z3.is_mul, "*")):
             if test(expr):
                 first, *rest = (self.term(part) for part in expr.children())
@@ -229,19 +210,19 @@ class TermReader:
         raise Unsupported(f"the term {expr}")
 
 
-def _arithmetic(operator: str, left: Term, right: Term, sort: RealSort | IntegerSort) -> Term:
-    if operator == "+" and isinstance(right, Arithmetic) and right.operator == "*" and _is_minus_one(right.left):
-        return Arithmetic("-", left, right.right, sort)
-    return Arithmetic(operator, left, right, sort)
+def _arithmetic(operator: str, left: t.Term, right: t.Term, sort: RealSort | IntegerSort) -> t.Term:
+    if operator == "+" and isinstance(right, t.Arithmetic) and right.operator == "*" and _is_minus_one(right.left):
+        return t.Arithmetic("-", left, right.right, sort)
+    return t.Arithmetic(operator, left, right, sort)
 
 
-def _is_minus_one(term: Term) -> bool:
-    return isinstance(term, Literal) and term.sort != BOOL and term.value == -1
+def _is_minus_one(term: t.Term) -> bool:
+    return isinstance(term, t.Literal) and term.sort != BOOL and term.value == -1
 
 
-def _widened(term: Term) -> Term:
+def _widened(term: t.Term) -> t.Term:
     if isinstance(term.sort, RealSort):
         return term
-    if isinstance(term, Literal) and not isinstance(term.value, str):
-        return Literal(Fraction(term.value), REAL)
-    return Widen(term, REAL)
+    if isinstance(term, t.Literal) and not isinstance(term.value, str):
+        return t.Literal(Fraction(term.value), REAL)
+    return t.Widen(term, REAL)

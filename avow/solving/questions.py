@@ -36,11 +36,12 @@ from avow.language.definedness import defined
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort, SequenceSort
 from avow.language.subterms import subterms
 from avow.language.terms import Apply, Quantified, Term, Variable
+from avow.solving import smtlib
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers
 from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
 from avow.solving.replay import is_partial, replay
-from avow.solving.translation import Expr, Meaning, Translator, Unsupported
+from avow.solving.translation import Expr, Meaning, Translator, Unsupported, same_session
 from avow.solving.z3_module import z3
 
 
@@ -118,7 +119,7 @@ def solve(
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
     granted = allowed(effort)
-    with budget(effort * QUESTION_SHARE):
+    with same_session(), budget(effort * QUESTION_SHARE):
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
         asked = _Asked(labelled, free, given or {}, effort, seed, values != "unused")
@@ -193,7 +194,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
             values = _read(one.model, free) if one.model is not None else None
             if values is None or (simple and not all(map(_is_simple, values.values()))):
                 continue
-            if replay(labelled.values(), {**values, **given}, beside=translator):
+            if replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values, engine=engine)
         return None
 
@@ -220,7 +221,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
         if functions:
             limit = max(1, int(effort * tables))
             found = search_tables(translator, build, ordinary, functions, effort=limit, seed=seed)
-            if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
+            if found is not None and replay(labelled.values(), {**found, **given}):
                 return Solution("sat", found, engine="z3, functions as tables")
             solution = replayed(answer, "z3", simple=False)
         else:
@@ -247,7 +248,7 @@ def _within_bounds(asked: _Asked) -> Solution | None:
     found = _solve(translator, within)
     if found.status == "sat":
         values = flat.values(found.values) if flat else found.values
-        if values is not None and replay(labelled.values(), {**values, **asked.given}, beside=translator):
+        if values is not None and replay(labelled.values(), {**values, **asked.given}):
             return Solution("sat", values, engine=found.engine)
     if flat is None:
         return None
@@ -377,8 +378,6 @@ def _with_tables(
 
 def _second_opinion(labelled: Mapping[str, Term], effort: int) -> Solution | None:
     """cvc5, if it is installed: only its `unsat` counts, since its models are not read."""
-    from avow.solving import smtlib
-
     try:
         script = smtlib.formulas_script(labelled)
     except Unsupported:

@@ -11,7 +11,7 @@ from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Quantified, Term, Variable
 from avow.solving.checking import Engine, check
 from avow.solving.limits import allowed
-from avow.solving.translation import Translator, Unsupported
+from avow.solving.translation import Translator, Unsupported, same_session
 from avow.solving.z3_module import z3
 
 
@@ -20,27 +20,26 @@ def replay(
     values: Mapping[Variable, Value],
     *,
     effort: int = 5_000,
-    beside: Translator | None = None,
 ) -> bool | None:
     """Do the formulas hold of these values, whatever partial operations yield outside their domains?
 
     True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
-    sort has the elements that the values name, and up to three more if the formulas hold only then. A translator of the
-    same formulas, if there is one, lends its context.
+    sort has the elements that the values name, and up to three more if the formulas hold only then.
     """
     if not allowed(effort):
         return None
     formulas = tuple(formulas)
     unspecified = sorted({sort for f in formulas for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
-    try:
-        if beside and not unspecified and _is_seen(beside, formulas, values):
-            return True
-        for more in range(4 if unspecified else 1):
-            found = _replay(Translator(beside), formulas, values, unspecified, more, effort)
-            if found or not unspecified:
-                return found
-    except (Unsupported, z3.Z3Exception):
-        pass
+    with same_session():
+        try:
+            if not unspecified and _is_seen(Translator(), formulas, values):
+                return True
+            for more in range(4 if unspecified else 1):
+                found = _replay(Translator(), formulas, values, unspecified, more, effort)
+                if found or not unspecified:
+                    return found
+        except (Unsupported, z3.Z3Exception):
+            pass
     return None
 
 

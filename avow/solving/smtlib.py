@@ -11,27 +11,22 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
-from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
+from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.tuning.effort import CVC5_EFFORT_A_SECOND, CVC5_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cells import compile_node
-from avow.language.contract import Contract
+from avow.language.contract import Contract, Partial
 from avow.language.printer import show_term
 from avow.language.terms import Term
-from avow.solving.limits import net
-from avow.solving.question_process import Answering, NoAnswer
+from avow.solving.apart import Apart, NoAnswer
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.solving.z3_sorts import Sorts
 
 
-def formulas_script(
-    formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "", beside: Sorts | None = None
-) -> str:
-    """A script that asks whether the formulas hold together; each is named by its label. `beside`: in whose context it
-    is made, where there are many. Raises Unsupported."""
+def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
+    """A script that asks whether the formulas hold together; each is named by its label. Raises Unsupported."""
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
-    translator = Translator(beside)
+    translator = Translator()
     free = frozenset(v for formula in labelled.values() for v in free_variables(formula))
     background = translator.background(free)
     named = [(label, translator.term(formula)) for label, formula in labelled.items()]
@@ -86,47 +81,55 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
     cannot read the script. Its own steps are counted, as Z3's are; the clock only ends what hangs."""
     if importlib.util.find_spec("cvc5") is None:
         return None
-    steps, seconds = max(1, effort * CVC5_STEPS), net(effort) + CVC5_START_SECONDS
+    seconds = CVC5_SECONDS + effort / CVC5_EFFORT_A_SECOND
     for _ in range(2):  # another process may have been ended by somebody else
         try:
-            found, _ = _cvc5.ask(("cvc5", script, steps), tuple[str, int], seconds)
+            return CVC5.ask(script, max(1, effort * CVC5_STEPS), seconds)[0] or None
         except TimeoutError:
             return "unknown"
         except NoAnswer:
             continue
-        return found or None
     return None
 
 
-_cvc5 = Answering("avow.solving.apart")
+CVC5 = Apart("cvc5")
 
 
-def end_cvc5() -> None:
-    """End the process that answers for it; the next question starts another."""
-    _cvc5.close()
-
-
-def to_smtlib(contract: Contract) -> str:
+def to_smtlib(contract: Contract) -> Partial:
     """One script, which asks of each node whether its assumptions and guarantees can hold together; between nodes the
     solver is reset. Of clauses that speak of other steps it is one step, whatever was before: what is remembered are
-    constants, and what the step leaves is said by an equation for each; first values are told in the comment. Raises
-    `Rejected` where SMT-LIB cannot say a formula."""
-    scripts = []
+    constants, and what the step leaves is said by an equation for each; first values are told in the comment. A clause
+    that SMT-LIB cannot say is left out, and named."""
+    scripts: list[str] = []
+    missing: list[Diagnostic] = []
     for node in contract.nodes:
         compiled = compile_node(node)
-        for name, unsaid in compiled.unsaid.items():
-            message = f"node `{node.name}` has no SMT-LIB form: {name} speaks of {unsaid.reason}"
-            raise Rejected(Diagnostic("SMT001", message, node.clause(name).span))
-        formulas = {clause.name: clause.formula for clause in compiled.node.clauses}
-        comment = f"node {node.name}: {', '.join(formulas)}"
+        refused = {name: f"it speaks of {unsaid.reason}" for name, unsaid in compiled.unsaid.items()}
+        formulas = {c.name: c.formula for c in compiled.node.clauses if c.name not in refused}
+        comment = ""
         for cell in compiled.cells:
             formulas[f"next {cell.name}"] = cell.leaves(replace(cell.before, name=f"{cell.name}'"))
             first = " ".join(show_term(cell.begins(), "rcl").split())
             comment += f"\nbefore the first step: {first}" if cell.initial is not None else ""
-        try:
-            scripts.append(formulas_script(formulas, comment=comment))
-        except Unsupported as unsupported:
-            raise Rejected(
-                Diagnostic("SMT001", f"node `{node.name}` has no SMT-LIB form: {unsupported}", node.span)
-            ) from None
-    return "(reset)\n".join(scripts)
+        refused |= {name: why for name, formula in formulas.items() if (why := _unsaid(formula))}
+        said = {name: formula for name, formula in formulas.items() if name not in refused}
+        names = ", ".join(clause.name for clause in node.clauses if clause.name in said)
+        if names:
+            scripts.append(formulas_script(said, comment=f"node {node.name}: {names}{comment}"))
+        clauses = {clause.name: clause.span for clause in node.clauses}
+        missing += [
+            Diagnostic(
+                "SMT001", f"{node.name}.{name} is left out: {why}", clauses.get(name, node.span), Severity.WARNING
+            )
+            for name, why in refused.items()
+        ]
+    return Partial("(reset)\n".join(scripts), tuple(missing))
+
+
+def _unsaid(formula: Term) -> str:
+    """Why SMT-LIB cannot say a formula; empty where it can."""
+    try:
+        formulas_script([formula])
+    except Unsupported as unsupported:
+        return str(unsupported)
+    return ""

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
+from avow.base.tuning.bounds import QUESTIONS_KEPT
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
-from avow.language.sorts import (
-    INTEGER,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
+from avow.language.terms import Term, Variable
 from avow.solving.z3_module import z3
 
 Expr = Any
@@ -45,69 +36,120 @@ class Unsupported(Exception):  # noqa: N818 - it names what happened
         self.span = span
 
 
-def _whole(sort: Sort) -> Sort:
+def _whole(sort: s.Sort) -> s.Sort:
     """The sort with INTEGER for NATURAL inside tuples and sequences: RCL compares ``(1, n)`` with ``(1, i)``, so that
     both must be of one Z3 sort. Which of its values are naturals, `member` says. A record is the tuple of its items."""
     match sort:
-        case NaturalSort():
-            return INTEGER
-        case TupleSort(items=items):
-            return TupleSort(tuple(map(_whole, items)))
-        case SequenceSort(item=item):
-            return SequenceSort(_whole(item))
+        case s.NaturalSort():
+            return s.INTEGER
+        case s.TupleSort(items=items):
+            return s.TupleSort(tuple(map(_whole, items)))
+        case s.SequenceSort(item=item):
+            return s.SequenceSort(_whole(item))
     return sort
 
 
-class Sorts:
-    """The Z3 sorts of one context, which of their values are members of RCL's sorts, and concrete values.
+@dataclass(slots=True, eq=False)
+class Session:
+    """A Z3 context, with the sorts, constants and formulas that were made in it: each is made once."""
 
-    `beside` another one, its context and sorts are used, and nothing else of it: a context costs more than most
-    questions.
+    context: Any = field(default_factory=lambda: z3.Context())
+    sorts: dict[s.Sort, Any] = field(default_factory=dict)
+    names: dict[str, s.Sort] = field(default_factory=dict)
+    constants: dict[Variable, Any] = field(default_factory=dict)
+    """Free variables as constants, or as functions."""
+    formulas: dict[int, tuple[Term, Expr]] = field(default_factory=dict)
+    """By the formula's identity, as formulas are deep."""
+    steps: int = 0
+    """Z3's steps in the context, as last counted."""
+
+
+_session: ContextVar[Session | None] = ContextVar("session", default=None)
+
+
+@contextmanager
+def new_session() -> Iterator[None]:
+    """Within the block all questions of this thread are asked in one new Z3 context, each of a solver of its own.
+
+    A context takes 16 MB and 8 ms, more than most questions. What a solver does depends a little on what else its
+    context holds. So a session is for questions that are always asked together, in the same order (the claims of a
+    node), and no longer: else an answer could depend on what was asked before it.
     """
+    before = _session.set(Session())
+    try:
+        yield
+    finally:
+        _session.reset(before)
 
-    def __init__(self, beside: Sorts | None = None) -> None:
-        self.context: Any = beside.context if beside else z3.Context()
-        self._sorts: dict[Sort, Any] = beside._sorts if beside else {}
-        self._names: dict[str, Sort] = beside._names if beside else {}
+
+@contextmanager
+def same_session() -> Iterator[None]:
+    """The session that there is, or a new one for the block."""
+    if _session.get() is not None:
+        yield
+        return
+    with new_session():
+        yield
+
+
+class _Kept(threading.local):
+    """A session of each thread."""
+
+    session: Session | None = None
+    questions = 0
+
+
+_kept = _Kept()
+
+
+@contextmanager
+def kept_session() -> Iterator[None]:
+    """A session that lasts for many blocks: for questions in any number of which each has one answer, and is easy."""
+    if _kept.session is None or _kept.questions >= QUESTIONS_KEPT:
+        _kept.session, _kept.questions = Session(), 0
+    _kept.questions += 1
+    before = _session.set(_kept.session)
+    try:
+        yield
+    finally:
+        _session.reset(before)
+
+
+class Sorts:
+    """The Z3 sorts of a session, which of their values are members of RCL's sorts, and concrete values."""
+
+    def __init__(self) -> None:
+        self.session = _session.get() or Session()
+        self.context: Any = self.session.context
         self._opaque: dict[tuple[str, int], Expr] = {}
         self._count = 0
-        self._counted: list[int] = beside._counted if beside else [0]
-
-    @property
-    def steps(self) -> int:
-        """Z3's steps in this context, as last counted."""
-        return self._counted[0]
-
-    @steps.setter
-    def steps(self, count: int) -> None:
-        self._counted[0] = count
 
     # -- sorts ---------------------------------------------------------------------------------------------------------
 
-    def sort(self, sort: Sort) -> Any:
+    def sort(self, sort: s.Sort) -> Any:
         """The Z3 sort of values of `sort`; of a function sort, an array sort. Raises Unsupported."""
         sort = _whole(sort)
-        if sort not in self._sorts:
-            self._sorts[sort] = self._make_sort(sort)
-        return self._sorts[sort]
+        if sort not in self.session.sorts:
+            self.session.sorts[sort] = self._make_sort(sort)
+        return self.session.sorts[sort]
 
-    def _make_sort(self, sort: Sort) -> Any:
+    def _make_sort(self, sort: s.Sort) -> Any:
         match sort:
-            case BoolSort():
+            case s.BoolSort():
                 return z3.BoolSort(self.context)
-            case RealSort():
+            case s.RealSort():
                 return z3.RealSort(self.context)
-            case IntegerSort() | NaturalSort():
+            case s.IntegerSort() | s.NaturalSort():
                 return z3.IntSort(self.context)
-            case StringSort():
+            case s.StringSort():
                 return z3.StringSort(self.context)
-            case EnumSort(members=members):
+            case s.EnumSort(members=members):
                 name = self._sort_name(sort.name, sort)
                 datatype = z3.Datatype(f"sort.{name}", ctx=self.context)
                 for member in members:
                     datatype.declare(f"{name}.{member}")
                 return datatype.create()
-            case DataSort(constructors=constructors):
+            case s.DataSort(constructors=constructors):
                 name = self._sort_name(sort.name, sort)
                 datatype = z3.Datatype(f"sort.{name}", ctx=self.context)
                 for constructor in constructors:
@@ -117,42 +159,42 @@ class Sorts:
                     ]
                     datatype.declare(f"{name}.{constructor.name}", *fields)
                 return datatype.create()
-            case OpaqueSort():
+            case s.OpaqueSort():
                 return z3.DeclareSort(f"sort.{self._sort_name(sort.name, sort)}", ctx=self.context)
-            case TupleSort(items=items):
+            case s.TupleSort(items=items):
                 name = self._sort_name("tuple", sort)
                 datatype = z3.Datatype(f"sort.{name}", ctx=self.context)
                 fields = [(f"{name}.{k}", self.field(item)) for k, item in enumerate(items)]
                 datatype.declare(f"{name}.of", *fields)
                 return datatype.create()
-            case SequenceSort(item=item):
+            case s.SequenceSort(item=item):
                 return z3.SeqSort(self.field(item))
-            case FunctionSort(parameters=parameters, result=result):
+            case s.FunctionSort(parameters=parameters, result=result):
                 return z3.ArraySort(*(self.field(p) for p in parameters), self.field(result))
-            case SetSort():
+            case s.SetSort():
                 raise Unsupported("a set outside the right-hand side of `in`")
 
-    def field(self, sort: Sort) -> Any:
-        if isinstance(sort, FunctionSort | SetSort):
+    def field(self, sort: s.Sort) -> Any:
+        if isinstance(sort, s.FunctionSort | s.SetSort):
             # Array equality would compare functions on arguments that are not members (negative naturals).
             raise Unsupported("a function or set as part of another value")
         return self.sort(sort)
 
-    def _sort_name(self, name: str, sort: Sort) -> str:
+    def _sort_name(self, name: str, sort: s.Sort) -> str:
         candidate = name
-        while self._names.setdefault(candidate, sort) != sort:
+        while self.session.names.setdefault(candidate, sort) != sort:
             candidate += "_"
         return candidate
 
-    def member(self, sort: Sort, expr: Expr) -> Expr | None:
+    def member(self, sort: s.Sort, expr: Expr) -> Expr | None:
         """That a Z3 value is a value of the sort (its naturals are not negative); None where every one is."""
         match sort:
-            case NaturalSort():
+            case s.NaturalSort():
                 return expr >= 0
-            case TupleSort(items=items):
+            case s.TupleSort(items=items):
                 datatype = self.sort(sort)
                 return self.all_of(self.member(item, datatype.accessor(0, k)(expr)) for k, item in enumerate(items))
-            case DataSort(constructors=constructors):
+            case s.DataSort(constructors=constructors):
                 datatype = self.sort(sort)
                 cases = []
                 for c, constructor in enumerate(constructors):
@@ -163,49 +205,57 @@ class Sorts:
                     if inside is not None:
                         cases.append(z3.Implies(datatype.recognizer(c)(expr), inside))
                 return self.all_of(cases)
-            case SequenceSort(item=item):
-                at = self.fresh("k", IntegerSort())
+            case s.SequenceSort(item=item):
+                at = self.fresh("k", s.IntegerSort())
                 inside = self.member(item, expr[at])
                 if inside is None:
                     return None
                 return z3.ForAll([at], z3.Implies(z3.And(at >= 0, at < z3.Length(expr)), inside))
-            case FunctionSort():
+            case s.FunctionSort():
                 return self.function_member(sort, lambda *arguments: z3.Select(expr, *arguments))
-            case BoolSort() | RealSort() | IntegerSort() | StringSort() | EnumSort() | OpaqueSort() | SetSort():
+            case (
+                s.BoolSort()
+                | s.RealSort()
+                | s.IntegerSort()
+                | s.StringSort()
+                | s.EnumSort()
+                | s.OpaqueSort()
+                | s.SetSort()
+            ):
                 # every value of its Z3 sort is one of it
                 return None
             case _:
                 assert_never(sort)
 
-    def clamped(self, expr: Expr, sort: Sort) -> Expr:
+    def clamped(self, expr: Expr, sort: s.Sort) -> Expr:
         """The expression where it is a value of the sort, else some value of the sort that depends on it alone."""
         match sort:
-            case NaturalSort():
+            case s.NaturalSort():
                 return z3.If(expr >= 0, expr, z3.IntVal(0, self.context))
-            case TupleSort(items=items) if self.member(sort, expr) is not None:
+            case s.TupleSort(items=items) if self.member(sort, expr) is not None:
                 datatype = self.sort(sort)
                 parts = (self.clamped(datatype.accessor(0, k)(expr), item) for k, item in enumerate(items))
                 return datatype.constructor(0)(*parts)
-            case DataSort(constructors=constructors) if self.member(sort, expr) is not None:
+            case s.DataSort(constructors=constructors) if self.member(sort, expr) is not None:
                 datatype, value = self.sort(sort), expr
                 for c, constructor in enumerate(constructors):
                     fields = enumerate(constructor.parameters)
                     made = (self.clamped(datatype.accessor(c, k)(expr), parameter) for k, parameter in fields)
                     value = z3.If(datatype.recognizer(c)(expr), datatype.constructor(c)(*made), value)
                 return value
-            case SequenceSort() if (inside := self.member(sort, expr)) is not None:
+            case s.SequenceSort() if (inside := self.member(sort, expr)) is not None:
                 return z3.If(inside, expr, z3.Empty(self.sort(sort)))
-            case FunctionSort() | SetSort():
+            case s.FunctionSort() | s.SetSort():
                 raise Unsupported("a function or set as part of another value")
             case (
-                BoolSort() | RealSort() | IntegerSort() | StringSort() | EnumSort() | OpaqueSort()
-                | TupleSort() | DataSort() | SequenceSort()
+                s.BoolSort() | s.RealSort() | s.IntegerSort() | s.StringSort() | s.EnumSort() | s.OpaqueSort()
+                | s.TupleSort() | s.DataSort() | s.SequenceSort()
             ):  # fmt: skip
                 return expr  # every value of its Z3 sort is one of it
             case _:
                 assert_never(sort)
 
-    def function_member(self, sort: FunctionSort, function: Callable[..., Expr]) -> Expr | None:
+    def function_member(self, sort: s.FunctionSort, function: Callable[..., Expr]) -> Expr | None:
         arguments = [self.fresh("k", parameter) for parameter in sort.parameters]
         inside = self.member(sort.result, function(*arguments))
         if inside is None:
@@ -222,7 +272,7 @@ class Sorts:
     def true(self) -> Expr:
         return z3.BoolVal(True, self.context)
 
-    def fresh(self, name: str, sort: Sort) -> Expr:
+    def fresh(self, name: str, sort: s.Sort) -> Expr:
         """A new constant that no other question knows."""
         self._count += 1
         return z3.Const(f"{name}!{self._count}", self.sort(sort))
@@ -239,38 +289,40 @@ class Sorts:
 
     # -- concrete values -----------------------------------------------------------------------------------------------
 
-    def value(self, value: Value, sort: Sort) -> Meaning:
+    def value(self, value: Value, sort: s.Sort) -> Meaning:
         """A concrete value of a sort, as a meaning for a variable of that sort. Raises Unsupported."""
         match sort:
-            case FunctionSort() if isinstance(value, FunctionValue):
+            case s.FunctionSort() if isinstance(value, FunctionValue):
                 return self._table(value, sort)
-            case RealSort() if isinstance(value, int | Fraction):
+            case s.RealSort() if isinstance(value, int | Fraction):
                 return self.real(Fraction(value))
-            case BoolSort():
+            case s.BoolSort():
                 return z3.BoolVal(bool(value), self.context)
-            case IntegerSort() | NaturalSort() if isinstance(value, int):
+            case s.IntegerSort() | s.NaturalSort() if isinstance(value, int):
                 return z3.IntVal(value, self.context)
-            case StringSort() if isinstance(value, str):
+            case s.StringSort() if isinstance(value, str):
                 return self.string(value)
-            case EnumSort(members=members) if isinstance(value, Element):
+            case s.EnumSort(members=members) if isinstance(value, Element):
                 return self.sort(sort).constructor(members.index(value.name))()
-            case DataSort(constructors=constructors) if isinstance(value, Data):
+            case s.DataSort(constructors=constructors) if isinstance(value, Data):
                 index = next(k for k, c in enumerate(constructors) if c.name == value.constructor)
                 parameters = constructors[index].parameters
                 fields = [self.value(a, p) for a, p in zip(value.arguments, parameters, strict=True)]
                 return self.sort(sort).constructor(index)(*fields)
-            case TupleSort(items=items) if isinstance(value, tuple):
-                return self.sort(sort).constructor(0)(*(self.value(v, s) for v, s in zip(value, items, strict=True)))
-            case SequenceSort(item=item) if isinstance(value, SequenceValue):
+            case s.TupleSort(items=items) if isinstance(value, tuple):
+                return self.sort(sort).constructor(0)(
+                    *(self.value(v, part) for v, part in zip(value, items, strict=True))
+                )
+            case s.SequenceSort(item=item) if isinstance(value, SequenceValue):
                 return self.sequence([z3.Unit(self.value(v, item)) for v in value.items], sort)
-            case OpaqueSort(name=name) if isinstance(value, Opaque):
+            case s.OpaqueSort(name=name) if isinstance(value, Opaque):
                 key = (name, value.index)
                 if key not in self._opaque:
                     self._opaque[key] = z3.Const(f"{name}#{value.index}", self.sort(sort))
                 return self._opaque[key]
         raise Unsupported(f"the value {value} of a {type(sort).__name__}")
 
-    def add_elements(self, sort: OpaqueSort, more: int) -> None:
+    def add_elements(self, sort: s.OpaqueSort, more: int) -> None:
         """Name further elements of an unspecified sort: at least one in all, and `more` than the values did."""
         used = [index for name, index in self._opaque if name == sort.name]
         first = max(used, default=-1) + 1
@@ -294,7 +346,7 @@ class Sorts:
                 facts.append(z3.Distinct(constants))
         return facts
 
-    def _table(self, value: FunctionValue, sort: FunctionSort) -> Callable[..., Expr]:
+    def _table(self, value: FunctionValue, sort: s.FunctionSort) -> Callable[..., Expr]:
         points = [
             ([self.value(a, p) for a, p in zip(point, sort.parameters, strict=True)], self.value(result, sort.result))
             for point, result in value.table.items()
@@ -314,7 +366,7 @@ class Sorts:
 
         return function
 
-    def sequence(self, units: Sequence[Expr], sort: SequenceSort) -> Expr:
+    def sequence(self, units: Sequence[Expr], sort: s.SequenceSort) -> Expr:
         if not units:
             return z3.Empty(self.sort(sort))
         return units[0] if len(units) == 1 else z3.Concat(*units)

@@ -9,14 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.base.files import inside
+from avow.base.files import inside, read_regular
 from avow.base.suggestions import suggest
 from avow.base.workspace import find_workspace
 from avow.language.contract import Contract, Node
-from avow.ros.launch import Launched, Started, read_launch
+from avow.ros.launch import Launched, Setting, Started, read_launch
 from avow.ros.names import Placed, Resolver
+from avow.ros.parameters import WrongParameters, flat, is_sectioned, of_node
+from avow.system.node_plan import parameters
 from avow.system.plan import Plan, System
 from avow.system.strict_yaml import Piece
 
@@ -62,11 +67,70 @@ def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...
         launched = _launched(plan, node, mine, faults)
         faults += _doubted(plan, node, mine, launched)
         if launched is not None:
-            faults += _disagreements(node, mine, launched)
+            faults += (*_disagreements(node, mine, launched), *_parameters(plan, node, launched))
             remaps = (*launched.remaps, *(mine.remaps if launched.unread else ()))
-            placed[node.name] = Placed(launched.name, remaps, launched.span, True)
+            placed[node.name] = Placed(launched.name, remaps, launched.span, True, True)
     names = Resolver(tuple(placed.items()))
     return replace(plan, ros=replace(plan.ros, names=names)), tuple(faults)
+
+
+def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnostic]:
+    """Where a node is started with other parameters than the plan's, with which its class is examined."""
+    source = next((entry.source for entry in plan.nodes if entry.node == node.name), None)
+    if source is None or not source.python:
+        return
+    mine, wrong = parameters(plan.root, source, launched.name)
+    if wrong:
+        return  # told where the class is examined
+    here = dict(flat(mine))
+    there, unread = _started_with(launched)
+    for name, (value, span) in there.items():
+        if here.get(name) != value or isinstance(here[name], bool) is not isinstance(value, bool):
+            said = f"the plan says {here[name]!r}" if name in here else "the plan does not set it"
+            message = f"{node.name} is started with {name} = {value!r}, and {said}"
+            hint = "write what the robot is started with into the file that the plan names:  source: {parameters: …}"
+            yield Diagnostic(
+                "ROS127", message, source.place.at("source", "parameters"), hint=hint, notes=((_at(span), span),)
+            )
+    for name in sorted(here.keys() - there.keys()) if there and not unread else ():
+        message = f"the plan sets {name} of {node.name}, and {_at(launched.span)} starts it without"
+        yield Diagnostic(
+            "ROS127", message, source.place.at("source", "parameters"), hint="leave it out, or launch with it"
+        )
+
+
+def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
+    """What a launch file surely sets for a node, and what it sets that is not read."""
+    there: dict[str, tuple[Any, Span]] = {}
+    unread: list[Diagnostic] = []
+    for setting in launched.parameters:
+        try:
+            there |= {name: (value, setting.span) for name, value in _set(setting, launched.name)}
+        except (OSError, ValueError, yaml.YAMLError, WrongParameters) as error:
+            what = setting.name or setting.value or "a file"
+            message = f"{launched.name} is started with the parameters of {what}, which are not read: {error}"
+            if setting.name:
+                message = f"{launched.name} is started with the parameter {what}, which is not read: {error}"
+                there.pop(what, None)
+            else:
+                there.clear()  # it may set any of them
+            hint = "see to it yourself that the plan's `source: {parameters: …}` has the same"
+            unread.append(Diagnostic("ROS121", message, setting.span, Severity.WARNING, hint))
+    return there, tuple(unread)
+
+
+def _set(setting: Setting, node: str) -> Iterator[tuple[str, Any]]:
+    """What a launch file's parameter, or file of parameters, sets. Raises OSError, ValueError, YAMLError and
+    WrongParameters."""
+    if not setting.value:
+        raise ValueError("its value is known only when it is launched")
+    if setting.name:
+        yield setting.name, yaml.safe_load(setting.value)
+    elif not Path(setting.value).is_absolute():
+        raise ValueError("a relative path depends on the folder in which `ros2 launch` runs")
+    else:
+        data = yaml.safe_load(read_regular(Path(setting.value)))
+        yield from (of_node(data, node) if is_sectioned(data) else dict(flat(data or {}))).items()
 
 
 def told(system: System) -> Iterator[Diagnostic]:
@@ -86,6 +150,8 @@ def told(system: System) -> Iterator[Diagnostic]:
         if one is not None:
             known[one.name] = node.name
             yield _runs(node, placed, one)
+            if any(entry.node == node.name and entry.source and entry.source.python for entry in system.plan.nodes):
+                yield from _started_with(one)[1]
         elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
             message = f"no launch file starts {node.name}"
             names = [s.name for s in launched.nodes if s.name]

@@ -38,7 +38,9 @@ def completed(plan: Plan, contract: Contract) -> System:
 
     def taken_on(entry: NodePlan, method: Method) -> Method:
         own = known[entry.node].guarantees if entry.node in known else ()
-        return method if method.guarantees else replace(method, guarantees=tuple(clause.name for clause in own))
+        return (
+            method if method.guarantees else replace(method, guarantees=tuple(c.name for c in own if not c.unwritten))
+        )
 
     nodes = tuple(replace(e, methods=tuple(taken_on(e, method) for method in e.methods)) for e in plan.nodes)
     return System(replace(plan, nodes=nodes, requirements=requirements), contract)

@@ -10,24 +10,14 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import exact
 from avow.base.suggestions import suggest
 from avow.base.tuning.bounds import VALUES_LOOKED_AT
+from avow.language import sorts as s
 from avow.language.contract import Contract, Node, Port
 from avow.language.load import parse_term
 from avow.language.printer import show_type
-from avow.language.sorts import (
-    BOOL,
-    BUILTINS,
-    REAL,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.system.hazards import check_mitigations
 from avow.system.node_plan import check_memory
 from avow.system.plan import STEP_LENGTH, Plan
+from avow.system.statements import GENERAL
 from avow.system.strict_yaml import Piece
 
 _FORMER = {
@@ -60,7 +50,8 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_running(root, nodes),
         *_scenario(plan, root, contract, nodes),
         *_findings(root, nodes),
-        *_suppositions(plan, root),
+        *_assumptions(plan, root),
+        *check_mitigations(plan, nodes),
         *check_memory(plan, nodes),
     )
 
@@ -128,13 +119,14 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
                 yield _unknown(where, item.text, [f"{owner}.{g.name}" for g in nodes[owner].guarantees], item.span)
 
 
-def _suppositions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
+def _assumptions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
     methods = sorted({"compose", "sanity", *(method.id for node in plan.nodes for method in node.methods)})
-    for name, span, _ in root.keyed("suppositions"):
+    general = [place.removeprefix("assumptions.") for place in GENERAL]
+    for name, span, _ in root.keyed("assumptions"):
         method = name.partition(".")[0]
-        if method not in methods:
-            message = f"suppositions.{name}: the plan has no method {method!r}"
-            yield Diagnostic("PLAN106", message, span, hint=suggest(method, methods))
+        if method not in methods and name not in general:
+            message = f"assumptions.{name}: the plan has no method {method!r}"
+            yield Diagnostic("PLAN106", message, span, hint=suggest(name, [*methods, *general]))
 
 
 def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
@@ -184,11 +176,11 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
             yield _unknown("scenario.interpret: port", name, everything, span)
             continue
         sort = found[0][1].sort
-        if not isinstance(sort, FunctionSort):
+        if not isinstance(sort, s.FunctionSort):
             message = f"scenario.interpret.{name}: only a function or relation is given by a table"
             yield Diagnostic("PLAN109", message, span, hint=f"give its values under domains: {name}")
             continue
-        wanted = len(sort.parameters) + (0 if sort.result == BOOL else 1)
+        wanted = len(sort.parameters) + (0 if sort.result == s.BOOL else 1)
         if len(columns) != wanted:
             message = f"scenario.interpret.{name}: {wanted} columns are wanted, {table} gives {len(columns)} here"
             yield Diagnostic("PLAN109", message, span)
@@ -203,15 +195,15 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
     for name, texts in plan.scenario.domains.items():
         span = domains.key_span(name) if domains else root.span
         if name == STEP_LENGTH and name not in types:
-            yield from _unusable(f"scenario.domains.{name}", texts, REAL, contract, span)
+            yield from _unusable(f"scenario.domains.{name}", texts, s.REAL, contract, span)
             continue
-        if name not in BUILTINS and name not in types and not ports_named(name, contract.nodes):
-            yield _unknown("scenario.domains: type or port", name, [*BUILTINS, *types, *everything], span)
+        if name not in s.BUILTINS and name not in types and not ports_named(name, contract.nodes):
+            yield _unknown("scenario.domains: type or port", name, [*s.BUILTINS, *types, *everything], span)
             continue
         place = (domains.at(name) or domains).span if domains else root.span
-        named = BUILTINS.get(name) or types.get(name)
+        named = s.BUILTINS.get(name) or types.get(name)
         sorts = [named] if named else [_domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
-        if len(set(sorts)) == 1 and not isinstance(sorts[0], FunctionSort):
+        if len(set(sorts)) == 1 and not isinstance(sorts[0], s.FunctionSort):
             yield from _unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
 
 
@@ -233,7 +225,7 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 # -- are a scenario's values values? What a domain or a table gives must be of the type that it is given for -----------
 
 
-def _unusable(where: str, texts: tuple[str, ...], sort: Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
+def _unusable(where: str, texts: tuple[str, ...], sort: s.Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
     """The first of the values that is none of the sort."""
     for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
         reason = _wrong(text, sort, contract)
@@ -243,27 +235,27 @@ def _unusable(where: str, texts: tuple[str, ...], sort: Sort, contract: Contract
             return
 
 
-def _domain_sort(sort: Sort) -> Sort:
+def _domain_sort(sort: s.Sort) -> s.Sort:
     """What the values under ``domains`` of a port are: a relation's are places, another function's its results."""
-    if not isinstance(sort, FunctionSort):
+    if not isinstance(sort, s.FunctionSort):
         return sort
-    if sort.result != BOOL:
+    if sort.result != s.BOOL:
         return sort.result
-    return sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
+    return sort.parameters[0] if len(sort.parameters) == 1 else s.TupleSort(sort.parameters)
 
 
-def _wrong(text: str, sort: Sort, contract: Contract) -> str | None:
+def _wrong(text: str, sort: s.Sort, contract: Contract) -> str | None:
     match sort:
-        case OpaqueSort() | StringSort():
+        case s.OpaqueSort() | s.StringSort():
             return None
-        case RealSort() | IntegerSort() | NaturalSort():
+        case s.RealSort() | s.IntegerSort() | s.NaturalSort():
             try:
                 number = exact(text)
             except ValueError:
                 pass  # perhaps arithmetic, or a constant's name
             else:
-                if isinstance(sort, RealSort) or number.denominator == 1:
-                    return "it is negative" if isinstance(sort, NaturalSort) and number < 0 else None
+                if isinstance(sort, s.RealSort) or number.denominator == 1:
+                    return "it is negative" if isinstance(sort, s.NaturalSort) and number < 0 else None
                 return "it is not whole"
     try:
         parse_term(text, None, contract, sort=sort)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from avow.base.files import inside, read_regular
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
+from avow.ros.parameters import WrongParameters, is_sectioned, nested, of_node
 from avow.system.plan import Driving, Method, Numbers, Plan, Source
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -30,13 +32,26 @@ def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Dia
     faults: list[Diagnostic] = []
     used: set[str] = set()
     for item in piece.each("methods"):
-        method = _method(node, item, used, faults)
+        method = _method(node, item, piece.at("mapping"), used, faults)
         if method is not None:
             found.append(method)
     return tuple(found), tuple(faults)
 
 
-def _method(node: str, item: Piece, used: set[str], faults: list[Diagnostic]) -> Method | None:
+READ_MESSAGES = ("rosmonitoring", "hypothesis")
+"""The methods to which a node's own `mapping` is given: they read messages, and have an option of that name."""
+
+
+def _with_mapping(options: Piece, shared: Piece) -> Piece:
+    """A method's options with the node's mapping; what the method says of a variable itself comes first."""
+    own = options.at("mapping") or Piece(shared.span, entries={})
+    if own.entries is None or shared.entries is None:
+        return options  # told by the schemas
+    both = replace(own, entries=shared.entries | own.entries, keys=shared.keys | own.keys)
+    return replace(options, entries={**(options.entries or {}), "mapping": both})
+
+
+def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], faults: list[Diagnostic]) -> Method | None:
     if item.entries is None:
         backend, options = item.text, Piece(item.span, entries={})
     else:
@@ -52,6 +67,8 @@ def _method(node: str, item: Piece, used: set[str], faults: list[Diagnostic]) ->
     if not _METHOD_ID.match(backend):
         faults.append(Diagnostic("PLAN105", f"nodes.{node}: {backend!r} cannot be a backend's name", item.span))
         return None
+    if mapping is not None and backend in READ_MESSAGES:
+        options = _with_mapping(options, mapping)
     given = options.at("id")
     name = given.text if given is not None else backend
     if given is not None and (not _METHOD_ID.match(name) or name in used):
@@ -160,8 +177,9 @@ def check_memory(plan: Plan, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 # -- parameters --------------------------------------------------------------------------------------------------------
 
 
-def parameters(root: Path, source: Source) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
-    """What the class is made with. A YAML that another reader may take otherwise is refused."""
+def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
+    """What the class is made with; of a parameter file of ROS 2, what it sets for the node of this whole name. A YAML
+    that another reader may take otherwise is refused."""
     if not source.parameters:
         return {}, ()
     place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
@@ -178,9 +196,13 @@ def parameters(root: Path, source: Source) -> tuple[Mapping[str, Any], tuple[Dia
         return {}, faults
     if not isinstance(loaded, dict):
         return {}, (Diagnostic("PLAN130", f"`{source.parameters}` is no mapping", place),)
-    wrong = tuple(
-        Diagnostic("PLAN130", f"`{source.parameters}`: {why}", place) for why in _unclear(piece.data, loaded, "")
-    )
+    strict = piece.data
+    if is_sectioned(loaded):
+        try:
+            strict, loaded = (nested(of_node(data, name)) for data in (strict, loaded))
+        except WrongParameters as unclear:
+            return {}, (Diagnostic("PLAN130", f"`{source.parameters}`: {unclear}", place),)
+    wrong = tuple(Diagnostic("PLAN130", f"`{source.parameters}`: {why}", place) for why in _unclear(strict, loaded, ""))
     return loaded, wrong
 
 

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from avow.base import codec
-from avow.base.diagnostics import Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.language.contract import Contract, Port
+from avow.language.lints import uncarried
 from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 
@@ -97,7 +98,7 @@ class Statement:
     """What a person says of something that results rest on without its being shown, in words for any reader.
 
     `place` says of what: ``environment.in.r``, ``environment.in.r.constant``, ``D1.persistence``, ``D1.one-output``,
-    ``D1.entered``, ``suppositions.<method>.<word>`` or ``requirements.REQ1.amounts``.
+    ``D1.entered``, ``assumptions.<method>.<word>`` or ``requirements.REQ1.validation``.
     """
 
     place: str
@@ -230,14 +231,18 @@ class NodePlan:
 
 
 @dataclass(frozen=True, slots=True)
-class Confirmation:
-    """A named person's word that what stands under a requirement is what its sentence asks for."""
+class Validation:
+    """A named person's word that a requirement's formula, or the guarantees named under a sentence without one, say
+    what its sentence asks for. Why, and until when, stands in the `Statement` of its place."""
 
     who: str
-    on: str
-    """The day (ISO 8601) on which it was confirmed."""
-    sentence: str
-    """`Requirement.digest` as it was on that day."""
+    date: str
+    """The day (ISO 8601) on which the person read both."""
+    sentence: str = ""
+    """`Requirement.sentence_digest` as it was on that day."""
+    formula: str = ""
+    """`Requirement.formula_digest` as it was on that day; empty in an entry of the last release, whose `sentence` is a
+    digest of both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,21 +260,62 @@ class Requirement:
     span: Span | None = field(default=None, compare=False, repr=False)
     formula_span: Span | None = field(default=None, compare=False, repr=False)
     """Where the formula or the temporal property stands."""
-    confirmed: Confirmation | None = None
+    validation: Validation | None = None
     linked: str = ""
     """Digest of what the names under `supported_by` say in the contract: see `avow.system.links`."""
+    source: str = ""
+    """The document that it comes from, and the place in it."""
 
     @property
-    def digest(self) -> str:
-        """Of the sentence, without regard to white space, and of what is linked to it: names, and what they say."""
+    def sentence_digest(self) -> str:
+        """Of the sentence, without regard to white space."""
+        return sha256(" ".join(self.text.split()))[:16]
+
+    @property
+    def formula_digest(self) -> str:
+        """Of formula or temporal property, and of what is linked to it: names, and what they say."""
+        return sha256(repr((self.formula or "", self.temporal or "", *sorted(self.supported_by), self.linked)))[:16]
+
+    @property
+    def validated(self) -> bool:
+        """Whether a person has read sentence and formula as they stand."""
+        if self.validation is None:
+            return False
+        said = self.validation.sentence, self.validation.formula
+        return said in ((self.sentence_digest, self.formula_digest), (self._digest_of_both, ""))
+
+    @property
+    def outdated(self) -> bool:
+        """Whether a person has read another sentence or formula."""
+        return self.validation is not None and bool(self.validation.sentence) and not self.validated
+
+    @property
+    def _digest_of_both(self) -> str:
+        """As the last release had it."""
         names = sorted(self.supported_by)
         parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *names, self.linked)
         return sha256(repr(parts))[:16]
 
-    @property
-    def suspect(self) -> bool:
-        """Whether the sentence, or what is linked to it, is another than a person confirmed."""
-        return self.confirmed is not None and self.confirmed.sentence != self.digest
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """A hazard or a security goal, and what the plan says mitigates it (see `avow.system.hazards`)."""
+
+    id: str
+    text: str
+    severity: str
+    """A severity category of MIL-STD-882E, table I."""
+    exposure: str = ""
+    """A probability level of MIL-STD-882E, table II; empty: not estimated."""
+    source: str = ""
+    """The document that it comes from, and the place in it."""
+    kind: str = "safety"
+    """``safety`` or ``security``."""
+    causes: tuple[str, ...] = ()
+    consequences: tuple[str, ...] = ()
+    mitigated_by: tuple[str, ...] = ()
+    """Requirements, nodes, guarantees (``node.guarantee``) or methods (``node/method``)."""
+    span: Span | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,13 +424,22 @@ class Plan:
     launched: Launched | None = None
     """What the launch files start; None where the plan names none."""
     included: tuple[Path, ...] = ()
-    """Launch files, and files of other systems that were taken in as subsystems: what is said here depends on them
-    too."""
+    """Files of hazards, launch files, and files of other systems that were taken in as subsystems: what is said here
+    depends on them too."""
+    old_names: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+    """A warning for each key that has its old name."""
+    hazards: tuple[Hazard, ...] = ()
 
     @property
     def root(self) -> Path:
         """The system's folder; every path in the plan is relative to it and stays within it."""
         return self.path.parent
+
+    @property
+    def off(self) -> frozenset[str]:
+        """The lints that are switched off: codes, and what would be said of topics of an input that is memory."""
+        memory = ((entry.node, port) for entry in self.nodes if entry.source for port in entry.source.memory)
+        return frozenset((*self.lints_off, *(uncarried(node, f"in.{port}") for node, port in memory)))
 
     def node(self, name: str) -> NodePlan:
         """The plan of a node; a node that the plan does not mention has no methods and criticality ``medium``."""

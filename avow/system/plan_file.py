@@ -17,11 +17,12 @@ from avow.base.files import inside, read_regular, sha256
 from avow.base.remembered import Shelf
 from avow.base.verdict import unsaid
 from avow.ros.names import Placed, Resolver, is_name
+from avow.system.hazards import read_hazards
 from avow.system.launched import read_launched
 from avow.system.node_plan import files_of, read_methods, read_source
+from avow.system.old_names import rename_old_keys
 from avow.system.plan import (
     ComposeGoal,
-    Confirmation,
     Edge,
     Endpoint,
     EnvironmentInput,
@@ -36,6 +37,7 @@ from avow.system.plan import (
     Source,
     Subsystem,
     Table,
+    Validation,
     is_wild,
 )
 from avow.system.schema import check_shape, without_faults
@@ -59,10 +61,11 @@ def read_plan(
     Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
     """
     root, faults = _document(path) if text is None else read_yaml(text.encode("utf-8", "replace"), str(path))
+    old_names = rename_old_keys(root)
     faults += check_shape(root, shelf)
     if faults:
         raise Rejected(*faults)
-    reader = _PlanReader(path, root)
+    reader = _PlanReader(path, root, old_names)
     plan = reader.plan()
     return plan, root, tuple(reader.faults)
 
@@ -71,6 +74,7 @@ def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozense
     """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: to look for what else is
     wrong, never to verify. Raises Rejected where there is no document, or nothing of it is left."""
     root, faults = _document(path)
+    faults += rename_old_keys(root)
     faults += check_shape(root)
     rest, dropped = without_faults(root)
     if rest is None:
@@ -98,8 +102,9 @@ def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
 class _PlanReader:
     """Turns a well-shaped document into a `Plan`, noting what the schema cannot see."""
 
-    def __init__(self, path: Path, root: Piece) -> None:
+    def __init__(self, path: Path, root: Piece, old_names: tuple[Diagnostic, ...] = ()) -> None:
         self.path = path
+        self.old_names = old_names
         self.root = root
         self.faults: list[Diagnostic] = []
 
@@ -115,6 +120,7 @@ class _PlanReader:
         self.model_graph()
         scenario = self.scenario()
         launched = self.noted(read_launched(self.path, self.root.each("ros", "launch")))
+        hazards, hazard_files = self.noted(read_hazards(self.path, self.root.each("hazards")))
         return Plan(
             system=name,
             title=self.root.said("title") or name,
@@ -126,6 +132,7 @@ class _PlanReader:
             environment=tuple(self.environment()),
             scenario=scenario,
             requirements=tuple(self.requirements()),
+            hazards=hazards,
             compose=tuple(self.goals()),
             nodes=tuple(self.nodes()),
             policy=located["policy"],
@@ -138,7 +145,8 @@ class _PlanReader:
             statements=self.noted(read_statements(self.root)),
             ros=self.noted(_ros(self.root)),
             launched=launched,
-            included=launched.files if launched is not None else (),
+            included=(*hazard_files, *(launched.files if launched is not None else ())),
+            old_names=self.old_names,
         )
 
     def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
@@ -295,14 +303,15 @@ class _PlanReader:
                 piece.texts("supported_by"),
                 piece.span,
                 (formula or temporal or piece).span,
-                self.confirmation(name, piece.at("confirmed")),
+                self.validation(piece.at("validation")),
+                source=piece.said("source") or "",
             )
 
-    def confirmation(self, name: str, piece: Piece | None) -> Confirmation | None:
+    def validation(self, piece: Piece | None) -> Validation | None:
         if piece is None:
             return None
-        self.faults += wrong_words(f"requirements.{name}.confirmed", piece, done=("on",))
-        return Confirmation(**piece.words())
+        words = piece.words()
+        return Validation(**{key: words[key] for key in ("who", "date", "sentence", "formula") if key in words})
 
     def goals(self) -> Iterator[ComposeGoal]:
         for name, _, piece in self.root.keyed("compose"):

@@ -20,6 +20,7 @@ from avow.base.grammars import lark_of
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.base.tuning.sizes import ROS_GRAPH_ARCS, ROS_GRAPH_BYTES
+from avow.ros.drafting import is_plumbing
 from avow.ros.listing import is_info, parse_info
 from avow.system.graph import Graph
 from avow.system.plan import System
@@ -120,7 +121,7 @@ def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -
     found: dict[tuple[str, str], dict[str, None]] = {}
     for publisher, subscriber, topic in graph.arcs:
         one, other = home.get(publisher), home.get(subscriber)
-        if one and other and one != other and (one, other) not in linked:
+        if one and other and one != other and (one, other) not in linked and not is_plumbing(topic):
             found.setdefault((one, other), {})[topic] = None
     for (one, other), topics in found.items():
         message = f"ROS sends {', '.join(topics)} from {one} to {other}; the contracts connect nothing there"

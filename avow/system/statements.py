@@ -14,6 +14,14 @@ from avow.system.plan import Plan, Statement, System
 from avow.system.strict_yaml import Piece
 from avow.system.temporal import written_state
 
+GENERAL = {
+    "assumptions.platform.execution": "Hardware, operating system, compilers and transport do what is expected of them",
+    "assumptions.models.fidelity": "What runs does what its model does",
+    "assumptions.samples.representative": "Cases that were not tried are like those that were",
+    "assumptions.platform.start": "Each delayed input begins with the first value that the plan gives",
+    "assumptions.tools.trusted": "The tools that answered, and the trusted base, answer rightly",
+}
+"""What any evidence of a kind rests on: the place of the plan where a person answers for it, and its words."""
 _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
 
 
@@ -24,9 +32,10 @@ def read_statements(root: Piece) -> tuple[tuple[Statement, ...], list[Diagnostic
 
 
 def without_words(system: System) -> Iterator[Diagnostic]:
-    """A warning for each supposition of this plan that has no words for a reader who does not know the contract."""
+    """A warning for each assumption of this plan that has no words for a reader who does not know the contract."""
     for statement in system.plan.statements:
-        if not statement.says and statement.span is not None and _own(statement, system.plan):
+        told = statement.says or _has_fixed_words(statement.place)
+        if not told and statement.span is not None and _own(statement, system.plan):
             hint = f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …"
             if not statement.because and statement.place.startswith("environment."):  # `constant: true`
                 hint = (
@@ -36,18 +45,22 @@ def without_words(system: System) -> Iterator[Diagnostic]:
             yield Diagnostic("PLAN128", message, statement.span, Severity.WARNING, hint)
 
 
-def unconfirmed(system: System) -> Iterator[Diagnostic]:
-    """A warning for each requirement whose sentence, or what supports it, is another than a person confirmed."""
+def not_validated(system: System) -> Iterator[Diagnostic]:
+    """A warning for each requirement whose sentence nobody has read against its formula, as both are now."""
     for requirement in system.plan.requirements:
-        confirmed = requirement.confirmed
-        if confirmed is not None and requirement.suspect:
+        if not requirement.validated:
+            read = requirement.validation
+            why = (
+                f"{read.who} read another sentence, or another formula or support, on {read.date}"
+                if read is not None and read.sentence
+                else "nobody has read its sentence against its formula"
+            )
             yield Diagnostic(
                 "PLAN129",
-                f"requirements.{requirement.id}: {confirmed.who} confirmed another sentence, or other support, on "
-                f"{confirmed.on}: it counts for nothing until a person has read it again",
+                f"requirements.{requirement.id}: {why}",
                 requirement.span,
                 Severity.WARNING,
-                hint=f'confirmed: {{who: …, on: …, sentence: "{requirement.digest}"}}',
+                hint=f'read both, then: avow validate {system.name} {requirement.id} --as "YOUR NAME"',
             )
 
 
@@ -93,6 +106,11 @@ def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> 
             yield Diagnostic("PLAN105", f"{place}: {wrong}", part.span)
 
 
+def _has_fixed_words(place: str) -> bool:
+    """Whether what is said at a place has words that are the same in every plan."""
+    return place.startswith("requirements.") or place in GENERAL
+
+
 def _own(statement: Statement, plan: Plan) -> bool:
     return statement.span is not None and statement.span.file == str(plan.path)
 
@@ -111,12 +129,12 @@ def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
                 argument = piece.at(key)
                 if argument is not None:
                     yield f"{goal}.{name}", argument
-    for name, _, piece in root.keyed("suppositions"):
-        yield f"suppositions.{name}", piece
+    for name, _, piece in root.keyed("assumptions"):
+        yield f"assumptions.{name}", piece
     for name, _, piece in root.keyed("requirements"):
-        amounts = piece.at("amounts")
-        if amounts is not None:
-            yield f"requirements.{name}.amounts", amounts
+        validation = piece.at("validation")
+        if validation is not None:
+            yield f"requirements.{name}.validation", validation
 
 
 def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:

@@ -97,8 +97,6 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     if plan.ros.distro is None and not plan.messages:
         return
     known, wrong = definitions(plan.messages, plan.ros.distro)
-    if any(d.code == "ROS103" for d in wrong):  # what reads them is not installed: nothing can be said
-        return
     yield from wrong
     packages = {name.partition("/")[0] for name in known.messages}
     for topic in (topic for node in contract.nodes for topic in node.topics):
@@ -118,6 +116,8 @@ def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
     """Remappings of a topic that the node does not have to one that it has: it seems the other way round."""
     for node in contract.nodes:
         placed = plan.ros.names.placed(node.name)
+        if placed.launched:
+            continue  # a contract drafted of what runs has the names that topics have then
         own = {placed.expanded(topic.name): topic.name for topic in node.topics}
         for old, new in placed.remaps:
             meant = own.get(placed.expanded(new))

@@ -16,7 +16,7 @@ from avow.base.files import read_regular
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.records import dataclass
-from avow.base.tools import Tool, program_digest
+from avow.base.tools import Tool, program_digest, tried
 from avow.base.tuning.running import VERSION_SECONDS
 from avow.isolation.observed import Observed
 from avow.isolation.outside import Outside
@@ -82,7 +82,7 @@ class Installation:
     def tool(self) -> Tool:
         """With Java and its compiler."""
         parts = tuple(_whole(program) for program in (self.java, self.javac) if program is not None)
-        return Tool("AJPF", self.version, str(self.home), INSTALL, parts=parts)
+        return Tool("AJPF", self.version, str(self.home), INSTALL, parts=parts, trial=_trial)
 
     def mark(self) -> str:
         """Changes with any class, jar or program that is compiled anew or put in another's place."""
@@ -136,6 +136,17 @@ def _revision(home: Path) -> str:
 def tool() -> Tool:
     found = find()
     return found.tool if found else Tool("AJPF", None, None, INSTALL)
+
+
+def _trial() -> str:
+    """Compiles and runs a class that loads MCAPL's controller."""
+    found = find()
+    if found is None or found.javac is None:
+        return "there is no javac beside its Java"
+    path = ("-cp", found.class_path("."))
+    text = "class Trial { public static void main(String[] a) { System.out.print(ajpf.MCAPLcontroller.class); } }\n"
+    commands = [(found.javac, *path, "Trial.java"), (found.java, *path, "Trial")]
+    return tried(commands, "Trial.java", text, "class ajpf.MCAPLcontroller")
 
 
 def prepare(installation: Installation, folder: Path, files: Mapping[str, str], outside: Outside) -> str | None:

@@ -5,12 +5,14 @@ Imports stay light: whoever lists the backends does not load a parser and a mode
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from avow.backend_kit.given import file_path
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_text
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
@@ -26,7 +28,7 @@ class AjpfBackend(Backend):
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "9"
+    version = "11"
     strength = Verdict.CHECKED
     uses_steps = False
     uses_wiring = False
@@ -45,9 +47,9 @@ class AjpfBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        from . import ajpf_tool, spin_tool
+        from . import ajpf_tool
 
-        return (ajpf_tool.tool(), spin_tool.tool())
+        return (ajpf_tool.tool(),)
 
     def suits(self, node: Node) -> bool:
         """Agents decide: some output is a choice, none is a number or a table of numbers, and no clause measures. What
@@ -83,6 +85,19 @@ class AjpfBackend(Backend):
 
         setup = read(job)
         return export_files(job, setup, instances(job, setup))
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        """A run of AJPF for each property that counts for a guarantee."""
+        from .files import CLAIMS
+
+        made = json.loads(read_text(folder / CLAIMS))
+        properties = [(name, key) for name, claim in made["guarantees"].items() for key in claim["properties"]]
+        counting = [extra for extra in made["further properties"].values() if extra["counts"]]
+        properties += [(extra["guarantee"], key) for extra in counting for key in extra["properties"]]
+        java = 'java -cp ".:$AJPF_HOME/bin:$AJPF_HOME/lib/3rdparty/*" gov.nasa.jpf.tool.RunJPF +site=site.properties'
+        for guarantee, key in properties:
+            command = ("cd", folder, "&&", java, "+classpath+=.", f"jpf/{key}.jpf")
+            yield OutsideCheck(folder / "jpf" / f"{key}.jpf", command, (guarantee,), prints="no errors detected")
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from .run import settle

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from math import fmod, isfinite, isnan
 
 from .syntax import Bindings, Struct, Term, Var, plain
 
@@ -18,10 +17,6 @@ def _divide(x: float, y: float) -> float:
     return float("nan") if x == 0 else float("inf") if x > 0 else float("-inf")
 
 
-def _modulo(x: float, y: float) -> float:
-    return fmod(x, y) if y != 0 and isfinite(x) and not isnan(y) else float("nan")
-
-
 _ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "sum": lambda x, y: x + y,
     "minus": lambda x, y: x - y,
@@ -31,9 +26,6 @@ _ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
 _OPERATORS: Mapping[str, Callable[[float, float], float]] = {
     "+": _ARITHMETIC["sum"],
     "-": _ARITHMETIC["minus"],
-    "*": _ARITHMETIC["times"],
-    "/": _divide,
-    "%": _modulo,
 }
 COMPUTING = frozenset((*_ARITHMETIC, "append", "toString"))
 
@@ -63,7 +55,7 @@ def _bound(action: Struct, at: int, value: Struct) -> Bindings:
 
 
 def compare(test: str, term: Term, bindings: Bindings) -> Iterator[Bindings]:
-    """Two numbers compared; ``==`` (or ``is``) with one side free binds it. What cannot be computed does not hold."""
+    """Two numbers compared; ``==`` with one side free binds it. What cannot be computed does not hold."""
     assert isinstance(term, Struct)
     left, right = term.args
     values = (value_of(left), value_of(right))

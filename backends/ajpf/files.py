@@ -1,5 +1,5 @@
-"""The files that AJPF takes: properties (.psl), agent (.gwen), agent system (.ail) and one run each (.jpf); and a table
-of what each property stands for. Pure: the same job gives the same bytes."""
+"""The files that AJPF takes: properties (.psl), the plan's program (.gwen), agent system (.ail) and one run each
+(.jpf); and a table of what each property stands for. Pure: the same job gives the same bytes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 
+from avow.backend_kit.given import file_path
 from avow.backend_kit.protocol import Job
 from avow.base.codec import document
+from avow.base.files import read_regular
 
 from . import psl
 from .ajpf_tool import jpf_file
@@ -18,6 +20,7 @@ from .java import CLASS, environment_class
 from .options import Setup
 from .syntax import SENT, Condition, DeedKind, Event, GoalKind, Plan, Program, Rule, Struct, show, show_deed, show_event
 
+CLAIMS = "claims.json"
 _BUILDER = "gwendolen.GwendolenMASBuilder"
 
 
@@ -26,7 +29,10 @@ def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, st
     name = setup.agent
     runs = {f"jpf/{p.key}.jpf": jpf_file(f"{name}.ail", f"{name}.psl", p.key) for p in made.properties}
     properties = {f"{name}.psl": psl_file(made.properties)}
-    return {**system_files(setup, name), **properties, "claims.json": _claims(job, setup, made), **runs}
+    path = file_path(job, "program")
+    assert path is not None  # `setup` was read from it
+    program = {f"{name}.gwen": read_regular(path).decode("utf-8")}
+    return {**system_files(setup, name), **program, **properties, CLAIMS: _claims(job, setup, made), **runs}
 
 
 def system_files(setup: Setup, name: str, *, scripted: bool = False) -> dict[str, str]:
@@ -78,6 +84,7 @@ def _claims(job: Job, setup: Setup, made: Instantiation) -> str:
         "further properties": {
             extra.name: {
                 "guarantee": extra.guarantee,
+                "counts": extra.counts,
                 "because": extra.because,
                 "properties": {p.key: entry(p) for p in properties},
             }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Generic, NamedTuple, TypeVar, assert_never
@@ -11,6 +11,7 @@ from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
 from .intentions import EMPTY, PERCEPTION, Frame, Intention, bind, canonical, goal_of, of_event, tail
 from .syntax import (
+    RECEIVED,
     SENT,
     Bindings,
     DeedKind,
@@ -82,7 +83,7 @@ class Mind:
         intention = self.intentions.items[number]
         event, below = intention.frames[-1].event, intention.frames[:-1]
         suffix = f"^{len(intention.frames)}"
-        for plan in self._triggers.get(_key(event), ()):
+        for plan in self._triggered(event):
             kind = _kind_met(plan.event, event) if event.is_goal else None
             if event.is_goal and kind is None:
                 continue
@@ -106,6 +107,16 @@ class Mind:
             problem = Frame(replace(event, sign=Sign.DROP))
             return self.number(replace(intention, frames=(*intention.frames, problem))), goals
         return number, goals
+
+    def _triggered(self, event: Event) -> Sequence[Plan]:
+        """The plans that an event may trigger, in file order. The addition of a belief with a free variable triggers
+        none: AIL annotates the belief with its source, and a term with variables, unlike a ground one, unifies only
+        with a trigger of the same annotations, which a program cannot write. (A message is not annotated.)"""
+        key = _key(event)
+        is_belief = not event.is_goal and key[2] != RECEIVED
+        if is_belief and event.sign is Sign.ADD and not is_ground(event.term):
+            return ()
+        return self._triggers.get(key, ())
 
     # Deeds
 

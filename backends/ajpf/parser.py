@@ -39,8 +39,12 @@ from .tuning import PROGRAM_BYTES, TERM_DEPTH
 _SAID = {
     "ATOM": "a name",
     "VARIABLE": "a variable",
+    "WORD": "a name",
     "NUMBER": "a number",
+    "POSITIVE": "a number",
+    "NATURAL": "a whole number",
     "STRING": "a text",
+    "TEXT": "a text",
     "SIGN_ADD": "'+'",
     "SIGN_DROP": "'-'",
     "KIND": "'perform' or 'achieve'",
@@ -213,8 +217,7 @@ class _Builder(Transformer):  # type: ignore[misc]
         return self.measured(Struct(str(parts[1]), (parts[0], parts[2])))
 
     def equation(self, parts: list[Any]) -> tuple[str, Struct]:
-        test = "==" if str(parts[1]) == "is" else str(parts[1])
-        return test, Struct(test, (parts[0], parts[2]))
+        return str(parts[1]), Struct(str(parts[1]), (parts[0], parts[2]))
 
     # Conditions, each with the sign that denies it, if it has one
 

@@ -1,4 +1,4 @@
-"""A run that refutes, done again by the real AIL: our lasso as a scripted environment, with the same draws.
+"""Runs done again by the real AIL: our lasso as a scripted environment, with the same draws.
 
 AIL runs the program as it is, without AJPF, in seconds. It tells each action and draw, with what the agent believes
 then; our run says what should be told. Where they part, one of the two interpreters is wrong.
@@ -6,8 +6,9 @@ then; our run says what should be told. Where they part, one of the two interpre
 
 from __future__ import annotations
 
+import random
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,15 @@ from .asking import keep, key, recall
 from .explore import Graph, System
 from .files import system_files
 from .interpreter import PRINT
-from .java import CLASS, MARK, SCRIPT, Script
+from .java import MARK, RUNS, RUNS_CLASS, SCRIPT, Script
 from .options import Setup
 from .syntax import DeedKind, plain
-from .tuning import REPLAY_SECONDS
+from .tuning import REPLAY_MILLISECONDS, REPLAY_START, SAMPLED_STEPS
 
 _VARIABLE = re.compile(r"(?<![A-Za-z0-9_.\"])[A-Z_~][A-Za-z0-9_]*(?:[\^'~][0-9']*)*")
+
+
+Run = tuple[Graph, Lasso]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,41 +95,73 @@ def _told(system: System, state: Any, why: str) -> Moment:
 
 
 def replay(
-    installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path, outside: Outside
-) -> Answer:
-    """Whether AIL does our run (holds) or another (violated, with the difference); an error where it cannot be run.
-
-    In `folder` the environment's class is compiled once for all runs of the setup, and `outside` knows what was looked
-    at for all of them. What AIL told of a run that agreed is kept (`asking`)."""
-    moments, script = expected(graph, lasso)
+    installation: Installation, setup: Setup, runs: Sequence[Run], folder: Path, outside: Outside
+) -> tuple[Answer, ...]:
+    """For each run whether AIL does it (holds) or another one (violated, with the difference); an error where it cannot
+    be run. One Java does all that are not kept from earlier (`asking`); `outside` records what it reads."""
     files = system_files(setup, "agent", scripted=True)
-    asked = key({**files, SCRIPT: script.text()}, "replay", installation.mark())
-    told = recall(asked) or _run(installation, files, script, folder, outside)
+    asked = [expected(graph, lasso) for graph, lasso in runs]
+    keys = [key({**files, SCRIPT: script.text()}, "replay", installation.mark()) for _, script in asked]
+    told = [recall(each) for each in keys]
+    new = [at for at, answer in enumerate(told) if answer is None]
+    if new:
+        fresh = _run(installation, files, [asked[at][1] for at in new], folder, outside)
+        for at, answer in zip(new, fresh, strict=True):
+            told[at] = answer
+    return tuple(_judged(*each) for each in zip(told, asked, keys, strict=True))
+
+
+def _judged(told: Answer | None, asked: tuple[Sequence[Moment], Script], key: str) -> Answer:
+    assert told is not None
     if told.said is Said.ERROR:
         return told
-    if (difference := _difference(moments, told.log)) is not None:
+    if (difference := _difference(asked[0], told.log)) is not None:
         return replace(told, said=Said.VIOLATED, reason=difference)
-    keep(asked, told)  # anything else may come of the machine, and is tried again
+    keep(key, told)  # anything else may come of the machine, and is tried again
     return told
 
 
+def sampled(graph: Graph, runs: int) -> Iterator[Lasso]:
+    """Runs drawn by chance (the same each time), each till a state comes again."""
+    chance = random.Random(0)
+    for _ in range(runs):
+        path, places = [chance.choice(graph.initial)], dict[int, int]()
+        while len(path) <= SAMPLED_STEPS:
+            places[path[-1]] = len(path) - 1
+            after = graph.after(path[-1])
+            if not after:
+                break
+            following = chance.choice(after)
+            if following in places:
+                yield Lasso(tuple(path), places[following])
+                break
+            path.append(following)
+
+
 def _run(
-    installation: Installation, files: Mapping[str, str], script: Script, folder: Path, outside: Outside
-) -> Answer:
+    installation: Installation, files: Mapping[str, str], scripts: Sequence[Script], folder: Path, outside: Outside
+) -> tuple[Answer, ...]:
     wrong, output = None, ""
     try:
-        if not (folder / f"{CLASS}.class").is_file():
-            wrong = prepare(installation, folder, files, outside)
+        wrong = prepare(installation, folder, {**files, f"{RUNS}.java": RUNS_CLASS}, outside)
         if wrong is None:
-            (folder / SCRIPT).write_text(script.text(), encoding="utf-8")
-            command = [installation.java, *BRIEF, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
+            names = [f"{at}.txt" for at in range(len(scripts))]
+            for name, script in zip(names, scripts, strict=True):
+                (folder / name).write_text(script.text(), encoding="utf-8")
+            command = [installation.java, *BRIEF, "-cp", installation.class_path("."), RUNS, str(REPLAY_MILLISECONDS)]
             env = {"AJPF_HOME": str(installation.home)}
-            done = outside.run(command, cwd=folder, seconds=REPLAY_SECONDS, env=env)
+            seconds = REPLAY_START + len(scripts) * REPLAY_MILLISECONDS / 1000
+            done = outside.run([*command, *names], cwd=folder, seconds=seconds, env=env)
             output = f"{done.stdout}\n{done.stderr}"
     except ToolMissing as error:
         wrong = str(error)
-    said = Said.HOLDS if wrong is None else Said.ERROR
-    return Answer(said, wrong or "", log=output, observed=outside.observed())
+    if wrong is not None:
+        return tuple(Answer(Said.ERROR, wrong, observed=outside.observed()) for _ in scripts)
+    logs = re.split(rf"^{MARK}run .*$", output, flags=re.MULTILINE)[1 : len(scripts) + 1]
+    seen = outside.observed()
+    done_runs = [Answer(Said.HOLDS, log=log, observed=seen) for log in logs]
+    lost = Answer(Said.ERROR, f"Java ended before the run: {output.strip()[-200:]}", observed=seen)
+    return (*done_runs, *(lost for _ in scripts[len(logs) :]))
 
 
 def _difference(moments: Sequence[Moment], output: str) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,14 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
-from avow.base.files import read_text
 from avow.base.verdict import Counterexample, Verdict
+from avow.formulas.lasso import Lasso
 from avow.formulas.ltl import TooLarge
-from avow.isolation.observed import Observed, Seen, as_here
+from avow.isolation.observed import Observed, Seen
 from avow.isolation.outside import Outside
-from avow.isolation.tracing import remedy, traces
 
-from . import ajpf_tool, spin, spin_tool
-from .ajpf_tool import Answer, Said
+from . import ajpf_tool
+from .ajpf_tool import Installation, Said
 from .asking import ask
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
@@ -29,10 +28,10 @@ from .instances import Instantiation, instances
 from .lazy import open_part
 from .options import Setup, read
 from .partial import Reduction, reduction, unfolded
-from .replay import replay
+from .replay import Run, replay, sampled
 from .settle import Frame, Settled, outcome
 from .society import system
-from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SPIN_SECONDS, SPIN_SHARE
+from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SAMPLED_RUNS
 from .words import Wording, explain
 
 ENGINE = "Avow's own Gwendolen checker"
@@ -92,29 +91,24 @@ class _Run:
         return max(0.0, self.deadline - time.monotonic())
 
     def frame(self) -> Frame:
-        checkers = self.own()
-        if checkers and self.setup.engine in ("auto", "spin"):
-            self.ask_spin(checkers)
+        self.own()
         if self.setup.engine == "ajpf":
             self.ask_ajpf()
         return Frame(self.setup, self.made, self.results, self.counterexamples, self.engine, self.bound)
 
     # Our own engine
 
-    def own(self) -> list[Checker]:
-        """Results for every property; where a bound was met, a violation within it still counts. The checkers of the
-        whole state spaces: properties that ask for percepts have one of their own (`interpreter.Agent`)."""
-        whole = []
+    def own(self) -> None:
+        """Results for every property; where a bound was met, a violation within it still counts. Properties that ask
+        for percepts have a state space of their own (`interpreter.Agent`)."""
         self.bound |= {"states": 0, "transitions": 0, "exhaustive": True}
         for probed in (False, True):
             properties = [p for p in self.made.properties if asks_for_percepts(p) is probed]
             if properties or (not probed and not self.made.properties):
-                checker = self.explored(properties, probed)
-                whole += [checker] if checker is not None and checker.graph.unfinished is None else []
+                self.explored(properties, probed)
         self.explain()
-        return whole if self.bound["exhaustive"] else []
 
-    def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
+    def explored(self, properties: Sequence[Property], probed: bool) -> None:
         setup = self.setup
         agents = system(setup.programs, setup.environment, setup.semantics, probed=probed)
         reduced = reduction(agents, properties)
@@ -129,7 +123,7 @@ class _Run:
         if graph.unfinished is not None:
             properties = [p for p in properties if not self.settled_early(agents, p)]
             if not properties:
-                return None
+                return
             if len(graph) > LAZY_STATES:
                 graph = reached(setup.states)
         self.bound["states"] += len(graph)
@@ -142,13 +136,12 @@ class _Run:
         except (TooDeep, RecursionError):
             reason = "the agent's terms or reasoning rules nest too deeply, or ask for too much"
             self.results |= {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
-            return None
+            return
         for p in properties:
             self.results[p.key] = self.one(checker, p)
             self.checkers[p.key] = checker
             if reduced is not None:
                 self.reductions[p.key] = reduced
-        return checker
 
     def settled_early(self, agents: System, p: Property) -> bool:
         """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
@@ -194,106 +187,77 @@ class _Run:
         return Verdict.UNKNOWN, reason
 
     def explain(self) -> None:
-        """A run for the first refuted property of each guarantee, and of each further property."""
+        """A run for the first refuted property of each guarantee, and of each further property. Where AJPF is
+        installed, AIL does these runs again, and some of each state space by which properties hold."""
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
-        outside = Outside((self.ajpf.tool,) if self.ajpf is not None else ())
-        with tempfile.TemporaryDirectory(prefix="avow-ail-") as ail:
-            for group in groups:
-                refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
-                if refuted is not None:
-                    self.explained(refuted, Path(ail), outside)
+        runs: list[tuple[str, Run]] = []
+        for group in groups:
+            refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
+            if refuted is not None and (run := self.explained(refuted)) is not None:
+                runs.append((refuted.key, run))
+        if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
+            runs += [("", run) for run in self.samples()]
+            self.replay(self.ajpf, runs)
 
-    def explained(self, refuted: Property, ail: Path, outside: Outside) -> None:
+    def explained(self, refuted: Property) -> Run | None:
         checker = self.checkers[refuted.key]
         lasso = checker.lasso(refuted)
         if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
             self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
-            return
-        graph = checker.graph
-        if refuted.key in self.reductions:
-            graph, lasso = unfolded(self.reductions[refuted.key], graph, lasso)
+            return None
+        graph, lasso = self.whole(refuted.key, checker.graph, lasso)
         found = explain(graph, lasso, refuted, self.wording)
         self.counterexamples[refuted.key] = found
         self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
-        if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
-            name = f"AIL ({self.ajpf.version})"
-            if traces():
-                answer = replay(self.ajpf, self.setup, graph, lasso, ail, outside)
-                self.replayed(name, refuted, answer)
-            else:
-                self.bound["replay"] = f"not replayed by {name}: {self.untraced()}"
+        return graph, lasso
 
-    def replayed(self, name: str, refuted: Property, answer: Answer) -> None:
-        """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
-        this program, and there is no verdict on anything."""
-        result = self.results[refuted.key]
-        if answer.said is Said.ERROR:
-            self.unanswered(answer.observed)
-            self.bound["replay"] = f"not replayed by {name}: {answer.reason}"
+    def whole(self, key: str, graph: Graph, lasso: Lasso) -> Run:
+        """The run with all that a reduction leaves out."""
+        return unfolded(self.reductions[key], graph, lasso) if key in self.reductions else (graph, lasso)
+
+    def samples(self) -> Iterator[Run]:
+        spaces = {id(checker): (key, checker.graph) for key, checker in self.checkers.items()}
+        for key, graph in spaces.values():
+            for lasso in sampled(graph, SAMPLED_RUNS):
+                yield self.whole(key, graph, lasso)
+
+    def replay(self, ajpf: Installation, runs: Sequence[tuple[str, Run]]) -> None:
+        """AIL does the runs again: if one goes another way, our interpreter is not AIL's for this program, and there is
+        no verdict on anything."""
+        name = f"AIL ({ajpf.version})"
+        if not runs:
             return
-        self.logs[f"{refuted.key}.replay.txt"] = answer.log
-        self.observed.update(dict.fromkeys(answer.observed))
-        if answer.said is Said.HOLDS:
-            opinions = {**result.opinions, name: "does the same run"}
-            self.results[refuted.key] = replace(result, opinions=opinions)
-            return
-        reason = f"contradictory: {name} does not do the run that refutes {refuted.key}: {answer.reason}"
-        self.results = {key: replace(r, verdict=Verdict.ERROR, reason=reason) for key, r in self.results.items()}
-        self.counterexamples = {}
+        outside = Outside((ajpf.tool,))
+        with tempfile.TemporaryDirectory(prefix="avow-ail-") as folder:
+            answers = replay(ajpf, self.setup, [run for _, run in runs], Path(folder), outside)
+        agreed = 0
+        for (key, _), answer in zip(runs, answers, strict=True):
+            if answer.said is Said.ERROR:
+                self.unanswered(answer.observed)
+                self.bound["replay"] = f"not replayed by {name}: {answer.reason}"
+                return
+            self.observed.update(dict.fromkeys(answer.observed))
+            if key:
+                self.logs[f"{key}.replay.txt"] = answer.log
+            if answer.said is Said.VIOLATED:
+                reason = f"contradictory: {name} does not do {_of(key)}: {answer.reason}"
+                self.results = {
+                    each: replace(r, verdict=Verdict.ERROR, reason=reason) for each, r in self.results.items()
+                }
+                self.counterexamples = {}
+                return
+            agreed += 1
+            if key:
+                result = self.results[key]
+                self.results[key] = replace(result, opinions={**result.opinions, name: "does the same run"})
+        self.bound["replay"] = f"{name} does {agreed} runs as the checker does"
 
     # Others
-
-    def ask_spin(self, checkers: Sequence[Checker]) -> None:
-        if self.setup.engine == "auto" and spin_tool.version() is not None and not traces():
-            self.bound["spin"] = f"no second opinion: {self.untraced()}"
-            return
-        name = f"Spin {spin_tool.version()}"
-        answers: dict[str, bool] = {}
-        seconds = min(self.left() * SPIN_SHARE, SPIN_SECONDS) if self.setup.engine == "auto" else self.left()
-        deadline = time.monotonic() + seconds
-        outside = Outside((spin_tool.tool(),))
-        with tempfile.TemporaryDirectory() as temporary:
-            try:
-                for checker in checkers:
-                    seconds = max(0.0, deadline - time.monotonic())
-                    answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds, outside)
-            except spin.NoOpinion as error:
-                self.unanswered(outside.observed())
-                self.bound["spin"] = f"no second opinion: {error.reason}"
-                if self.setup.engine == "spin":
-                    verdict = Verdict.NOT_RUN if spin_tool.version() is None else Verdict.UNKNOWN
-                    reason = f"the plan wants Spin's opinion: {error.reason} ({spin_tool.tool().install})"
-                    self.results = {key: replace(r, verdict=verdict, reason=reason) for key, r in self.results.items()}
-                return
-            self.logs["spin.pml"] = read_text(Path(temporary) / "agent.pml")
-        self.observed.update(dict.fromkeys(outside.observed()))
-        for key, holds in answers.items():
-            self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
-        self.engine += f" and {name}"
-        self.bound["spin"] = "asked of the program, by a translation of its own"
 
     def unanswered(self, observed: Iterable[Observed]) -> None:
         """What was looked at for a second opinion that did not come: it may come once that is another. What cannot be
         recorded is left out, as no answer of ours rests on it."""
         self.observed.update(dict.fromkeys(o for o in observed if o.kind is not Seen.OUTSIDE))
-
-    def untraced(self) -> str:
-        """Why another tool is not asked beside our own engine: its answer would be an undeclared input, and ours is
-        none."""
-        self.observed[as_here(Seen.TRACER)] = None
-        return f"what it reads cannot be recorded ({remedy()})"
-
-    def second(self, key: str, name: str, said: Said) -> None:
-        """Note another engine's answer; a contradiction is an error, never a vote."""
-        result = self.results[key]
-        opinions = {**result.opinions, name: str(said)}
-        own, other = result.answer, _SAID[said]
-        decided = (Verdict.CHECKED, Verdict.REFUTED)
-        if own in decided and other in decided and own is not other:
-            reason = f"{ENGINE} says {own}, {name} says {said}"
-            self.results[key] = replace(result, verdict=Verdict.ERROR, reason=reason, opinions=opinions)
-        else:
-            self.results[key] = replace(result, opinions=opinions)
 
     def ask_ajpf(self) -> None:
         """AJPF's answers instead of ours. Vacuity and runs in words stay our own engine's."""
@@ -321,6 +285,10 @@ class _Run:
             verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
             opinions = {} if own.answer is None else {ENGINE: str(own.answer)}
             self.results[p.key] = replace(own, verdict=verdict, reason=reason or answer.reason, opinions=opinions)
+
+
+def _of(key: str) -> str:
+    return f"the run that refutes {key}" if key else "a run that the checker explored"
 
 
 def _trace(found: Counterexample) -> str:

@@ -58,7 +58,7 @@ SCHEMA = schema(
             },
         },
         "semantics": {"enum": ["mcapl", "edge"], "description": "how percepts become events; default mcapl"},
-        "engine": {"enum": ["auto", "builtin", "ajpf", "spin"], "description": "default auto"},
+        "engine": {"enum": ["auto", "builtin", "ajpf"], "description": "default auto"},
         "states": {"type": "integer", "minimum": 1, "description": "bound on the states explored"},
         "environment_class": {
             **_TEXT,

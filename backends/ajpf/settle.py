@@ -33,7 +33,7 @@ class Settled:
     refutes: bool = True
     """Whether a run on which the property fails refutes the guarantee: where it does not, that makes an unknown."""
     opinions: Mapping[str, str] = field(default_factory=dict)
-    """Other engines' answers: ``{"Spin 6.5.2": "holds"}``."""
+    """Other engines' answers: ``{"AIL (…)": "does the same run"}``."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,29 +13,9 @@ from avow.formulas.flattening import joined
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
+from avow.language import terms as t
 from avow.language.operators import FLIPPED
 from avow.language.sorts import BOOL, INTEGER, NATURAL, BoolSort, IntegerSort, NaturalSort, RealSort
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Iff,
-    In,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    SetTerm,
-    Term,
-    Variable,
-    Widen,
-)
 
 from .tuning import FORMULA_DEPTH, MULTIPLIED_OUT, PARTS
 
@@ -44,118 +24,118 @@ class TooComplex(Exception):  # noqa: N818 - it names what happened
     """The formula is nested too deeply, or multiplies out to too much."""
 
 
-def shape(term: Term) -> Term:
+def shape(term: t.Term) -> t.Term:
     """The normal form of a formula. Raises TooComplex."""
     if depth(term) > FORMULA_DEPTH or _written_out(term) > PARTS:
         raise TooComplex
     return _shaped(term)
 
 
-def _written_out(term: Term) -> int:
+def _written_out(term: t.Term) -> int:
     """How many parts the formula has once `<=>`, `xor` and conditionals are written out, which doubles theirs."""
     sizes = [_written_out(child) for child in term.children]
     match term:
-        case Conditional(sort=sort) if sort == BOOL:
+        case t.Conditional(sort=sort) if sort == BOOL:
             return 1 + sum(sizes) + sizes[0]
-        case Iff() | Operation(sort=BoolSort()):
+        case t.Iff() | t.Operation(sort=BoolSort()):
             return 1 + 2 * sum(sizes)
-        case Compare(left=left) if left.sort == BOOL:
+        case t.Compare(left=left) if left.sort == BOOL:
             return 1 + 2 * sum(sizes)
         case _:  # its parts stand in it once
             return 1 + sum(sizes)
 
 
-def conjuncts(term: Term) -> tuple[Term, ...]:
-    return term.items if isinstance(term, And) else (() if term == TRUE else (term,))
+def conjuncts(term: t.Term) -> tuple[t.Term, ...]:
+    return term.items if isinstance(term, t.And) else (() if term == t.TRUE else (term,))
 
 
-def disjuncts(term: Term) -> tuple[Term, ...]:
-    return term.items if isinstance(term, Or) else (() if term == FALSE else (term,))
+def disjuncts(term: t.Term) -> tuple[t.Term, ...]:
+    return term.items if isinstance(term, t.Or) else (() if term == t.FALSE else (term,))
 
 
-def conjunction(items: list[Term]) -> Term:
-    return joined(items, And, TRUE, FALSE, once=True)
+def conjunction(items: list[t.Term]) -> t.Term:
+    return joined(items, t.And, t.TRUE, t.FALSE, once=True)
 
 
-def disjunction(items: list[Term]) -> Term:
-    return joined(items, Or, FALSE, TRUE, once=True)
+def disjunction(items: list[t.Term]) -> t.Term:
+    return joined(items, t.Or, t.FALSE, t.TRUE, once=True)
 
 
-def _shaped(term: Term) -> Term:
+def _shaped(term: t.Term) -> t.Term:
     return _formula(push_negations(term))
 
 
-def _formula(term: Term) -> Term:
+def _formula(term: t.Term) -> t.Term:
     """Of a formula whose negations stand at its atoms."""
     match term:
-        case And(items=items):
+        case t.And(items=items):
             return conjunction([_formula(i) for i in items])
-        case Or(items=items):
+        case t.Or(items=items):
             return disjunction([_formula(i) for i in items])
-        case Iff(left=left, right=right):
-            one = disjunction([_shaped(Not(left)), _formula(right)])
-            return conjunction([one, disjunction([_formula(left), _shaped(Not(right))])])
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            yes = disjunction([_shaped(Not(condition)), _formula(then)])
+        case t.Iff(left=left, right=right):
+            one = disjunction([_shaped(t.Not(left)), _formula(right)])
+            return conjunction([one, disjunction([_formula(left), _shaped(t.Not(right))])])
+        case t.Conditional(condition=condition, then=then, otherwise=otherwise):
+            yes = disjunction([_shaped(t.Not(condition)), _formula(then)])
             return conjunction([yes, disjunction([_formula(condition), _formula(otherwise)])])
-        case Quantified(quantifier=Quantifier.UNIQUE, variables=variables, body=body):
-            return Quantified(Quantifier.UNIQUE, variables, _shaped(body), term.span)
-        case Quantified(quantifier=quantifier, variables=variables, body=body):
-            return _quantified(quantifier is Quantifier.EXISTS, variables, _formula(body))
-        case Literal():
+        case t.Quantified(quantifier=t.Quantifier.UNIQUE, variables=variables, body=body):
+            return t.Quantified(t.Quantifier.UNIQUE, variables, _shaped(body), term.span)
+        case t.Quantified(quantifier=quantifier, variables=variables, body=body):
+            return _quantified(quantifier is t.Quantifier.EXISTS, variables, _formula(body))
+        case t.Literal():
             return term
-        case Not(body=Compare() as body):
+        case t.Not(body=t.Compare() as body):
             return _comparison(body, False)
-        case Not(body=body):
-            return Not(_formula(body))
-        case Compare():
+        case t.Not(body=body):
+            return t.Not(_formula(body))
+        case t.Compare():
             return _comparison(term, True)
-        case In(item=item, collection=SetTerm(items=items) as collection):
+        case t.In(item=item, collection=t.SetTerm(items=items) as collection):
             members = tuple(sorted({_value(m) for m in items}, key=repr))
-            return In(_value(item), SetTerm(members, collection.sort), term.span)
+            return t.In(_value(item), t.SetTerm(members, collection.sort), term.span)
         case _:  # an atom: its terms normalised
             return _value(term)
 
 
-def _comparison(term: Compare, positive: bool) -> Term:
+def _comparison(term: t.Compare, positive: bool) -> t.Term:
     operator, left, right = term.operator, term.left, term.right
     if operator in (">", ">="):
         operator, left, right = FLIPPED[operator], right, left
     if not positive and operator in ("<", "<="):
         operator, left, right, positive = {"<": "<=", "<=": "<"}[operator], right, left, True
     made_left, made_right = _value(left), _value(right)
-    if isinstance(made_left, Literal) and isinstance(made_right, Literal):
+    if isinstance(made_left, t.Literal) and isinstance(made_right, t.Literal):
         a, b = made_left.value, made_right.value
         holds = a == b if operator == "==" else (a < b if operator == "<" else a <= b)  # type: ignore[operator]
-        return TRUE if holds is positive else FALSE
-    made = Compare(operator, made_left, made_right, term.span)
-    return made if positive else Not(made)
+        return t.TRUE if holds is positive else t.FALSE
+    made = t.Compare(operator, made_left, made_right, term.span)
+    return made if positive else t.Not(made)
 
 
-def _value(term: Term) -> Term:
+def _value(term: t.Term) -> t.Term:
     """A term of another sort than BOOL, or an atom: literals folded, the formulas within it normalised."""
-    if isinstance(term, Literal):
+    if isinstance(term, t.Literal):
         if isinstance(term.sort, IntegerSort | NaturalSort) and isinstance(term.value, int):
             return _integer(term.value)
-        return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term
+        return t.Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term
     parts = tuple(_shaped(p) if p.sort == BOOL and p.children else _value(p) for p in term.children)
     made = term.rebuild(parts)
     match made:
-        case Widen(term=Literal(value=value)) if not isinstance(value, str):
-            return Literal(Fraction(value), made.sort)
-        case Negative(term=Literal(value=value)) if not isinstance(value, str):
-            return _integer(-value) if isinstance(value, int) else Literal(-value, made.sort)
-        case Arithmetic(operator=operator, left=Literal(value=a), right=Literal(value=b)):
+        case t.Widen(term=t.Literal(value=value)) if not isinstance(value, str):
+            return t.Literal(Fraction(value), made.sort)
+        case t.Negative(term=t.Literal(value=value)) if not isinstance(value, str):
+            return _integer(-value) if isinstance(value, int) else t.Literal(-value, made.sort)
+        case t.Arithmetic(operator=operator, left=t.Literal(value=a), right=t.Literal(value=b)):
             if isinstance(a, int) and isinstance(b, int) and operator in ("+", "-", "*"):
                 return _integer(a + b if operator == "+" else a - b if operator == "-" else a * b)
     return made
 
 
-def _integer(value: int) -> Literal:
-    return Literal(value, NATURAL if value >= 0 else INTEGER)
+def _integer(value: int) -> t.Literal:
+    return t.Literal(value, NATURAL if value >= 0 else INTEGER)
 
 
-def _quantified(exists: bool, variables: tuple[Variable, ...], body: Term) -> Term:
+def _quantified(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -> t.Term:
     """``exists`` distributes over ``or`` and stands outside only of what it binds (``forall`` the other way round)."""
     outer = disjuncts if exists else conjuncts
     join_outer = disjunction if exists else conjunction
@@ -165,17 +145,17 @@ def _quantified(exists: bool, variables: tuple[Variable, ...], body: Term) -> Te
     return join_outer(blocks)
 
 
-def _multiplied(exists: bool, variables: tuple[Variable, ...], body: Term) -> Term:
+def _multiplied(exists: bool, variables: tuple[t.Variable, ...], body: t.Term) -> t.Term:
     """Disjunctive form (for ``exists``) of what mentions the variables."""
     names = {v.name for v in variables}
     inner = conjuncts if exists else disjuncts
     outer = disjuncts if exists else conjuncts
     join_inner = conjunction if exists else disjunction
     join_outer = disjunction if exists else conjunction
-    kind = Or if exists else And
+    kind = t.Or if exists else t.And
     if isinstance(body, kind):
         return join_outer([_multiplied(exists, variables, part) for part in body.items])
-    rows: list[list[Term]] = [[]]
+    rows: list[list[t.Term]] = [[]]
     for item in inner(body):
         choices = outer(item) if isinstance(item, kind) and names & bound_names(item) else (item,)
         rows = [[*row, choice] for row in rows for choice in choices]
@@ -186,13 +166,13 @@ def _multiplied(exists: bool, variables: tuple[Variable, ...], body: Term) -> Te
     return join_outer([_multiplied(exists, variables, join_inner(row)) for row in rows])
 
 
-def _scoped(exists: bool, variables: tuple[Variable, ...], block: Term) -> Term:
+def _scoped(exists: bool, variables: tuple[t.Variable, ...], block: t.Term) -> t.Term:
     """Conjuncts (for ``exists``) that share no variable are parted."""
     inner = conjuncts if exists else disjuncts
     join = conjunction if exists else disjunction
     names = {v.name for v in variables}
-    groups: list[tuple[set[str], list[Term]]] = []
-    outside: list[Term] = []
+    groups: list[tuple[set[str], list[t.Term]]] = []
+    outside: list[t.Term] = []
     for item in inner(block):
         mentioned = set(bound_names(item)) & names
         if not mentioned:
@@ -204,9 +184,9 @@ def _scoped(exists: bool, variables: tuple[Variable, ...], block: Term) -> Term:
             joined = group[1] + joined
             groups.remove(group)
         groups.append((mentioned, joined))
-    quantifier = Quantifier.EXISTS if exists else Quantifier.FORALL
+    quantifier = t.Quantifier.EXISTS if exists else t.Quantifier.FORALL
     made = [
-        Quantified(quantifier, tuple(v for v in variables if v.name in mentioned), join(items), items[0].span)
+        t.Quantified(quantifier, tuple(v for v in variables if v.name in mentioned), join(items), items[0].span)
         for mentioned, items in groups
     ]
     return join([*outside, *made]) if inner(block) else block

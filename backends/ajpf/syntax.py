@@ -145,7 +145,7 @@ class Program:
 
 CONS, NIL = "[|]", "[]"
 """Lists are terms: ``[a, b|T]`` is ``[|](a, [|](b, T))``."""
-OPERATORS = frozenset("+-*/%")
+OPERATORS = frozenset("+-")
 
 
 def show(term: Term) -> str:

@@ -39,8 +39,17 @@ PROPERTY_NESTING = 60
 ALTERNATIVES = 8
 """Alternatives of a trigger that are each explained: a reader follows no more."""
 
-REPLAY_SECONDS = 20.0
+REPLAY_MILLISECONDS = 10_000
 """For one run. An agent that stands still for ever is ended; what it told counts."""
+
+REPLAY_START = 30.0
+"""Seconds for Java to start and to load AIL's classes, on a busy machine."""
+
+SAMPLED_RUNS = 5
+"""Runs of each state space that AIL does again, besides those that refute."""
+
+SAMPLED_STEPS = 400
+"""Steps of such a run; a longer one is left out."""
 
 GRACE = 0.5
 """Of the time limit, what may be used beyond it to look for violations in what could be explored."""
@@ -53,15 +62,6 @@ PART_STATES = 20_000
 
 LAZY_SHARE = 0.02
 """Of the time that is left, what one property may use for that."""
-
-SPIN_SHARE = 0.5
-"""Of the time that is left, what Spin may use for its second opinion."""
-
-SPIN_SECONDS = 60.0
-"""The most that a second opinion may take that the plan did not ask for: the case study's agents take five to ten."""
-
-SPIN_DEPTH = 10_000
-"""Steps of the run that Spin follows at first; the case study's searches go to 1,300."""
 
 FORMULA_DEPTH = 120
 """Deeper guarantees are refused by name: what translates them recurses."""
@@ -83,9 +83,6 @@ INDICES_TRIED = 400
 
 TURN = 1_000
 """Jobs of one agent after which its turn is taken for endless: the orders of turns are then not reduced."""
-
-PLAN_VARIABLES = 64
-"""Variables of one plan that Spin's runner takes: which of them are still needed is a number of so many bits."""
 
 LIVE_JOBS = 1_000
 """Steps of a running program without an action: after so many it is taken for endless; a plan has some tens."""

@@ -1,18 +1,20 @@
 """``python -m avow.backends.dafny FOLDER NODE``: a skeleton of the implementation, where the plan wants it.
 
-A plan that names a file that is not there yet is refused, and then nothing is exported: without this, nobody would come
-by the first skeleton.
+The skeleton includes the specification from where `doit export` writes it, so that an editor opens both.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, job_for
+from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
+from avow.base.workspace import Workspace
 
 from .modules import generate
 from .printer import NotExpressible
@@ -29,13 +31,19 @@ def _write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Pa
     if path.exists():
         raise Rejected(Diagnostic("DFY102", f"'{name}' is there already; nothing is ever written over it", place))
     try:
-        write(path, generate(job.node, job.method.guarantees).skeleton)
+        write(path, generate(job.node, job.method.guarantees).skeleton(_generated_beside(job, path)))
     except NotExpressible as problem:
         message = f"node '{node}' cannot be put into Dafny: {problem.what}"
         raise Rejected(Diagnostic("DFY105", message, problem.span or job.node.span)) from None
     except OSError as error:
         raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be written: {error}", place)) from None
     return path
+
+
+def _generated_beside(job: Job, path: Path) -> str:
+    """Where `doit export` writes the files that the skeleton includes, relative to the skeleton's folder."""
+    place = Workspace(job.root.resolve().parents[1]).node(job.system.name, job.node.name, job.method.id)
+    return Path(os.path.relpath(place, path.resolve().parent)).as_posix() + "/"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -54,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
             hint = f" ({d.hint})" if d.hint else ""
             sys.stderr.write(f"{d.span or given.folder}: {d.message}{hint} [{d.code}]\n")
         return 2
-    sys.stdout.write(f"{path}\n")
+    sys.stdout.write(f"{path}\n`doit export` writes the files that it includes.\n")
     return 0
 
 

@@ -6,13 +6,13 @@ Imports stay light: whoever lists the backends does not load what writes and rea
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avow.backend_kit.given import existing_file, file, file_path, schema, told
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
+from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool, Translated
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.files import read_regular
@@ -36,7 +36,7 @@ class DafnyBackend(Backend):
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "6"
+    version = "7"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
@@ -85,23 +85,29 @@ class DafnyBackend(Backend):
         return (path,) if path is not None else ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        """Types, contract, specification, the map from `ensures` to guarantees, and a skeleton to start from."""
-        from .modules import PROBE_FILE, lines_map
+        """Types, contract and specification, which the implementation includes."""
         from .printer import NotExpressible
 
         try:
-            generated = _generate(job)
+            return _specification(_generate(job))
         except NotExpressible as problem:
             return {"NOT-COVERED.txt": f"{one_line(problem.what)}\n"}
-        return {
-            **_specification(generated),
-            PROBE_FILE: generated.probe,
-            "guarantees.json": lines_map(generated),
-            f"skeleton/{generated.impl_file}": generated.skeleton,
-        }
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        """The implementation, which includes the specification from `folder`."""
+        from .dafny_tool import has_commands
+        from .modules import generate
+
+        path = file_path(job, "implementation")
+        if path is None or len(names) < 3:
+            return
+        tool = dafny()
+        words = ("verify",) if has_commands(tool.version) or not tool.present else ("/compile:0",)
+        covered = generate(job.node, job.method.guarantees).ensures
+        yield OutsideCheck(path, ("dafny", *words, path), tuple(name for _, name in covered))
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
-        """Types, contract, specification and skeleton, as `export` has them, of all the node's guarantees."""
+        """What `export` has, for all the node's guarantees, and a skeleton beside it."""
         from .modules import generate
         from .printer import NotExpressible
 
@@ -117,7 +123,7 @@ class DafnyBackend(Backend):
         )
         if len(missing) == len(names):
             return Translated({}, missing)
-        return Translated({**_specification(generated), generated.impl_file: generated.skeleton}, missing)
+        return Translated({**_specification(generated), generated.impl_file: generated.skeleton()}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from avow.isolation.outside import Outside
@@ -166,6 +172,7 @@ def _outcome(obligation: str, settled: Settled) -> Outcome:
         hypotheses=settled.hypotheses,
         details=dict(settled.details),
         link=Link.GENERATED,
+        vacuous=settled.vacuous,
     )
 
 

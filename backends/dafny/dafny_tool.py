@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from dataclasses import replace
 
-from avow.base.tools import Tool, find_tool
+from avow.base.tools import Tool, find_tool, tried
 
-INSTALL = "apt-get install dafny"
+INSTALL = "sudo apt install dafny"
 
+_VERSION = r"\d+\.\d+\.\d+(\.\d+)?"
 _MONO = ("/usr/lib/mono", "/etc/mono")
 
 
 def dafny() -> Tool:
     """Dafny as found now. Never raises."""
     # Any run prints its version in the XML only; without a file it says it in a usage line.
-    found = find_tool("dafny", ("/version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+    found = find_tool("dafny", ("/version",), install=INSTALL, pattern=_VERSION, optional=False)
     if found.version == "unknown":
-        found = find_tool("dafny", ("--version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+        found = find_tool("dafny", ("--version",), install=INSTALL, pattern=_VERSION, optional=False)
     # Its prover; what runs it, from version 4 on, and before.
     parts = (shutil.which("z3"), shutil.which("dotnet"), *(place for place in _MONO if os.path.isdir(place)))  # noqa: PTH112
-    return replace(found, parts=tuple(part for part in parts if part is not None))
+    return replace(found, parts=tuple(part for part in parts if part is not None), trial=_trial)
+
+
+def has_commands(version: str | None) -> bool:
+    """Whether this version is asked by commands. One that does not tell its version is asked as 2.3 is."""
+    major = re.match(r"\d+", version or "")
+    return major is not None and int(major[0]) >= 4
+
+
+def _trial() -> str:
+    """Verifies a lemma."""
+    command = ("dafny", "verify" if has_commands(dafny().version) else "/compile:0", "trial.dfy")
+    return tried([command], "trial.dfy", "lemma Half(n: nat) ensures n / 2 <= n { }\n", " verified, 0 errors")

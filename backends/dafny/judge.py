@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from fractions import Fraction
 
 from avow.backend_kit.protocol import Limits
@@ -31,7 +31,7 @@ from avow.language.terms import Variable
 
 from .answer import Member
 from .history import FIRST
-from .modules import CALL, ENV_ALWAYS, PROBE_FILE, Generated, without_env_always
+from .modules import ANYWAY, BY_ENV, CALL, ENV_ALWAYS, EXCLUDED_FILE, PROBE_FILE, Generated, without_env_always
 from .printer import Names, Vocabulary
 from .runner import Audit, Run, audit, verify
 from .scanner import Scan, resolved_environment
@@ -46,6 +46,7 @@ class Settled:
     summary: str
     hypotheses: tuple[str, ...] = ()
     details: Mapping[str, object] = field(default_factory=dict)
+    vacuous: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +98,16 @@ def settle(
         if _broken(again, scanned, generated, shown_name) is None:
             left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated, environment))
             unproved |= dict.fromkeys(spared, left)
+    about_nothing: frozenset[str] = frozenset()
+    if environment != "true" and generated.conditions and not all(unproved.values()):
+        said = verify(_asked_of_env(files, generated), limits, outside)
+        logs["excluded.log"] = said.output
+        about_nothing = _about_nothing(said, generated)
     tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
     verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated, tried) for name in guarantees}
+    for name in about_nothing & {n for n, settled in verdicts.items() if settled.verdict is Verdict.PROVED}:
+        text = f"vacuous: where Env holds ({environment}), what it is about never comes about"
+        verdicts[name] = replace(verdicts[name], summary=text, vacuous=True)
     return Judgement(verdicts, run.command, logs)
 
 
@@ -122,6 +131,9 @@ def _verdict(
         return Settled(
             Verdict.UNKNOWN, f"proved only if what it takes for granted holds: {_few(taken)}", taken, details
         )
+    if environment != "true" and generated.remembers:
+        why = "whether inputs can meet it for ever is not asked: make it an assumption of the contract"
+        return Settled(Verdict.UNKNOWN, f"proved only where Env holds ({environment}); {why}", taken, details)
     added: tuple[str, ...] = ()
     summary = f"Step of {generated.impl_module} meets it for all inputs that meet the assumptions"
     if environment != "true":
@@ -243,6 +255,20 @@ def _files(generated: Generated, scanned: Scan, guarantees: tuple[str, ...], ask
         generated.impl_file: scanned.text,
     }
     return files if scanned.problems else {**files, PROBE_FILE: without_env_always(probe) if asks else probe}
+
+
+def _asked_of_env(files: Mapping[str, str], generated: Generated) -> dict[str, str]:
+    """What Dafny is given to tell what Env excludes."""
+    head, end, _ = files[generated.contract_file].rpartition("}")
+    whole = f"{head}{generated.situations}\n{end}\n"
+    return {**files, generated.contract_file: whole, EXCLUDED_FILE: generated.excluded}
+
+
+def _about_nothing(run: Run, generated: Generated) -> frozenset[str]:
+    """The guarantees of which Dafny proves that Env excludes a condition that the contract alone does not exclude."""
+    proved = {m.name for m in run.members or () if m.kind == "Impl" and m.outcome == "correct"}
+    asked = enumerate(generated.conditions)
+    return frozenset(name for k, name in asked if f"{BY_ENV}{k}" in proved and f"{ANYWAY}{k}" not in proved)
 
 
 def _name(file: str, generated: Generated, shown_name: str) -> str:

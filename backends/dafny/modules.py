@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from avow.backend_kit.stepping import stepping
-from avow.base.codec import document
 from avow.base.plain import one_line
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
@@ -16,6 +15,7 @@ from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
+from avow.sanity.claims import triggers
 
 from .history import ESTABLISHED, History, declared, history
 from .printer import (
@@ -90,7 +90,8 @@ class Generated:
     types: str
     contract: str
     spec: str
-    skeleton: str
+    outline: str
+    """The implementation's module, to be filled in."""
     ensures: tuple[tuple[int, str], ...]
     probe_module: str
     probe: str
@@ -100,8 +101,18 @@ class Generated:
     """The same map for its `ensures`."""
     uncovered: tuple[tuple[str, str], ...]
     """Guarantees that cannot be expressed, with the reason."""
+    situations: str = ""
+    """More predicates of the module of the contract: the conditions of guarantees."""
+    excluded: str = ""
+    """A module that asks of each of them whether Env, or the contract anyway, keeps it from coming about."""
+    conditions: tuple[str, ...] = ()
+    """Of each of them, the guarantee."""
     remembers: bool = False
     """Whether the contract speaks of other steps, so that there is a history."""
+
+    def skeleton(self, folder: str = "") -> str:
+        """A first implementation. `folder`: where the generated files are, relative to where it will be (``../x/``)."""
+        return f'include "{folder}{self.spec_file}"\n{self.outline}'
 
     @property
     def lemmas(self) -> tuple[str, ...]:
@@ -109,8 +120,8 @@ class Generated:
         return ("EnvNotEmpty", ESTABLISHED) if self.remembers else ("EnvNotEmpty",)
 
 
-PROBE_FILE = "probe.dfy"
-ENV_ALWAYS, CALL = "EnvAlways", "Call"
+PROBE_FILE, EXCLUDED_FILE = "probe.dfy", "excluded.dfy"
+ENV_ALWAYS, CALL, BY_ENV, ANYWAY = "EnvAlways", "Call", "ByEnv", "Anyway"
 
 
 def generate(node: Node, guarantees: Sequence[str]) -> Generated:
@@ -153,23 +164,46 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     impl_file = f"{stem}_impl.dfy"
     clauses = list(zip(node.assumptions, assumed, strict=True)) + promised
     written = _contract(past, clauses, words, types_file)
-    spec, ensures = _spec(node, past, assumed, promised, words, spec_module, contract_file)
+    spec, ensures = _spec(node, past, assumed, promised, words, spec_module, contract_file, uncovered)
     probe, probe_ensures = _probe(node, past, assumed, promised, words, probe_module, impl_module)
-    skeleton = _skeleton(past, inputs, outputs, words, spec_module, impl_module, spec_file)
+    outline = _outline(past, inputs, outputs, words, spec_module, impl_module)
+    types = _types(words)
+    situations, excluded, conditions = _excluded(node, past, assumed, promised, words, impl_module)
     return Generated(
-        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, _types(words), written,
-        spec, skeleton, ensures, probe_module, probe, probe_ensures, tuple(uncovered), bool(past.cells),
+        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, types, written,
+        spec, outline, ensures, probe_module, probe, probe_ensures, tuple(uncovered), situations, excluded, conditions,
+        bool(past.cells),
     )  # fmt: skip
 
 
-def lines_map(generated: Generated) -> str:
-    """The line-to-guarantee map, as it stands beside the files."""
-    data = {
-        "file": generated.spec_file,
-        "ensures": {str(line): name for line, name in generated.ensures},
-        "not covered": dict(generated.uncovered),
-    }
-    return document(data) + "\n"
+def _excluded(
+    node: Node,
+    past: History,
+    assumed: Sequence[tuple[Predicate, ...]],
+    promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
+    words: Vocabulary,
+    impl_module: str,
+) -> tuple[str, str, tuple[str, ...]]:
+    """Predicates for the conditions of guarantees, a module that asks what excludes them, and whose each is."""
+    taken = signature([p.variable for p in (*node.inputs, *node.outputs)], words)
+    env = f"Implementation.Env({', '.join(words.local(p.variable) for p in node.inputs)})"
+    sane = [f"    requires {past.call(p[-1], words)}" for p in assumed]
+    predicates, lemmas, whose = list[str](), list[str](), list[str]()
+    for clause, _ in promised:
+        for situation in triggers(clause.formula):
+            try:
+                found = print_clause(f"{clause.name} condition", situation, words)
+            except NotExpressible:
+                continue
+            for predicate in found:
+                predicates += declared(predicate, "bool", words)
+            for name, more in ((BY_ENV, [f"    requires {env}"]), (ANYWAY, [])):
+                lemmas += ["", f"  lemma {name}{len(whose)}({past.given(taken, program=False)})", *sane, *more]
+                lemmas += [f"    ensures !{past.call(found[-1], words)}", "  { }"]
+            whose.append(clause.name)
+    head = ["  import Types", "  import Contract", f"  import Implementation = {impl_module}"]
+    module = "\n".join([f"{_MODULE} {words.names.fresh('Excluded')} {{", *head, *lemmas, "}", ""])
+    return "\n".join(predicates), module, tuple(whose)
 
 
 def _types(words: Vocabulary) -> str:
@@ -241,12 +275,17 @@ def _spec(
     words: Vocabulary,
     spec_module: str,
     contract_file: str,
+    uncovered: Sequence[tuple[str, str]],
 ) -> tuple[str, tuple[tuple[int, str], ...]]:
     inputs = signature([p.variable for p in node.inputs], words)
     outputs = signature([p.variable for p in node.outputs], words)
     env = f"Env({', '.join(words.local(p.variable) for p in node.inputs)})"
     lines = [
         f"// Generated: what an implementation of node {one_line(node.name)} must do. Do not edit.",
+        *(
+            f"// Not here: guarantee {one_line(name)}: Dafny has no counterpart for {one_line(why)}"
+            for name, why in uncovered
+        ),
         f'include "{contract_file}"',
         f"abstract {_MODULE} {spec_module} {{",
         "  import Types",
@@ -329,20 +368,17 @@ def without_env_always(probe: str) -> str:
     return probe[: probe.index(f"\n  lemma {ENV_ALWAYS}(")] + "}\n"
 
 
-def _skeleton(
+def _outline(
     past: History,
     inputs: Sequence[Variable],
     outputs: Sequence[Variable],
     words: Vocabulary,
     spec_module: str,
     impl_module: str,
-    spec_file: str,
 ) -> str:
     taken = signature(inputs, words)
     given = signature(outputs, words)
     lines = [
-        "// A skeleton: copy it into the system's models/ and fill it in. Nothing is ever written over it there.",
-        f'include "{spec_file}"',
         f"{_MODULE} {impl_module} refines {spec_module} {{",
         *past.skeleton(),
         f"  predicate Env({taken}) {{ true }}",

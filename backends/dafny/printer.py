@@ -20,55 +20,9 @@ from avow.base.plain import decimal
 from avow.base.records import dataclass
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.operators import OPERATORS, Level, Operator, Why
-from avow.language.sorts import (
-    BOOL,
-    REAL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    History,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Item,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 
 class NotExpressible(Exception):  # noqa: N818 - it names what the term is
@@ -85,7 +39,7 @@ class Predicate:
     """A generated predicate: a clause, or the body of one of its quantifiers."""
 
     name: str
-    parameters: tuple[Variable, ...]
+    parameters: tuple[t.Variable, ...]
     body: str
     origin: str
     """The clause that it comes from."""
@@ -99,54 +53,54 @@ class Vocabulary:
     """Of types, constructors and predicates."""
     locals: Names
     """Of ports and bound variables."""
-    ports: tuple[Variable, ...]
-    types: dict[Sort, str] = field(default_factory=dict)
+    ports: tuple[t.Variable, ...]
+    types: dict[s.Sort, str] = field(default_factory=dict)
     """Declared sorts that occur, in order of first use."""
     functions: set[str] = field(default_factory=set)
     """The functions of numbers that are called, without their module."""
 
-    def local(self, variable: Variable) -> str:
+    def local(self, variable: t.Variable) -> str:
         wanted = None if variable.role == "bound" else f"{variable.role}_{variable.name}"
         return self.locals(str(variable.role), variable.name, wanted)
 
-    def declared(self, sort: EnumSort | DataSort | OpaqueSort) -> str:
+    def declared(self, sort: s.EnumSort | s.DataSort | s.OpaqueSort) -> str:
         if sort not in self.types:
             self.types[sort] = self.names.fresh(sort.name)
         return f"Types.{self.types[sort]}"
 
-    def constructor(self, sort: EnumSort | DataSort, name: str) -> str:
+    def constructor(self, sort: s.EnumSort | s.DataSort, name: str) -> str:
         prefix = self.declared(sort)
         return f"{prefix}.{self.names(f'constructor of {prefix}', name)}"
 
 
-def sort_text(sort: Sort, words: Vocabulary) -> str:
+def sort_text(sort: s.Sort, words: Vocabulary) -> str:
     """The Dafny type of a sort. Raises NotExpressible."""
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return "bool"
-        case RealSort():
+        case s.RealSort():
             return "real"
-        case IntegerSort():
+        case s.IntegerSort():
             return "int"
-        case NaturalSort():
+        case s.NaturalSort():
             return "nat"
-        case StringSort():
+        case s.StringSort():
             return "string"
-        case EnumSort() | DataSort() | OpaqueSort():
+        case s.EnumSort() | s.DataSort() | s.OpaqueSort():
             return words.declared(sort)
-        case FunctionSort(parameters=parameters, result=result):
+        case s.FunctionSort(parameters=parameters, result=result):
             return f"({', '.join(sort_text(p, words) for p in parameters)}) -> {sort_text(result, words)}"
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             if len(items) < 2:
                 raise NotExpressible("a tuple of fewer than two items", None)
             return f"({', '.join(sort_text(i, words) for i in items)})"
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             return f"seq<{sort_text(item, words)}>"
-        case SetSort():
+        case s.SetSort():
             raise NotExpressible("a set outside 'in'", None)
 
 
-def print_clause(name: str, formula: Term, words: Vocabulary) -> tuple[Predicate, ...]:
+def print_clause(name: str, formula: t.Term, words: Vocabulary) -> tuple[Predicate, ...]:
     """The predicate of a clause, after those of its quantifiers. Raises NotExpressible."""
     printer = _Printer(name, words)
     body, _ = run(printer.term(formula, words.ports))
@@ -161,7 +115,7 @@ def call(predicate: Predicate, words: Vocabulary, module: str = "") -> str:
     return f"{module}{predicate.name}({arguments})"
 
 
-def signature(variables: Sequence[Variable], words: Vocabulary) -> str:
+def signature(variables: Sequence[t.Variable], words: Vocabulary) -> str:
     """Variables with their types, as parameters."""
     return ", ".join(f"{words.local(v)}: {sort_text(v.sort, words)}" for v in variables)
 
@@ -169,10 +123,10 @@ def signature(variables: Sequence[Variable], words: Vocabulary) -> str:
 _Text = tuple[str, bool]
 """Text, and whether it can stand as an operand without parentheses."""
 
-_KINDS: Mapping[Quantifier, str] = {
-    Quantifier.FORALL: "all",
-    Quantifier.EXISTS: "ex",
-    Quantifier.UNIQUE: "one",
+_KINDS: Mapping[t.Quantifier, str] = {
+    t.Quantifier.FORALL: "all",
+    t.Quantifier.EXISTS: "ex",
+    t.Quantifier.UNIQUE: "one",
 }
 
 
@@ -183,116 +137,118 @@ class _Printer:
         self.made: list[Predicate] = []
         self.count = 0
 
-    def parameters(self, term: Term, scope: tuple[Variable, ...]) -> tuple[Variable, ...]:
+    def parameters(self, term: t.Term, scope: tuple[t.Variable, ...]) -> tuple[t.Variable, ...]:
         free = free_variables(term)
         return tuple(variable for variable in scope if variable in free)
 
-    def operand(self, term: Term, scope: tuple[Variable, ...]) -> Steps[str]:
+    def operand(self, term: t.Term, scope: tuple[t.Variable, ...]) -> Steps[str]:
         text, atomic = yield self.term(term, scope)
         return text if atomic else f"({text})"
 
-    def list(self, terms: tuple[Term, ...], scope: tuple[Variable, ...]) -> Steps[str]:
+    def list(self, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> Steps[str]:
         texts = []
         for term in terms:
             text, _ = yield self.term(term, scope)
             texts.append(text)
         return ", ".join(texts)
 
-    def infix(self, operator: str, terms: tuple[Term, ...], scope: tuple[Variable, ...]) -> Steps[_Text]:
+    def infix(self, operator: str, terms: tuple[t.Term, ...], scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         texts = []
         for term in terms:
             texts.append((yield self.operand(term, scope)))
         return f" {operator} ".join(texts), len(texts) == 1
 
-    def term(self, term: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
+    def term(self, term: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         whole: _Text
         match term:
-            case Literal():
+            case t.Literal():
                 return _literal(term)
-            case EnumValue(name=name, sort=sort):
+            case t.EnumValue(name=name, sort=sort):
                 return self.words.constructor(sort, name), True
-            case Variable():
+            case t.Variable():
                 return self.words.local(term), True
-            case Construct(constructor=name, arguments=arguments, sort=sort):
+            case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 inner = yield self.list(arguments, scope)
                 made = self.words.constructor(sort, name)
                 return (f"{made}({inner})" if arguments else made), True
-            case Apply(function=function, arguments=arguments):
+            case t.Apply(function=function, arguments=arguments):
                 head = yield self.operand(function, scope)
                 inner = yield self.list(arguments, scope)
                 return f"{head}({inner})", True
-            case Index(sequence=sequence, index=index):
+            case t.Index(sequence=sequence, index=index):
                 inner = yield self.list((sequence, index), scope)
                 return f"Types.Nth({inner})", True
-            case Item(record=record, position=position):
+            case t.Item(record=record, position=position):
                 inner = yield self.operand(record, scope)
                 return f"{inner}.{position}", True
-            case Argument():
+            case t.Argument():
                 raise NotExpressible("an argument of a value's constructor", term.span)
-            case Length(sequence=sequence):
+            case t.Length(sequence=sequence):
                 inner, _ = yield self.term(sequence, scope)
                 return f"|{inner}|", True
-            case Widen(term=inner_term):
+            case t.Widen(term=inner_term):
                 inner = yield self.operand(inner_term, scope)
                 return f"{inner} as real", False
-            case Negative(term=inner_term, sort=sort):
+            case t.Negative(term=inner_term, sort=sort):
                 inner = yield self.operand(inner_term, scope)
                 # Of a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
-                return (f"-{inner}" if sort == REAL or isinstance(inner_term, Literal) else f"0 - {inner}"), False
-            case Arithmetic(operator=operator) | Operation(operator=operator):
+                return (f"-{inner}" if sort == s.REAL or isinstance(inner_term, t.Literal) else f"0 - {inner}"), False
+            case t.Arithmetic(operator=operator) | t.Operation(operator=operator):
                 whole = yield self.operation(OPERATORS[operator], term, scope)
                 return whole
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
+            case t.Conditional(condition=condition, then=then, otherwise=otherwise):
                 test, _ = yield self.term(condition, scope)
                 yes, _ = yield self.term(then, scope)
                 no, _ = yield self.term(otherwise, scope)
                 return f"(if {test} then {yes} else {no})", True
-            case TupleTerm(items=items):
+            case t.TupleTerm(items=items):
                 if len(items) < 2:
                     raise NotExpressible("a tuple of fewer than two items", term.span)
                 inner = yield self.list(items, scope)
                 return f"({inner})", True
-            case SequenceTerm(items=items, sort=sequence_sort):
+            case t.SequenceTerm(items=items, sort=sequence_sort):
                 inner = yield self.list(items, scope)
                 if items:
                     return f"[{inner}]", True
                 # An empty display alone says nothing of its type.
                 return f"(var nothing: {sort_text(sequence_sort, self.words)} := []; nothing)", True
-            case SequenceRange(low=low, high=high):
+            case t.SequenceRange(low=low, high=high):
                 inner = yield self.list((low, high), scope)
                 return f"Types.Upto({inner})", True
-            case SetTerm():
+            case t.SetTerm():
                 raise NotExpressible("a set outside 'in'", term.span)
-            case History(operator=operator):
+            case t.History(operator=operator):
                 raise NotExpressible(f"'{operator}', which speaks of other steps", term.span)
-            case Compare(operator=operator, left=left, right=right):
+            case t.Compare(operator=operator, left=left, right=right):
                 whole = yield self.infix(OPERATORS[operator].dafny, (left, right), scope)
                 return whole
-            case In(item=item, collection=collection):
+            case t.In(item=item, collection=collection):
                 whole = yield self.membership(item, collection, scope)
                 return whole
-            case Not(body=body):
+            case t.Not(body=body):
                 inner = yield self.operand(body, scope)
                 return f"!{inner}", True
-            case And(items=items):
+            case t.And(items=items):
                 whole = (yield self.infix(OPERATORS["and"].dafny, items, scope)) if items else ("true", True)
                 return whole
-            case Or(items=items):
+            case t.Or(items=items):
                 whole = (yield self.infix(OPERATORS["or"].dafny, items, scope)) if items else ("false", True)
                 return whole
-            case Implies(left=left, right=right):
+            case t.Implies(left=left, right=right):
                 whole = yield self.infix(OPERATORS["->"].dafny, (left, right), scope)
                 return whole
-            case Iff(left=left, right=right):
+            case t.Iff(left=left, right=right):
                 whole = yield self.infix(OPERATORS["<=>"].dafny, (left, right), scope)
                 return whole
-            case Quantified():
+            case t.Quantified():
                 whole = yield self.quantified(term, scope)
                 return whole
             case _:
                 assert_never(term)
 
-    def operation(self, operator: Operator, term: Arithmetic | Operation, scope: tuple[Variable, ...]) -> Steps[_Text]:
+    def operation(
+        self, operator: Operator, term: t.Arithmetic | t.Operation, scope: tuple[t.Variable, ...]
+    ) -> Steps[_Text]:
         whole: _Text
         if not operator.dafny.startswith("Types."):
             whole = yield self.infix(operator.dafny, term.children, scope)
@@ -304,15 +260,15 @@ class _Printer:
         if operator.level is not Level.ATOM:
             return f"{operator.dafny}({', '.join(texts)})", True
         sorts = {argument.sort for argument in term.children}
-        name = f"{operator.dafny}{'Real' if REAL in sorts else 'Bool' if BOOL in sorts else 'Int'}"
+        name = f"{operator.dafny}{'Real' if s.REAL in sorts else 'Bool' if s.BOOL in sorts else 'Int'}"
         self.words.functions.add(name.removeprefix("Types."))
         if not isinstance(operator.takes, Why) and operator.takes[1] is not None:
             return f"{name}({', '.join(texts)})", True
         return reduce(lambda a, b: f"{name}({a}, {b})", texts), True  # of any number: two after two
 
-    def membership(self, item: Term, collection: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
+    def membership(self, item: t.Term, collection: t.Term, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         left = yield self.operand(item, scope)
-        if not isinstance(collection, SetTerm):
+        if not isinstance(collection, t.SetTerm):
             right = yield self.operand(collection, scope)
             return f"{left} in {right}", False
         if not collection.items:
@@ -324,7 +280,7 @@ class _Printer:
             parts.append(f"{left} == {text}")
         return (f"({parts[0]})", True) if len(parts) == 1 else (" || ".join(parts), False)
 
-    def quantified(self, term: Quantified, scope: tuple[Variable, ...]) -> Steps[_Text]:
+    def quantified(self, term: t.Quantified, scope: tuple[t.Variable, ...]) -> Steps[_Text]:
         self.count += 1
         name = self.words.names.fresh(f"{self.clause}_{_KINDS[term.quantifier]}{self.count}")
         inner_scope = scope + term.variables
@@ -336,11 +292,11 @@ class _Printer:
         bound = ", ".join(f"{self.words.local(v)}: {sort_text(v.sort, self.words)}" for v in term.variables)
         applied = call(predicate, self.words)
         match term.quantifier:
-            case Quantifier.FORALL:
+            case t.Quantifier.FORALL:
                 return f"forall {bound} :: {applied}", False
-            case Quantifier.EXISTS:
+            case t.Quantifier.EXISTS:
                 return f"exists {bound} :: {applied}", False
-            case Quantifier.UNIQUE:
+            case t.Quantifier.UNIQUE:
                 table = self.words.locals.inner()
                 others = {v: table.fresh(f"{self.words.local(v)}_other") for v in term.variables}
                 more = ", ".join(f"{others[v]}: {sort_text(v.sort, self.words)}" for v in term.variables)
@@ -350,13 +306,13 @@ class _Printer:
                 return f"(exists {bound} :: {applied}) && ({unique})", False
 
 
-def _literal(term: Literal) -> _Text:
+def _literal(term: t.Literal) -> _Text:
     match term.value, term.sort:
         case bool() as truth, _:
             return ("true" if truth else "false"), True
         case str() as text, _:
             return _string(text, term.span), True
-        case int() | Fraction() as number, RealSort():
+        case int() | Fraction() as number, s.RealSort():
             return _real(Fraction(number))
         case number, _:
             return (str(number), True) if number >= 0 else (f"({number})", True)

@@ -19,19 +19,13 @@ from avow.isolation.outside import Outside
 
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members
-from .dafny_tool import dafny
+from .dafny_tool import dafny, has_commands
 from .tuning import MODEL_CHARACTERS
 
 _ANSWER = "answer.xml"
 _RESOLVED = "resolved.txt"
 _MODEL = "model.txt"
 _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
-
-
-def has_commands(version: str | None) -> bool:
-    """Whether this version is asked by commands. One that does not tell its version is asked as 2.3 is."""
-    major = re.match(r"\d+", version or "")
-    return major is not None and int(major[0]) >= 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
-"""What measured runs justify of a guarantee (see `docs/backends/experiment.md`).
+"""What recorded runs show of a guarantee (see `docs/backends/experiment.md`).
 
-`runs` reads a table of runs, or `figures` printed ones; `expression` is what is measured of each, `statistics` what
-that shows, `bound` the tolerance that the guarantee allows. `judge` says it.
+`table` reads the data, `binding` says how cells become values of ports, `options` reads the plan. `judging` judges each
+run by the guarantee's formula, and `verdict` says what that shows, with the bounds of `statistics`.
 """
 
 from .backend import ExperimentBackend

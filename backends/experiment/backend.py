@@ -1,4 +1,4 @@
-"""The experiment backend: measured runs, or the printed figures of an experiment, as evidence for a guarantee."""
+"""The experiment backend: recorded runs as evidence, each judged by the guarantee's own formula."""
 
 from __future__ import annotations
 
@@ -7,111 +7,76 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, told
+from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.verdict import Link, Object, Outcome, Verdict
-from avow.evidence.record import CASE
+from avow.base.verdict import Link, Object, Verdict
+from avow.language.contract import Clause, Node
 
 from .codes import CODES
-from .figures import Figures, read_figures
-from .judge import exceeds, failing, held_against, judge_figures, judge_runs
-from .options import SCHEMA, Experiment, read
-from .quantity import show
-from .runs import Run, Runs, read_runs
+from .options import SCHEMA, read
+from .verdict import settle
 
 
 class ExperimentBackend(Backend):
     """See `docs/backends/experiment.md`."""
 
     name = "experiment"
-    title = "measured runs, judged by exact binomial statistics"
-    version = "4"
+    title = "recorded runs, judged by the guarantee and exact binomial statistics"
+    version = "6"
     strength = Verdict.TESTED
+    remembers = True
     uses_scenario = False
     uses_criticality = True
     uses_wiring = False
-    link = Link.GUIDED
+    link = Link.MAPPED
     of = Object.RECORDING
     options_schema = SCHEMA
     codes = CODES
     green_means = (
-        "The runs in the data set stayed within the stated tolerance, often enough for the stated confidence. "
-        "It shows nothing of other conditions; that the measure is what the guarantee means is a person's judgement."
+        "The runs in the data that met the guarantee's condition met the guarantee, often enough for the stated "
+        "confidence. It shows nothing of other conditions, and that the columns are the ports is a person's word."
     )
 
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        return unsaid(self.name, node, clause)
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        experiment, problems = read(job)
-        if experiment is None:
-            return problems
         try:
-            material = _material(experiment)
+            read(job)
         except Rejected as error:
             return error.diagnostics
-        return material.warnings if isinstance(material, Runs) else ()
+        return ()
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        """Whatever the options name, also where they are not in order."""
-        return tuple(path for key in ("data", "summary") if (path := file_path(job, key)) is not None)
+        path = file_path(job, "data")
+        return (path,) if path is not None else ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        """The claim as it will be judged, in exact numbers."""
-        experiment, problems = read(job)
-        if experiment is None:
-            raise Rejected(*problems)
-        source = experiment.data or experiment.summary
+        """The claim as it will be judged; nothing where options or data are at fault."""
+        try:
+            experiment = read(job)
+        except Rejected:
+            return {}
         claim = {
             "guarantees": {o.name: o.formula for o in job.obligations},
-            "source": source.relative_to(job.root.resolve()).as_posix() if source else "",
-            "measure": experiment.measure.text if experiment.measure else "",
-            "within": str(experiment.within),
-            "strict": experiment.strict,
-            "unit": experiment.unit,
-            "confidence": str(experiment.confidence),
-            "at_least": str(experiment.at_least) if experiment.at_least is not None else None,
-            "floor": str(experiment.floor),
-            "supposed": experiment.supposed,
-            "protocol": experiment.protocol,
+            "options": job.options,
+            "conditions": {name: [c.name for c in claim.conditions] for name, claim in experiment.claims.items()},
+            "least success rate": str(experiment.at_least or experiment.floor),
         }
         return {"claim.json": document(claim) + "\n"}
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        experiment, problems = read(job)
-        found, runs, logs = _settle(job, experiment, problems)
-        outcomes = []
+        try:
+            experiment = read(job)
+        except Rejected as error:
+            why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
+            return Report.alike(job, Verdict.ERROR, why, "avow experiment", self.version)
+        outcomes, logs = [], {}
         for o in job.obligations:
-            kept = job.kept.get(o.id, ())
-            judged = held_against(found, runs, experiment, kept) if experiment is not None else found
-            outcomes.append(replace(judged, obligation=o.id, link=self.link))
+            outcome, logs[f"{o.name}.tsv"] = settle(o.name, experiment, job.kept.get(o.id, ()))
+            # what a part of the contract means in terms of columns is a person's judgement
+            link = Link.GUIDED if experiment.claims[o.name].interpreted else self.link
+            outcomes.append(replace(outcome, obligation=o.id, link=link))
         return Report(tuple(outcomes), "avow experiment", self.version, logs=logs)
-
-
-def _settle(
-    job: Job, experiment: Experiment | None, problems: tuple[Diagnostic, ...]
-) -> tuple[Outcome, tuple[Run, ...], dict[str, str]]:
-    try:
-        if experiment is None:
-            raise Rejected(*problems)
-        material = _material(experiment)
-    except Rejected as error:
-        why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
-        return Outcome("", Verdict.ERROR, why), (), {}
-    if isinstance(material, Figures):
-        return judge_figures(material, experiment), (), {}
-    judgement = judge_runs(material.runs, experiment)
-    if judgement.verdict is Verdict.REFUTED:
-        judgement.details[CASE] = failing(material.runs, experiment)
-    if material.warnings:
-        judgement.details["warnings"] = [told(job, [d]) for d in material.warnings[:20]]
-    lines = [
-        f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if exceeds(run, experiment) else 'ok'}"
-        for run in material.runs
-    ]
-    return judgement, material.runs, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}
-
-
-def _material(experiment: Experiment) -> Runs | Figures:
-    if experiment.data is not None and experiment.measure is not None:
-        return read_runs(experiment.data, experiment.measure, experiment.id_column)
-    assert experiment.summary is not None
-    return read_figures(experiment.summary, experiment.unit)

@@ -1,40 +1,63 @@
-"""The options of an experiment in plan.yaml, read and checked; every problem has its place."""
+"""The options of an experiment in plan.yaml, its data, and each guarantee ready to be judged; or all that is wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.given import existing_file, file, schema, text
 from avow.backend_kit.protocol import Job
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.plain import exact
 from avow.base.records import dataclass
-from avow.formulas.negation_normal_form import push_negations
-from avow.language.bounds import constant
-from avow.language.subterms import subterms
-from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable
+from avow.base.suggestions import suggest
+from avow.language.sorts import BOOL, REAL, Sort
 
-from .bound import Bound, upper_bound
-from .expression import Expression, Malformed, parse
-from .quantity import conversion, decimal, figure, show
+from .binding import WORDS, Binding, Interpretation, Unfit, bound, interpretation
+from .judging import Claim, Step, claim
+from .table import Row, Table, read_table
+
+_COLUMN = text("a column")
+_COLUMNS = {"type": "array", "items": _COLUMN, "minItems": 1, "description": "columns, in order"}
 
 SCHEMA = schema(
     {
         "data": file("CSV file, one row a run"),
-        "summary": text("YAML file of printed figures, where the runs are not published"),
-        "measure": text("a column, or an expression over columns; never negative"),
-        "within": {
-            "type": ["number", "string"],
-            "description": "the greatest measure of a run that succeeds: the contract's number, as in the guarantee or "
-            "as a constant's name",
+        "mapping": {
+            "type": "object",
+            "description": "the columns of a port (in.speed, out.distance); a column of the port's name needs no entry",
+            "additionalProperties": {
+                "oneOf": [
+                    _COLUMN,
+                    _COLUMNS,
+                    {
+                        "type": "object",
+                        "properties": {
+                            "field": _COLUMN,
+                            "values": {
+                                "type": "object",
+                                "additionalProperties": {"type": "string"},
+                                "description": "a cell's word: the contract's name",
+                            },
+                            "constructor": text("the column that names the constructor; a constructor: its columns"),
+                        },
+                        "additionalProperties": _COLUMNS,
+                    },
+                ]
+            },
         },
-        "unit": text("the unit of the measure and of numbers without one"),
-        "run_column": text("the column that names a run (default: run, or id)"),
-        "confidence": {
-            "type": ["number", "string"],
-            "description": "of the statistical statement: 0.9 or more, default 0.95",
+        "interpret": {
+            "type": "object",
+            "additionalProperties": {"type": "string"},
+            "description": "what a predicate, such as out.at(x, y), or a part of a guarantee means, as a formula over "
+            "columns; an assumption",
         },
+        "run_column": text("the column that identifies a run (default: run, trial or id)"),
+        "steps": {"type": "boolean", "description": "the rows of a run are its steps; without it, each row is a run"},
+        "strata": text("the column of the condition under which a run was made: each condition has a bound"),
+        "confidence": {"type": ["number", "string"], "description": "of the bound: 0.9 or more, default 0.95"},
         "at_least": {
             "type": ["number", "string"],
             "description": "the claimed probability of success, no less than the criticality asks for; without it no "
@@ -49,41 +72,14 @@ SCHEMA = schema(
             },
             "required": ["runs", "because"],
             "additionalProperties": False,
-            "description": "runs that failed before and are no longer among the data, by name, and why they do not "
-            "count",
+            "description": "runs that failed before and are no longer among the data, and why they do not count",
         },
     },
-    "within",
-    oneOf=[{"required": ["data", "measure"]}, {"required": ["summary"]}],
+    "data",
 )
 
-ID_COLUMNS = ("run", "id")
+RUN_COLUMNS = ("run", "trial", "id")
 """Where the names of runs are looked for, unless the plan says otherwise."""
-
-
-@dataclass(frozen=True, slots=True)
-class Experiment:
-    """The options in exact numbers. Either `data` and `measure`, or `summary`, is set."""
-
-    data: Path | None
-    summary: Path | None
-    measure: Expression | None
-    within: Fraction
-    strict: bool
-    """Whether a run that measures exactly `within` fails: the guarantee says `<`."""
-    unit: str
-    id_column: str | None
-    confidence: Fraction
-    at_least: Fraction | None
-    floor: Fraction
-    """The least success rate that the runs must show, whatever is claimed."""
-    protocol: str
-    supposed: str
-    """That the tolerance is what the guarantee allows, where the contract has no number to say so; else empty."""
-    left_out: tuple[str, ...] = ()
-    """Failing runs that the plan says are rightly no longer among the data, and why."""
-    because: str = ""
-
 
 FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 2)}
 """Criticality of the node → the least success rate that may be claimed, or shown."""
@@ -91,195 +87,235 @@ FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 
 LEAST_CONFIDENCE = Fraction(9, 10)
 
 
-@dataclass(slots=True)
-class Problems:
-    """Collects what is wrong, each with its place in the plan."""
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run; each step's cells (those that the guarantees read), and its values."""
 
-    job: Job
-    found: list[Diagnostic]
-
-    def add(self, key: str | None, message: str, hint: str | None = None, code: str = "EXP101") -> None:
-        options = self.job.method.options
-        self.found.append(Diagnostic(code, message, options.at(key) if key else options.span, hint=hint))
-
-
-def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
-    """The experiment, or None with what hinders it."""
-    problems = Problems(job, [])
-    options = job.options
-    data, summary = _path(problems, "data"), _path(problems, "summary")
-    if ("data" in options) == ("summary" in options):
-        problems.add(None, "an experiment has either 'data' (the runs) or 'summary' (printed figures)")
-    unit = options.get("unit", "")
-    measure = _measure(problems, "data" in options)
-    within = _within(problems, unit)
-    confidence = _probability(problems, "confidence", Fraction(95, 100))
-    if confidence is not None and not LEAST_CONFIDENCE <= confidence < 1:
-        problems.add("confidence", f"the confidence must be at least {float(LEAST_CONFIDENCE):g} and less than 1")
-    at_least = _probability(problems, "at_least", None)
-    if at_least is not None and not 0 < at_least < 1:
-        problems.add(
-            "at_least",
-            "the claimed probability of success must lie between 0 and 1",
-            "no finite number of runs shows a certainty; leave 'at_least' out to demand that no run fails",
-        )
-    floor = FLOORS[job.system.plan.node(job.node.name).criticality or "medium"]
-    if at_least is not None and 0 < at_least < floor:
-        problems.add(
-            "at_least",
-            f"a success rate of {float(at_least):g} is too little at this criticality: {float(floor):g} at least",
-            code="EXP105",
-        )
-    if problems.found or within is None or confidence is None:
-        return None, tuple(problems.found)
-    left_out = options.get("left_out", {})
-    supposed = "" if within.contracts else f"a tolerance of {within.text} is what the guarantee allows"
-    return Experiment(
-        data,
-        summary,
-        measure,
-        within.value,
-        within.strict,
-        unit,
-        options.get("run_column") or None,
-        confidence,
-        at_least,
-        floor,
-        " ".join(options.get("protocol", "").split()),
-        supposed,
-        tuple(str(name) for name in left_out.get("runs", ())),
-        " ".join(left_out.get("because", "").split()),
-    ), ()
-
-
-def _path(problems: Problems, key: str) -> Path | None:
-    if key not in problems.job.options:
-        return None
-    try:
-        return existing_file(problems.job, key, problems.job.options[key], wrong="EXP101", absent="EXP102")
-    except Rejected as rejected:
-        problems.found.extend(rejected.diagnostics)
-        return None
-
-
-def _measure(problems: Problems, wanted: bool) -> Expression | None:
-    text = problems.job.options.get("measure")
-    if text is None:
-        return None
-    if not wanted:
-        problems.add("measure", "'measure' goes with 'data'; a summary has its figures already")
-    try:
-        found = parse(text)
-    except Malformed as error:
-        problems.add("measure", f"character {error.position + 1} of the measure: {error.message}", code=error.code)
-        return None
-    for obligation in problems.job.obligations if found.halves else ():
-        if not _centre_is_free(problems.job.node.clause(obligation.name).formula):
-            message = f"half a width is no measure of {obligation.name}: it says of no place that there is one"
-            hint = (
-                "`x - mean(…)` goes with `exists(a in REAL | … a - T <= x <= a + T)`; elsewhere it halves the distance"
-            )
-            problems.add("measure", message, hint, "EXP106")
-    return found
-
-
-def _centre_is_free(formula: Term) -> bool:
-    return any(
-        isinstance(p, Quantified) and p.quantifier is Quantifier.EXISTS for p in subterms(push_negations(formula))
-    )
+    name: str
+    stratum: str
+    rows: tuple[Mapping[str, str], ...]
+    steps: tuple[Step, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class _Tolerance:
-    value: Fraction
-    """In the measure's unit."""
-    text: str
-    strict: bool
-    contracts: bool
-    """Whether each guarantee says it."""
+class Experiment:
+    """`claims` are by the guarantee's name, the others the options, in exact numbers."""
+
+    runs: tuple[Run, ...]
+    claims: Mapping[str, Claim]
+    bindings: tuple[Binding, ...]
+    confidence: Fraction
+    at_least: Fraction | None
+    floor: Fraction
+    """The least success rate that the runs must show, whatever is claimed."""
+    strata: str
+    protocol: str
+    left_out: tuple[str, ...] = ()
+    """Failing runs that the plan says are rightly no longer among the data, and why."""
+    because: str = ""
+
+    def values(self, rows: Iterable[Mapping[str, str]]) -> tuple[Step, ...]:
+        """Raises Unfit, and KeyError where a cell is missing."""
+        return tuple({b.name: b.value(cells) for b in self.bindings} for cells in rows)
 
 
-def _within(problems: Problems, unit: str) -> _Tolerance | None:
-    """The tolerance, held against the contract: where a guarantee compares with numbers it is one of them; where it
-    names none, a person has to say that it is meant, also of a constant: it may be of something else."""
-    written = problems.job.options.get("within", "")
-    constants = {n: v for n, t in problems.job.contract.constants if (v := constant(t)) is not None}
-    found = _read_tolerance(problems, written, unit, constants)
-    if found is None:
-        return None
-    value, number = found
-    if value < 0:
-        problems.add("within", "the tolerance is negative: no run could succeed")
-    if value != number:
-        message = f"'{written}' is another number in {unit} than in the contract, so it is not its tolerance"
-        hint = "the contract's numbers have no units: measure in the unit that they are meant in"
-        problems.add("within", message, hint, "EXP107")
-    formulas = [(o.name, problems.job.node.clause(o.name).formula) for o in problems.job.obligations]
-    bounds = [(name, upper_bound(formula)) for name, formula in formulas if _numbers(formula)]
-    for name, bound in bounds:
-        match bound:
-            case Bound(value=most) if most == number:
-                continue
-            case Bound(value=most):
-                why = f"{name} allows no more than {show(most)}: {written} is not its tolerance"
-            case reason:
-                why = f"{written} is not its tolerance: of {name}, {reason}"
-        hint = "a tolerance is the least number T for which the whole guarantee says `quantity <= T` or `< T`"
-        problems.add("within", why, hint, "EXP107")
-    strict = any(bound.strict for _, bound in bounds if isinstance(bound, Bound))
-    return _Tolerance(value, f"{written}", strict, len(bounds) == len(formulas))
+def read(job: Job) -> Experiment:
+    """Raises Rejected, with all that is wrong of options and data."""
+    reader = _Reader(job)
+    found = reader.experiment()
+    if found is None or reader.found:
+        raise Rejected(*reader.found)
+    return found
 
 
-def _read_tolerance(
-    problems: Problems, written: float | str, unit: str, constants: Mapping[str, Fraction]
-) -> tuple[Fraction, Fraction] | None:
-    """(in the measure's unit; as the contract would write it: without a unit of its own)."""
-    number = _number(written)
-    if number is not None:
-        return number, number
-    name, _, own = str(written).strip().partition(" ")
-    given = figure(str(written))
-    if name in constants and not own.strip():
-        return constants[name], constants[name]
-    if name in constants or given is not None:
-        source = own.strip() if name in constants or given is None else given.unit
-        factor = conversion(source, unit) if unit else None
-        if factor is None:
-            wanted = f"the measure is in {unit}" if unit else "the option 'unit' says nothing"
-            problems.add("within", f"cannot compare with '{written}': {wanted}", code="EXP104")
+class _Reader:
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.options = job.options
+        self.found: list[Diagnostic] = []
+
+    def add(self, key: str, message: str, hint: str | None = None, code: str = "EXP101", entry: str = "") -> None:
+        self.found.append(Diagnostic(code, message, self._at(key, entry), hint=hint))
+
+    def _at(self, key: str, entry: str = "") -> Span | None:
+        return self.job.method.options.at(*((key, entry) if entry else (key,)))
+
+    def experiment(self) -> Experiment | None:
+        confidence = self._probability("confidence", Fraction(95, 100))
+        if confidence is not None and not LEAST_CONFIDENCE <= confidence < 1:
+            self.add("confidence", f"the confidence must be at least {float(LEAST_CONFIDENCE):g} and less than 1")
+        at_least, floor = self._claimed()
+        table = self._table()
+        if table is None:
             return None
-        if name in constants or given is None:
-            return constants[name] * factor, constants[name]
-        return given.value * factor, given.value * factor
-    if any(name == other for other, _ in problems.job.contract.constants):
-        problems.add("within", f"the constant '{name}' is not a number")
-        return None
-    message = f"'{written}' is neither a number nor a constant of the contract"
-    problems.add("within", message, f"constants: {', '.join(constants)}")
-    return None
+        bindings = [*self._mapped(table)]
+        meanings = [*self._meanings(table)]
+        self._measured(bindings, meanings)
+        bindings += {b.name: b for one in meanings for b in one.bindings}.values()
+        claims = self._claims(bindings, meanings)
+        named = [column for binding in bindings for column in binding.columns]
+        runs = self._runs(table, named, bindings := self._read(bindings, claims))
+        if self.found or confidence is None:
+            return None
+        left_out = self.options.get("left_out", {})
+        return Experiment(
+            runs,
+            claims,
+            tuple(bindings),
+            confidence,
+            at_least,
+            floor,
+            self.options.get("strata", ""),
+            " ".join(self.options.get("protocol", "").split()),
+            tuple(str(name) for name in left_out.get("runs", ())),
+            " ".join(left_out.get("because", "").split()),
+        )
+
+    def _claimed(self) -> tuple[Fraction | None, Fraction]:
+        at_least = self._probability("at_least", None)
+        floor = FLOORS[self.job.system.plan.node(self.job.node.name).criticality or "medium"]
+        if at_least is not None and not 0 < at_least < 1:
+            hint = "no finite number of runs shows a certainty; leave 'at_least' out to demand that no run fails"
+            self.add("at_least", "the claimed probability of success must lie between 0 and 1", hint)
+        elif at_least is not None and at_least < floor:
+            message = f"a success rate of {float(at_least):g} is below the {float(floor):g} of this criticality"
+            self.add("at_least", message, code="EXP105")
+        return at_least, floor
+
+    def _probability(self, key: str, default: Fraction | None) -> Fraction | None:
+        if key not in self.options:
+            return default
+        try:
+            return exact(str(self.options[key]))  # of a float what the person typed
+        except ValueError:
+            self.add(key, f"'{key}' must be a number")
+            return None
+
+    def _table(self) -> Table | None:
+        try:
+            path = existing_file(self.job, "data", self.options.get("data", ""), wrong="EXP101", absent="EXP102")
+            return read_table(path)
+        except Rejected as rejected:
+            self.found.extend(rejected.diagnostics)
+            return None
+
+    # -- what columns mean ---------------------------------------------------------------------------------------------
+
+    def _mapped(self, table: Table) -> Iterator[Binding]:
+        ports = {p.variable.qualified: p.sort for p in (*self.job.node.inputs, *self.job.node.outputs)}
+        entries = {name: name for name in ports if name in table.columns} | self.options.get("mapping", {})
+        for name, entry in entries.items():
+            if name not in ports:
+                hint = suggest(name, tuple(ports))
+                self.add("mapping", f"{self.job.node.name} has no port '{name}'", hint, "EXP103", name)
+                continue
+            try:
+                yield bound(name, ports[name], entry)
+            except Unfit as unfit:
+                self.add("mapping", f"{name}: {unfit}", code="EXP103", entry=name)
+
+    def _meanings(self, table: Table) -> Iterator[Interpretation]:
+        columns = {name: _sort(table, name) for name in table.columns if re.fullmatch(r"[^\W\d]\w*", name)}
+        for pattern, said in self.options.get("interpret", {}).items():
+            place = self._at("interpret", pattern)
+            try:
+                yield interpretation(pattern, said, self.job.node, self.job.contract, columns, place)
+            except Unfit as unfit:
+                self.add("interpret", f"{pattern}: {unfit}", code="EXP106", entry=pattern)
+            except Rejected as rejected:
+                self.found.extend(rejected.diagnostics)
+
+    def _measured(self, bindings: Iterable[Binding], meanings: Iterable[Interpretation]) -> None:
+        """An output that is read off an input's column is no measurement."""
+        given = {column for b in bindings if b.name.startswith("in.") for column in b.columns}
+        for b in bindings:
+            if b.name.startswith("out.") and (shared := given & {*b.columns}):
+                message = f"{b.name}: column '{min(shared)}' is bound to an input too, so it measures no output"
+                self.add("mapping", message, code="EXP103", entry=b.name)
+        for one in meanings:
+            if one.output and all(column in given for b in one.bindings for column in b.columns):
+                message = f"{one.pattern_text}: its meaning reads only columns that are bound to inputs"
+                self.add("interpret", message, code="EXP106", entry=one.pattern_text)
+
+    def _claims(self, bindings: Iterable[Binding], meanings: Sequence[Interpretation]) -> Mapping[str, Claim]:
+        known, node = {binding.name for binding in bindings}, self.job.node
+        claims = {o.name: claim(self.job.clause(o), node.assumptions, meanings, known) for o in self.job.obligations}
+        for meaning in meanings:
+            if not any(meaning.text in one.interpreted for one in claims.values()):
+                message = f"{meaning.pattern_text} occurs in no guarantee of this method, and in no assumption"
+                self.add("interpret", message, code="EXP106", entry=meaning.pattern_text)
+        for name, one in claims.items():
+            for port in one.missing:
+                hint = "name its column under 'mapping', or what its predicate means under 'interpret'"
+                self.add("mapping", f"{name} speaks of {port}, and no column is bound to it", hint, "EXP103")
+            if one.remembers and not self.options.get("steps"):
+                message = f"{name}, or an assumption, speaks of other steps: a row by itself is no run"
+                self.add("data", message, "with 'steps: true', the rows of one run are its steps")
+        return claims
+
+    def _read(self, bindings: Iterable[Binding], claims: Mapping[str, Claim]) -> list[Binding]:
+        """What some guarantee, or an assumption that can be judged, reads; the others are no business of it."""
+        used = {name for one in claims.values() for name in one.reads}
+        return [binding for binding in bindings if binding.name in used]
+
+    # -- runs ----------------------------------------------------------------------------------------------------------
+
+    def _runs(self, table: Table, named: list[str], bindings: list[Binding]) -> tuple[Run, ...]:
+        column = self.options.get("run_column") or next((n for n in RUN_COLUMNS if n in table.columns), None)
+        if column is None:
+            hint = "name it under 'run_column': without one, a copied row would count as another run"
+            self.found.append(table.fault(1, "EXP112", "no column identifies a run", hint))
+            return ()
+        strata = self.options.get("strata", "")
+        read = tuple(dict.fromkeys(name for binding in bindings for name in binding.columns))
+        needed = dict.fromkeys((column, *((strata,) if strata else ()), *named))
+        confused = [fault for name in needed if (fault := table.confused(name)) is not None]
+        self.found.extend(confused)
+        if confused:
+            return ()
+        grouped = self._grouped(table, column).items()
+        return tuple(self._run(table, name, rows, strata, read, bindings) for name, rows in grouped)
+
+    def _grouped(self, table: Table, column: str) -> dict[str, list[Row]]:
+        grouped, last = dict[str, list[Row]](), None
+        for row in table.rows:
+            name = row.cells[column]
+            if not name:
+                self.found.append(table.fault(row.line, "EXP113", "the run has no name"))
+            if name in grouped and not (self.options.get("steps") and name == last):
+                first = grouped[name][0].line
+                message = f"a second run named '{name}'; the first is in line {first}"
+                hint = None if self.options.get("steps") else "with 'steps: true', the rows of a run are its steps"
+                self.found.append(table.fault(row.line, "EXP113", message, hint))
+            grouped.setdefault(name, []).append(row)
+            last = name
+        return grouped
+
+    def _run(
+        self, table: Table, name: str, rows: list[Row], strata: str, read: tuple[str, ...], bindings: list[Binding]
+    ) -> Run:
+        steps = list[Step]()
+        for row in rows:
+            step = {}
+            for binding in bindings:
+                try:
+                    step[binding.name] = binding.value(row.cells)
+                except Unfit as unfit:
+                    self.found.append(table.fault(row.line, "EXP113", str(unfit)))
+            steps.append(step)
+        among = {row.cells[strata] for row in rows} if strata else {""}
+        if len(among) > 1:
+            message = f"run '{name}' has several conditions in column '{strata}': {', '.join(sorted(among))}"
+            self.found.append(table.fault(rows[0].line, "EXP113", message))
+        return Run(name, min(among), tuple({c: row.cells[c] for c in read} for row in rows), tuple(steps))
 
 
-def _numbers(formula: Term) -> bool:
-    """Whether a guarantee compares with numbers, constants by their values; what only inputs are compared with says
-    when it applies."""
-    for comparison in subterms(formula):
-        if isinstance(comparison, Compare | In):
-            parts = [*subterms(comparison)]
-            roles = {part.role for part in parts if isinstance(part, Variable)}
-            if roles != {Role.INPUT} and any(constant(part) is not None for part in parts):
-                return True
-    return False
+def _sort(table: Table, column: str) -> Sort:
+    """Of a column in a formula: BOOL where each cell is a word for it, else REAL."""
+    words = {word for word in WORDS if word.isalpha()}
+    return BOOL if all(row.cells[column].casefold() in words for row in table.rows) else REAL
 
 
-def _probability(problems: Problems, key: str, default: Fraction | None) -> Fraction | None:
-    if key not in problems.job.options:
-        return default
-    number = _number(problems.job.options[key])
-    if number is None:
-        problems.add(key, f"'{key}' must be a number")
-    return number
-
-
-def _number(value: float | str) -> Fraction | None:
-    """Of a float what the person typed: the shortest decimal that reads as it."""
-    return decimal(str(value))
+def told(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that say what is claimed, for the exported claim."""
+    return {key: value for key, value in options.items() if key not in ("left_out", "protocol")}

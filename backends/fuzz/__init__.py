@@ -21,7 +21,7 @@ class FuzzBackend(Backend):
 
     name = "fuzz"
     title = "libFuzzer with sanitizers on the node's C++ source; kept runs judged against the contract"
-    version = "2"
+    version = "3"
     strength = Verdict.TESTED
     link = Link.GENERATED
     of = Object.BINARY
@@ -46,9 +46,9 @@ class FuzzBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        from .clang_tool import clang
+        from .clang_tool import tools
 
-        return (clang(),)
+        return tools()
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .reading import load

@@ -1,28 +1,27 @@
-"""Clang: the harness with its sanitizers, and the plain program, from the same generated files."""
+"""The harness with its sanitizers, and the plain program, from the same generated files."""
 
 from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 
-from avow.base.files import read_text
+from avow.base.files import read_regular, read_text
+from avow.base.notes import cache_folder
 from avow.base.process import Completed, ToolMissing
 from avow.base.records import dataclass
 from avow.base.tools import Tool
 from avow.isolation.observed import Observed, folded, recorded
 from avow.isolation.outside import Outside
 
-from .clang_tool import clang
+from .clang_tool import fuzzes, tools
 from .reading import Reading
 from .tables import TABLES, Drawable, native, tables
 from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
-from .unseen import WATCHED, Line, Unseen, own, unseen
+from .unseen import Line, Unseen, own, undefined, unseen
 
-_INSTALL_RUN_TIME = "sudo apt install --install-recommends clang; a package of its own, libclang-rt-*-dev, has them"
-_RUN_TIME = re.compile(r"cannot find \S*libclang_rt\.")
-"""What the linker says where clang was installed without them."""
 LINK = "avow-adapter.hpp"
 """The adapter by another name: its own path may hold what no line of C++ can say."""
 _COMMON = (
@@ -46,6 +45,8 @@ _SANITIZED = (
     "-D_GLIBCXX_ASSERTIONS",
 )
 _PLAIN = ("-O2",)
+# Without sanitizers' builds the plain program itself ends by a signal where its behaviour is undefined.
+_TRAPPED = ("-fsanitize=undefined", "-fsanitize-trap=undefined", "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_FAST")
 _FILLED = ("-ftrivial-auto-var-init=pattern", "-DAVOW_FILLED")
 _FUZZED = ("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-coverage=trace-cmp")
 
@@ -72,7 +73,7 @@ _FLAGS = {
 
 
 class NotBuilt(Exception):  # noqa: N818 - it names what happened
-    """Clang refuses the source; the message is its first error."""
+    """The compiler refuses the source; the message is its first error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,8 @@ class Built:
 
     program: Path
     read: tuple[Path, ...]
-    linked: str = ""
-    """What the linker said of the functions that are watched."""
+    asked: tuple[str, ...] = ()
+    """The names that its objects leave to libraries to define."""
 
 
 def write(reading: Reading, made: Drawable, folder: Path) -> None:
@@ -92,11 +93,11 @@ def write(reading: Reading, made: Drawable, folder: Path) -> None:
     (folder / LINK).symlink_to(reading.adapter)
 
 
-def looked_into(reading: Reading, folder: Path, outside: Outside, linked: str, seconds: float) -> Unseen:
-    """What no run shows of the source; `linked` as the plain build has it. Raises NotBuilt and ToolMissing."""
-    alone = _preprocessed(reading, folder, outside, _PLAIN, seconds)
-    fuzzing = _preprocessed(reading, folder, outside, _FLAGS[Build.FUZZED], seconds)
-    found = unseen(alone, fuzzing, linked)
+def looked_into(reading: Reading, folder: Path, outside: Outside, asked: Iterable[str], seconds: float) -> Unseen:
+    """What no run shows of the source; `asked` as the plain build has it. Raises NotBuilt and ToolMissing."""
+    alone = _preprocessed(reading, folder, outside, _flags(Build.PLAIN), seconds)
+    fuzzed = Build.FUZZED if fuzzes(_there()) else Build.PLAIN
+    found = unseen(alone, _preprocessed(reading, folder, outside, _flags(fuzzed), seconds), asked)
     return Unseen(*(plainly(said, reading, folder) for said in (found.undeclared, found.faults)))
 
 
@@ -113,11 +114,20 @@ def _preprocessed(
     return lines
 
 
+def _flags(name: Build) -> tuple[str, ...]:
+    return _FLAGS[name] if fuzzes(_there()) else (*_FLAGS[name], *_TRAPPED)
+
+
 def _there() -> Tool:
-    tool = clang()
-    if tool.path is None:
-        raise ToolMissing(f"clang++ is not here ({tool.install})")
+    tool = tools()[0]
+    if not tool.present:
+        raise ToolMissing(missing(tool))
     return tool
+
+
+def missing(tool: Tool) -> str:
+    """What is missing, and the command that installs it."""
+    return f"clang++ is {'not here' if tool.path is None else 'here without libFuzzer'}: {tool.install}"
 
 
 def _includes(reading: Reading, folder: Path) -> list[str]:
@@ -127,7 +137,7 @@ def _includes(reading: Reading, folder: Path) -> list[str]:
 
 def build(name: Build, reading: Reading, folder: Path, outside: Outside, seconds: float) -> Built:
     """Raises NotBuilt and ToolMissing."""
-    tool, flags = _there(), _FLAGS[name]
+    tool, flags = _there(), _flags(name)
     main = "harness.cpp" if name is Build.FUZZED else "replay.cpp"
     objects: list[str] = []
     read: list[Path] = []
@@ -141,26 +151,36 @@ def build(name: Build, reading: Reading, folder: Path, outside: Outside, seconds
         objects.append(str(object_file))
         read += _listed(listed, folder)
     program = folder / name
-    watched = [f"-Wl,-y,{function}" for function in WATCHED]
-    done = _clang(tool, [*flags, *watched, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
+    done = _clang(tool, [*flags, *objects, "-o", str(program), "-lpthread"], folder, outside, seconds)
     if done.code != 0 or not program.is_file():
-        if _RUN_TIME.search(done.stderr):
-            raise ToolMissing(f"clang's run-time libraries, which it links, are not here ({_INSTALL_RUN_TIME})")
         raise NotBuilt(_first(done, reading, folder))
-    return Built(program, tuple(dict.fromkeys(read)), done.stdout + done.stderr)
+    try:
+        asked = tuple(dict.fromkeys(n for o in objects for n in undefined(read_regular(Path(o)))))
+    except ValueError as error:
+        raise NotBuilt(str(error)) from None
+    return Built(program, tuple(dict.fromkeys(read)), asked)
 
 
 def _clang(tool: Tool, words: list[str], folder: Path, outside: Outside, seconds: float) -> Completed:
-    limit = max(5.0, min(seconds, BUILD_SECONDS))
-    return outside.run([str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
+    if fuzzes(tool):
+        limit = max(5.0, min(seconds, BUILD_SECONDS))
+        return outside.run([str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
+    kept = {f"ZIG_{which}_CACHE_DIR": str(_wheel_cache()) for which in ("GLOBAL", "LOCAL")}
+    # its first build builds the standard library: a minute of processor time
+    return outside.run([str(tool.path), "c++", *words], cwd=folder, seconds=max(5.0, seconds), env=kept)
+
+
+def _wheel_cache() -> Path:
+    """Where the wheel's compiler keeps the standard library that it has built."""
+    return cache_folder() / "zig"
 
 
 def _first(done: Completed, reading: Reading, folder: Path) -> str:
-    """Clang's first error, with a place that is the same on every machine."""
+    """The compiler's first error, with a place that is the same on every machine."""
     if done.timed_out:
-        return "clang did not end in the time given"
+        return "the compiler did not end in the time given"
     lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
-    said = (lines or done.stderr.strip().splitlines() or [f"clang ended with code {done.code}"])[0]
+    said = (lines or done.stderr.strip().splitlines() or [f"the compiler ended with code {done.code}"])[0]
     return plainly(said, reading, folder)[:300]
 
 
@@ -189,4 +209,5 @@ def observed(reading: Reading, built: tuple[Built, ...], outside: Outside) -> tu
     read = dict.fromkeys(path for one in built for path in one.read)
     folders = dict.fromkeys([reading.adapter.parent, *reading.include])
     told = recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])
-    return folded((*told, *outside.observed()))
+    kept = f"{_wheel_cache()}{os.sep}"
+    return folded((*told, *(each for each in outside.observed() if not f"{each.path}{os.sep}".startswith(kept))))

@@ -1,9 +1,52 @@
-"""Is Clang here, and in which version? Apart from `building`, as every run asks and few build."""
+"""Which compiler is here, with libFuzzer or without? Apart from `building`, as every run asks and few build."""
 
 from __future__ import annotations
 
-from avow.base.tools import Tool, find_tool
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+from avow.base.tools import Tool, find_tool, package_version, tried
+
+_TARGET = """#include <cstddef>
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, std::size_t) { return 0; }
+"""
+
+
+def tools() -> tuple[Tool, ...]:
+    """Clang; where it is not here, the compiler of the extra `cpp` first, with which no sanitizer of addresses and no
+    libFuzzer comes."""
+    found, wheel = clang(), None if clang().present else zig()
+    return (found,) if wheel is None else (wheel, replace(found, optional=True))
+
+
+def fuzzes(tool: Tool) -> bool:
+    """Whether a compiler links libFuzzer."""
+    return tool.name == "clang++"
+
+
+def zig() -> Tool | None:
+    """The C++ compiler of the wheel `ziglang`, if that is installed."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or not spec.submodule_search_locations:
+        return None
+    path = Path(spec.submodule_search_locations[0], "zig")
+    return Tool("zig", package_version("ziglang"), str(path), "pip install 'avow[cpp]'", optional=False)
 
 
 def clang() -> Tool:
-    return find_tool("clang++", install="sudo apt install clang", optional=False)
+    """Missing also where its run-time libraries are: they are packages of their own, and nothing links without them."""
+    found = find_tool("clang++", install="sudo apt install clang", optional=False)
+    if not found.present:
+        return found
+    resources = find_tool("clang++", ("-print-resource-dir",), install="", pattern=r"/.+").version or ""
+    if not any(Path(resources).glob("lib/*/libclang_rt.fuzzer*.a")):
+        version = (found.version or "").partition(".")[0]
+        return replace(found, version=None, install=f"sudo apt install libclang-rt-{version}-dev")
+    return replace(found, trial=_trial)
+
+
+def _trial() -> str:
+    """Links and runs a fuzz target."""
+    build = ("clang++", "-fsanitize=fuzzer,address,undefined", "target.cpp", "-o", "target")
+    return tried([build, ("./target", "-runs=10")], "target.cpp", _TARGET, "DONE")

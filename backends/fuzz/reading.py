@@ -93,7 +93,7 @@ def load(job: Job) -> Reading:
     )
     sources, wrong = _paths(job, "sources", Path.is_file)
     include, odd = _paths(job, "include", Path.is_dir)
-    params, unclear = parameters(job.root, source)
+    params, unclear = parameters(job.root, source, job.system.plan.ros.names.placed(job.node.name).name)
     faults += [*wrong, *odd, *unclear]
     if faults or adapter is None:
         raise Rejected(*faults)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import secrets
@@ -21,18 +22,18 @@ from typing import Any, assert_never
 from avow.base import process
 from avow.base.codec import Unreadable, from_text
 from avow.base.tuning.running import SUBJECT_PATIENCE
+from avow.base.tuning.sizes import LOG_KEPT
 from avow.base.verdict import Isolation
 from avow.isolation import judge
 from avow.isolation.level import available, sealed
-from avow.isolation.observed import Observed
-from avow.isolation.printed import Names, Printed
+from avow.isolation.observed import Observed, recorded
 from avow.isolation.subject import Message, SubjectFailed, SubjectProcess
+from avow.isolation.tracing import Trace, remedy, traces
 
 _OPTIONS = {
     "ASAN_OPTIONS": "detect_leaks=0:symbolize=1:handle_abort=0:allocator_may_return_null=0",
     "UBSAN_OPTIONS": "print_stacktrace=0:halt_on_error=1",
 }
-_SCRATCH = "/tmp/avow-scratch"
 
 
 _CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGTRAP))
@@ -42,14 +43,15 @@ _CRASHES = frozenset((signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGIL
 class _Program(SubjectProcess):
     """A compiled program of the user's in a process of its own. It reads a line ``TURN|COMMAND|COMMAND…`` and answers
     with one line of JSON that has the same turn: what its own code writes into the channel is no answer. Nothing of it
-    is seen from within: what it reads is told by strace, and where there is none, by nobody.
+    is seen from within: strace reports what it reads.
 
     Each case is ``{"command": text}``; the text holds neither ``|`` nor the end of a line."""
 
-    def __init__(self, path: Path, patience: float, root: Path, names: Sequence[str] = ()) -> None:
-        super().__init__(path, "", patience, root, names)
+    def __init__(self, path: Path, patience: float, root: Path) -> None:
+        super().__init__(path, "", patience, root)
         self._turn = ""
-        self._events["program", f"the program {path.name}"] = None
+        self._traces: list[Trace] = []
+        self._looked: dict[tuple[str, str], None] = {}
 
     def crashed(self) -> str:
         """The signal that its own code ended with; empty where it ended otherwise."""
@@ -57,9 +59,24 @@ class _Program(SubjectProcess):
         number = -code if code < 0 else code - 128
         return signal.Signals(number).name if number in _CRASHES else ""
 
-    def _command(self, there: int, back: int, mark: str) -> tuple[list[str], tuple[Path, ...]]:
-        command = [str(self.path), str(there), str(back), mark or "/avow-unmarked", self.isolation.value]
-        return command, (self.path.parent,)
+    def observed(self) -> tuple[Observed, ...]:
+        """What strace reported of it; without strace nobody knows."""
+        for trace in self._traces:
+            told = trace.read_all(str(self.path), self.root)
+            self._looked.update(dict.fromkeys(told or [("outside", f"what no trace reports of {self.path.name}")]))
+        self._traces.clear()
+        built = str(self.path.parent) + os.sep
+        return recorded(each for each in self._looked if not each[1].startswith(built))
+
+    def _command(self, there: int, back: int) -> list[str]:
+        return [str(self.path), str(there), str(back)]
+
+    def _around(self, command: list[str]) -> list[str]:
+        if not traces():
+            self._looked["outside", f"what {self.path.name} reads, which nothing records here ({remedy()})"] = None
+            return command
+        self._traces.append(Trace())
+        return self._traces[-1].around(command)
 
     def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
         self._turn = secrets.token_hex(8)
@@ -143,8 +160,6 @@ class Question:
     ask: Campaign | Runs | Show
     root: str
     seconds: float
-    names: tuple[str, ...]
-    """What has a verdict: `avow.isolation.printed.Names.of`."""
 
 
 def campaign(asked: Campaign, question: Question) -> Campaigned:
@@ -157,7 +172,7 @@ def campaign(asked: Campaign, question: Question) -> Campaigned:
     os.close(nonces)
     command = [str(folder / "fuzz"), *asked.options, f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
     if level is Isolation.SEALED:
-        command = sealed(command, (folder, Path(question.root)), _SCRATCH, (kept,))
+        command = sealed(command, kept)
     told = {"AVOW_CHANNEL": str(channel.theirs), "AVOW_NONCE": str(source), "HOME": str(kept), "TMPDIR": str(kept)}
     code, left, said, printed = _ended(command, kept, question, channel, told, source)
     words = said.split()
@@ -166,9 +181,7 @@ def campaign(asked: Campaign, question: Question) -> Campaigned:
     fault = "the source left processes behind" if left and level is not Isolation.SEALED else ""
     if closed and words[1] == "left":
         fault = fault or "the source ended the process within a step"
-    if printed.result:
-        fault = f"the source {printed.told()}"
-    return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, printed.log(), level)
+    return Campaigned(code, int(words[2]) if done and words[2].isdigit() else 0, fault, printed, level)
 
 
 def _ended(
@@ -178,32 +191,32 @@ def _ended(
     channel: judge.Channel,
     told: Mapping[str, str],
     given: int,
-) -> tuple[int | None, bool, str, Printed]:
+) -> tuple[int | None, bool, str, str]:
     """Run a build with sanitizers to its end, and end all that it leaves; `given` is a descriptor that it reads. Its
-    exit code (None: its time was up), whether it left something, what came through the channel, and what it printed."""
-    printed = Printed(Names.of(question.names), keeps=True)
-    started = subprocess.Popen(
-        command,
-        cwd=cwd,
-        stdin=subprocess.DEVNULL,
-        stdout=printed.theirs[0],
-        stderr=printed.theirs[1],
-        env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
-        start_new_session=True,
-        pass_fds=(channel.theirs, given),
-    )
-    process.watch(started.pid)
-    printed.begun()
-    os.close(channel.theirs)
-    ended = os.pidfd_open(started.pid)
-    code = started.wait() if printed.wait((ended,), (), question.seconds) else None
-    os.close(ended)
-    process.kill_tree(started.pid)
-    started.wait()
-    process.unwatch(started.pid)
-    left = process.end_orphans()
-    printed.end()
-    said = channel.close() or b""
+    exit code (None: its time was up), whether it left something, what came through the channel, and the end of what it
+    printed as errors."""
+    with tempfile.TemporaryFile() as errors:
+        started = subprocess.Popen(
+            command,
+            cwd=cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), **told, "LC_ALL": "C.UTF-8"},
+            start_new_session=True,
+            pass_fds=(channel.theirs, given),
+        )
+        process.watch(started.pid)
+        code: int | None = None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            code = started.wait(question.seconds)
+        process.kill_tree(started.pid)
+        started.wait()
+        process.unwatch(started.pid)
+        left = process.end_orphans()
+        errors.seek(max(0, errors.seek(0, os.SEEK_END) - LOG_KEPT))
+        printed = errors.read().decode("utf-8", "replace")
+    said = channel.close()
     return code, left, said.decode("utf-8", "replace"), printed
 
 
@@ -223,14 +236,14 @@ def answered(asked: Runs, question: Question) -> Answered:
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
                 unsteady = k
-    observed = program.observed()[1:]  # no interpreter runs it
+    observed = program.observed()
     return Answered(tuple(first), faults, silent, unsteady, observed, program.isolation)
 
 
 def _all(
     path: str, runs: Sequence[tuple[str, ...]], most: int, question: Question, end: float
 ) -> tuple[list[Run], str, _Program]:
-    program = _Program(Path(path), SUBJECT_PATIENCE, Path(question.root), question.names)
+    program = _Program(Path(path), SUBJECT_PATIENCE, Path(question.root))
     found: list[Run] = []
     crashes = 0
     fault = ""
@@ -262,9 +275,9 @@ def shown(asked: Show, question: Question) -> Shown:
             lines.write(f"{k}|{line}\n".encode())
         lines.flush()
         lines.seek(0)
-        command = [str(program), str(lines.fileno()), str(channel.theirs), "/avow-unmarked", "alone"]
+        command = [str(program), str(lines.fileno()), str(channel.theirs)]
         if level is Isolation.SEALED:
-            command = sealed(command, (program.parent, Path(question.root)), _SCRATCH)
+            command = sealed(command)
         code, _, said, printed = _ended(command, Path(question.root), question, channel, {}, lines.fileno())
     replies: list[Any] = []
     for line in said.splitlines():
@@ -274,7 +287,7 @@ def shown(asked: Show, question: Question) -> Shown:
             break
         if message.turn == str(len(replies)) and message.replies:
             replies.append(message.replies[0]["value"])
-    return Shown(tuple(replies), code, printed.log())
+    return Shown(tuple(replies), code, printed)
 
 
 def _answer(question: Question) -> Campaigned | Answered | Shown:

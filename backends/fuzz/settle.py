@@ -32,12 +32,23 @@ from avow.isolation.outside import Outside
 
 from . import building
 from .building import Build, NotBuilt
-from .clang_tool import clang
+from .clang_tool import fuzzes, tools
 from .drawn import Drawn, Step, command
 from .reading import Reading, load
 from .runner import Answered, Campaign, Campaigned, Question, Run, Runs, Show, Shown
 from .tables import drawable
-from .tuning import HANGS, LONGEST_RUN, MOST_CRASHES, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
+from .tuning import (
+    HANGS,
+    LONGEST_RUN,
+    MOST_CRASHES,
+    MOST_JUDGED,
+    RESIDENT,
+    SEED_BYTES,
+    SEEDS,
+    SHORTENED,
+    SWEPT,
+    UNGUIDED,
+)
 from .unseen import Unseen
 from .verdicts import Bench, Broken, Counts, Misused
 
@@ -47,14 +58,14 @@ TOOL = "libfuzzer"
 
 def settle(job: Job, limits: Limits) -> Report:
     """One outcome for each obligation and claim."""
-    tool = clang()
-    version = f"clang {tool.version}"
+    tool = tools()[0]
+    version = f"{'clang' if fuzzes(tool) else tool.name} {tool.version}"
     if not job.every:
         return Report((), TOOL, version)
     try:
         available()
         if not tool.present:
-            return Report.alike(job, Verdict.NOT_RUN, f"clang++ is not here: {tool.install}", TOOL, version)
+            return Report.alike(job, Verdict.NOT_RUN, building.missing(tool), TOOL, version)
         reading = load(job)
     except Unavailable as missing:
         return Report.unsealed(job, missing, TOOL, version)
@@ -102,7 +113,7 @@ class Work:
 
     def __post_init__(self) -> None:
         self._end = time.monotonic() + self.limits.seconds * 0.9
-        self._outside = Outside((clang(),))
+        self._outside = Outside(tools())
 
     @property
     def job(self) -> Job:
@@ -115,39 +126,42 @@ class Work:
         reading = self.reading
         made = drawable(reading)
         building.write(reading, made, self.folder)
-        built: list[building.Built] = []
+        built: dict[Build, building.Built] = {}
+        fuzzed = fuzzes(tools()[0])
         try:
-            for wanted in (Build.FUZZED, Build.PLAIN, Build.FILLED):
-                built.append(building.build(wanted, reading, self.folder, self._outside, self._left()))
-            unseen = building.looked_into(reading, self.folder, self._outside, built[1].linked, self._left())
+            for wanted in (*([Build.FUZZED] if fuzzed else []), Build.PLAIN, Build.FILLED):
+                built[wanted] = building.build(wanted, reading, self.folder, self._outside, self._left())
+            asked = built[Build.PLAIN].asked
+            unseen = building.looked_into(reading, self.folder, self._outside, asked, self._left())
         finally:  # also of what cannot be built: it may be once a library is there
-            self.observed.update(dict.fromkeys(building.observed(reading, tuple(built), self._outside)))
+            self.observed.update(dict.fromkeys(building.observed(reading, tuple(built.values()), self._outside)))
+        program = built[Build.PLAIN].program
         bench = Bench(reading)
         kept = self.folder / "kept"
-        seeds = self._seeds(kept / "corpus")
-        campaign = self._campaign(kept)
+        seeds = self._seeds(kept / "corpus", SEEDS if fuzzed else UNGUIDED)
+        campaign = self._campaign(kept) if fuzzed else None
         faults = _files(kept, "fault-", 10)
         found = [Drawn(data, made, reading.single) for data in (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2))]
         drawn = [one.steps(reading.asked, reading.steps) for one in found]
         bench.recorded = recorded(self.job, [port.name for port in reading.asked])
         shown = _different([[dict(step) for step in run] for run in bench.recorded.runs])
         runs = _different([*shown, *self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
-        answer = self._asked(built[1].program, runs, built[2].program)
+        answer = self._asked(program, runs, built[Build.FILLED].program)
         judged = 0
         for run, reply in zip(runs, answer.runs, strict=False):
             bench.judge(run, reply)
             judged += 1
             bench.kept = len(bench.compared) if judged <= len(shown) else bench.kept
-        self._confirm(bench, built[1].program)
+        self._confirm(bench, program)
         if answer.unsteady is not None and not bench.broken:
             said = bench.words(runs[answer.unsteady])
             why = "asked again, where what nothing was written to holds other bytes, it answers otherwise"
             raise Unanswered(Verdict.UNKNOWN, f"undeclared input: {why} ({said})")
         fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
-        if not faults and campaign.done < reading.runs and not bench.crash:
+        if campaign is not None and not faults and campaign.done < reading.runs and not bench.crash:
             raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
-        apart = bench.apart(self._special(bench, built[1].program)) if judged else []
-        counts = Counts(campaign.done, len(runs), judged, self.limits.seed)
+        apart = bench.apart(self._special(bench, program)) if judged else []
+        counts = Counts(None if campaign is None else campaign.done, len(runs), judged, self.limits.seed)
         return tuple(_doubted(o, unseen) for o in bench.outcomes(counts, fault, bool(faults), tuple(apart)))
 
     # -- the steps of it ---------------------------------------------------------------------------------
@@ -157,7 +171,7 @@ class Work:
 
     def _ask(self, kind: type[T], ask: Campaign | Runs | Show) -> T:
         place = self.folder / "question.json"
-        question = Question(ask, str(self.job.root.resolve()), self._left(), ("fuzz", *(o.id for o in self.job.every)))
+        question = Question(ask, str(self.job.root.resolve()), self._left())
         place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
             kind,
@@ -177,10 +191,10 @@ class Work:
             raise Unanswered(Verdict.ERROR, f"its judge ended without an answer: {last[0][:200]}", True)
         return answer
 
-    def _seeds(self, corpus: Path) -> list[bytes]:
+    def _seeds(self, corpus: Path, count: int) -> list[bytes]:
         corpus.mkdir(parents=True)
         chance = random.Random(self.limits.seed)
-        seeds = [chance.randbytes(SEED_BYTES[k % len(SEED_BYTES)]) for k in range(SEEDS)]
+        seeds = [chance.randbytes(SEED_BYTES[k % len(SEED_BYTES)]) for k in range(count)]
         for seed in seeds:
             (corpus / sha256(seed.hex())[:40]).write_bytes(seed)
         return seeds

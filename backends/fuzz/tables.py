@@ -12,52 +12,17 @@ from typing import Any, assert_never
 
 from avow.backend_kit.programs.samples import around, as_single, leaves, numbers_of
 from avow.base.records import dataclass
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.contract import Port
 from avow.language.operators import definition
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Conditional,
-    EnumValue,
-    Iff,
-    Implies,
-    Index,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-    Widen,
-)
 
 from .reading import Reading, item_of, texts
 from .tuning import WRITTEN
 
 TABLES = "contract.inc"
 ENDS = (
-    *(s * 2**n + d for n in (7, 8, 15, 16, 31, 32, 53) for s in (1, -1) for d in (-1, 0, 1)),
+    *(sign * 2**n + d for n in (7, 8, 15, 16, 31, 32, 53) for sign in (1, -1) for d in (-1, 0, 1)),
     2**63 - 1,
     -(2**63),
 )
@@ -118,7 +83,7 @@ def tables(reading: Reading, made: Drawable) -> str:
     ]
     for k, port in enumerate((*node.inputs, *node.outputs)):
         item = item_of(port.sort)
-        names = ", ".join(map(_text, item.members)) if isinstance(item, EnumSort) else '""'
+        names = ", ".join(map(_text, item.members)) if isinstance(item, s.EnumSort) else '""'
         lines.append(f"static const char* const ELEMENTS_{k}[] = {{{names}}};")
     lines += _array("Port", "INPUT", "INPUTS", (_port(p, k, reading) for k, p in enumerate(node.inputs)), _NO_PORT)
     outputs = (_port(p, k, reading) for k, p in enumerate(node.outputs, len(node.inputs)))
@@ -148,23 +113,31 @@ def _array(kind: str, one: str, name: str, items: Iterable[str], nothing: str) -
 
 def _port(port: Port, k: int, reading: Reading) -> str:
     item = item_of(port.sort)
-    many, natural = isinstance(port.sort, SequenceSort), isinstance(item, NaturalSort)
+    many, natural = isinstance(port.sort, s.SequenceSort), isinstance(item, s.NaturalSort)
     flags = ", ".join(str(flag).lower() for flag in (many, natural, port.name in reading.memory))
-    members = len(item.members) if isinstance(item, EnumSort) else 1
+    members = len(item.members) if isinstance(item, s.EnumSort) else 1
     return f"{{{_text(port.name)}, Sort::{sort_name(item)}, {flags}, ELEMENTS_{k}, {members}}}"
 
 
-def sort_name(sort: Sort) -> str:
+def sort_name(sort: s.Sort) -> str:
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return "truth"
-        case IntegerSort() | NaturalSort():
+        case s.IntegerSort() | s.NaturalSort():
             return "integer"
-        case EnumSort():
+        case s.EnumSort():
             return "element"
-        case RealSort():
+        case s.RealSort():
             return "real"
-        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+        case (
+            s.StringSort()
+            | s.DataSort()
+            | s.OpaqueSort()
+            | s.FunctionSort()
+            | s.TupleSort()
+            | s.SequenceSort()
+            | s.SetSort()
+        ):
             # refused when the source is read
             raise TypeError(f"{sort} is no machine value")
         case _:
@@ -228,13 +201,13 @@ _WRITTEN = {
     "*": "times",
     "/": "divide",
 }
-_FORMS: Mapping[type[Term], str] = {
-    Widen: "widen",
-    Negative: "negate",
-    Not: "no",
-    Implies: "implies",
-    Iff: "same",
-    Conditional: "choose",
+_FORMS: Mapping[type[t.Term], str] = {
+    t.Widen: "widen",
+    t.Negative: "negate",
+    t.Not: "no",
+    t.Implies: "implies",
+    t.Iff: "same",
+    t.Conditional: "choose",
 }
 
 
@@ -255,9 +228,9 @@ class _Guide:
     inputs: Mapping[str, int]
     outputs: Mapping[str, int]
     parts: list[_Part] = field(default_factory=list)
-    _bound: list[Variable] = field(default_factory=list)
+    _bound: list[t.Variable] = field(default_factory=list)
 
-    def root(self, term: Term) -> int:
+    def root(self, term: t.Term) -> int:
         """The place of a formula's tree."""
         try:
             return self._of(term)
@@ -268,33 +241,33 @@ class _Guide:
         self.parts.append(part)
         return len(self.parts) - 1
 
-    def _joined(self, op: str, items: tuple[Term, ...]) -> int:
+    def _joined(self, op: str, items: tuple[t.Term, ...]) -> int:
         at = self._of(items[-1])
         for item in reversed(items[:-1]):
             at = self._put(_Part(op, self._of(item), at))
         return at
 
-    def _of(self, term: Term) -> int:
+    def _of(self, term: t.Term) -> int:
         match term:
-            case Literal(value=bool() | int() | Fraction() as value):
+            case t.Literal(value=bool() | int() | Fraction() as value):
                 return self._number(Fraction(value))
-            case EnumValue(name=name, sort=EnumSort(members=members)):
+            case t.EnumValue(name=name, sort=s.EnumSort(members=members)):
                 return self._number(Fraction(members.index(name)))
-            case Variable():
+            case t.Variable():
                 return self._variable(term)
-            case Arithmetic(operator=operator) | Compare(operator=operator) if operator in _WRITTEN:
+            case t.Arithmetic(operator=operator) | t.Compare(operator=operator) if operator in _WRITTEN:
                 return self._put(_Part(_WRITTEN[operator], *map(self._of, term.children)))
-            case Widen() | Negative() | Not() | Implies() | Iff() | Conditional():
+            case t.Widen() | t.Negative() | t.Not() | t.Implies() | t.Iff() | t.Conditional():
                 return self._put(_Part(_FORMS[type(term)], *map(self._of, term.children)))
-            case And(items=items) | Or(items=items) if items:
-                return self._joined("both" if isinstance(term, And) else "either", items)
-            case Length(sequence=Variable(role=role, name=name)) if self._port(role, name) is not None:
+            case t.And(items=items) | t.Or(items=items) if items:
+                return self._joined("both" if isinstance(term, t.And) else "either", items)
+            case t.Length(sequence=t.Variable(role=role, name=name)) if self._port(role, name) is not None:
                 return self._put(_Part(f"length_{_side(role)}", self._port(role, name) or 0))
-            case Index(sequence=Variable(role=role, name=name), index=index) if self._port(role, name) is not None:
+            case t.Index(sequence=t.Variable(role=role, name=name), index=index) if self._port(role, name) is not None:
                 return self._put(_Part(f"index_{_side(role)}", self._port(role, name) or 0, self._of(index)))
-            case Operation() if (same := definition(term)) is not None:
+            case t.Operation() if (same := definition(term)) is not None:
                 return self._of(same)
-            case Quantified(quantifier=quantifier, variables=variables, body=body):
+            case t.Quantified(quantifier=quantifier, variables=variables, body=body):
                 return self._quantified(quantifier, variables, body)
             case _:  # what the harness does not look at
                 return self._put(_Part("unknown"))
@@ -305,10 +278,10 @@ class _Guide:
         except OverflowError:
             return self._put(_Part("unknown"))
 
-    def _port(self, role: Role, name: str) -> int | None:
-        return {Role.INPUT: self.inputs, Role.OUTPUT: self.outputs}.get(role, {}).get(name)
+    def _port(self, role: t.Role, name: str) -> int | None:
+        return {t.Role.INPUT: self.inputs, t.Role.OUTPUT: self.outputs}.get(role, {}).get(name)
 
-    def _variable(self, term: Variable) -> int:
+    def _variable(self, term: t.Variable) -> int:
         at = self._port(term.role, term.name)
         if at is not None:
             return self._put(_Part(_side(term.role), at))
@@ -316,18 +289,18 @@ class _Guide:
             return self._put(_Part("bound", len(self._bound) - 1 - self._bound[::-1].index(term)))
         return self._put(_Part("unknown"))
 
-    def _quantified(self, quantifier: Quantifier, variables: tuple[Variable, ...], body: Term) -> int:
-        whole = all(isinstance(v.sort, NaturalSort | IntegerSort) for v in variables)
-        if quantifier not in (Quantifier.FORALL, Quantifier.EXISTS) or not whole or len(self._bound) > 6:
+    def _quantified(self, quantifier: t.Quantifier, variables: tuple[t.Variable, ...], body: t.Term) -> int:
+        whole = all(isinstance(v.sort, s.NaturalSort | s.IntegerSort) for v in variables)
+        if quantifier not in (t.Quantifier.FORALL, t.Quantifier.EXISTS) or not whole or len(self._bound) > 6:
             return self._put(_Part("unknown"))
         self._bound += variables
         at = self._of(body)
-        op = "every" if quantifier is Quantifier.FORALL else "some"
+        op = "every" if quantifier is t.Quantifier.FORALL else "some"
         for _ in variables:
             self._bound.pop()
             at = self._put(_Part(op, at, len(self._bound)))
         return at
 
 
-def _side(role: Role) -> str:
-    return "input" if role is Role.INPUT else "output"
+def _side(role: t.Role) -> str:
+    return "input" if role is t.Role.INPUT else "output"

@@ -9,6 +9,9 @@ STEPS = 12
 SEEDS = 400
 """Runs drawn before libFuzzer begins, which are judged like those that it keeps: thresholds are in most of them."""
 
+UNGUIDED = 4_000
+"""Runs drawn where libFuzzer is not here: ten times as many, as none is led on by what it reached."""
+
 SEED_BYTES = (8, 24, 64, 160)
 """Their lengths: one step of a few numbers, up to several of many."""
 

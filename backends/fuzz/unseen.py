@@ -1,13 +1,14 @@
 """What no run of a source shows: where sanitizers do not look, and what it uses that no record can hold.
 
-Both are told from the source as the compiler sees it: its preprocessed text, and the functions that its object files
+Both are read from the source as the compiler sees it: its preprocessed text, and the functions that its object files
 name. A sentence of this module never refutes; it keeps a good answer from being given.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+import struct
+from collections.abc import Iterable, Iterator
 from itertools import zip_longest
 from pathlib import Path
 
@@ -24,6 +25,9 @@ UNDECLARED = {
     **dict.fromkeys((f"_ZNSt6chrono3_V21{n}_clock3nowEv" for n in ("2system", "2steady")), _CLOCK),
     **dict.fromkeys(("getrandom", "getentropy", "arc4random", "arc4random_buf", "arc4random_uniform"), _CHANCE),
     "_ZNSt13random_device9_M_getvalEv": _CHANCE,
+    **dict.fromkeys((f"_ZNSt3__16chrono12{n}_clock3nowEv" for n in ("system", "steady")), _CLOCK),  # of libc++
+    "_ZNSt3__113random_deviceclEv": _CHANCE,
+    "_ZNSt3__16thread20hardware_concurrencyEv": _MACHINE,
     **dict.fromkeys(("gethostname", "uname", "getppid", "gettid", "getloadavg", "getrusage"), _MACHINE),
     "_ZNSt6thread20hardware_concurrencyEv": _MACHINE,
     **dict.fromkeys(("syscall", "dlopen", "dlsym"), _HIDDEN),
@@ -33,18 +37,16 @@ UNDECLARED = {
 CATCHING = ("signal", "sigaction", "sysv_signal", "__sysv_signal", "bsd_signal", "sigset", "sigvec")
 """Functions after which a fault no longer ends the program."""
 
-WATCHED = (*UNDECLARED, *CATCHING)
-"""What the linker tells references to."""
-
 _ASSEMBLER = re.compile(r'\b(?:asm|__asm|__asm__)\b(?:\s*(?:volatile|__volatile__|goto|inline))*\s*\(\s*(?!""\s*[:)])')
 _COUNTER = re.compile(r"\b(__rdtscp?|_rdrand\w*|_rdseed\w*|__builtin_ia32_rd\w+|__builtin_readcyclecounter)\b")
 _SWITCHED = re.compile(
     r"\b(\w*no_sanitize\w*|no_address_safety_analysis|disable_sanitizer_instrumentation"
     r"|__(?:asan|ubsan|lsan|sanitizer|sancov)_\w+|LLVMFuzzer\w+)\b"
 )
+_SYMBOLS = 2
+"""The kind of an ELF section that has symbols."""
 _TEXT = re.compile(r'"(?:\\.|[^"\\])*"')
 _MARKER = re.compile(r'# (\d+) "((?:\\.|[^"\\])*)"([ \d]*)$')
-_REFERENCE = re.compile(r"\S+\.o: reference to (\S+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +86,25 @@ def own(preprocessed: str, generated: Path, adapter: Path) -> Iterator[Line]:
         number += 1
 
 
-def unseen(plain: list[Line], fuzzed: list[Line], linked: str) -> Unseen:
-    """Of a source as the plain build and the sanitizers' build see it, and what the linker says of WATCHED."""
+def undefined(data: bytes) -> Iterator[str]:
+    """The names that an object file (ELF of 64 bits, little-endian) leaves to others to define. Raises ValueError for
+    another format."""
+    if data[:6] != b"\x7fELF\x02\x01":
+        raise ValueError("an object file is no ELF of 64 bits")
+    start, size, count = (struct.unpack_from(form, data, at)[0] for form, at in (("<Q", 40), ("<H", 58), ("<H", 60)))
+    # kind, offset, size and link of each section; the first one's size is their number where the header has no room
+    sections = [struct.unpack_from("<4xI16xQQI", data, start)]
+    sections += (struct.unpack_from("<4xI16xQQI", data, start + k * size) for k in range(1, count or sections[0][2]))
+    for kind, offset, length, link in sections:
+        for at in range(offset, offset + length, 24) if kind == _SYMBOLS else ():
+            name, section = struct.unpack_from("<I2xH", data, at)
+            if name and section == 0:
+                begin = sections[link][1] + name
+                yield data[begin : data.index(b"\0", begin)].decode("utf-8", "replace")
+
+
+def unseen(plain: list[Line], fuzzed: list[Line], asked: Iterable[str]) -> Unseen:
+    """Of a source as the plain build and the sanitizers' build see it, and of the names that its objects ask for."""
     undeclared = faults = ""
     for line in plain:
         bare = _TEXT.sub('"x"', line.text)
@@ -101,7 +120,7 @@ def unseen(plain: list[Line], fuzzed: list[Line], linked: str) -> Unseen:
             at = one or other
             faults = faults or f"{at.place}: built with sanitizers the source is another program than without"
             break
-    for name in dict.fromkeys(_REFERENCE.findall(linked)):
+    for name in dict.fromkeys(asked):
         if name in UNDECLARED:
             undeclared = undeclared or f"undeclared input: it uses {UNDECLARED[name]} (`{_short(name)}`)"
         elif name in CATCHING:

@@ -16,16 +16,9 @@ from avow.drive.steps import coded, plain
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import CASE
 from avow.formulas.values import Value
-from avow.language.sorts import (
-    BoolSort,
-    EnumSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    SequenceSort,
-    Sort,
-)
+from avow.language import sorts as s
 
+from .clang_tool import clang
 from .drawn import Step
 from .reading import Reading
 from .runner import Run
@@ -41,9 +34,9 @@ class Misused(Exception):  # noqa: N818 - it names what happened
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What was done: libFuzzer's runs, runs to be judged, runs judged, the seed."""
+    """What was done: libFuzzer's runs (None where it is not here), runs to be judged, runs judged, the seed."""
 
-    fuzzed: int
+    fuzzed: int | None
     kept: int
     judged: int
     seed: int
@@ -257,9 +250,9 @@ class Bench:
         for run in self.samples:
             for port, word in itertools.product(self.reading.asked, SPECIAL):
                 value = run[0][port.name]
-                if isinstance(port.sort, RealSort):
+                if isinstance(port.sort, s.RealSort):
                     found.append(([{**run[0], port.name: SPECIAL[word]}], port.name, word))
-                elif isinstance(port.sort, SequenceSort) and isinstance(port.sort.item, RealSort) and value:
+                elif isinstance(port.sort, s.SequenceSort) and isinstance(port.sort.item, s.RealSort) and value:
                     found.append(([{**run[0], port.name: [SPECIAL[word], *value[1:]]}], port.name, word))
         return found
 
@@ -328,7 +321,8 @@ class Bench:
         details: dict[str, object] = {"triggers": met}
         if apart:
             details["no numbers"] = [one.text() for one in apart]
-        bound: dict[str, object] = {"cases": self.steps, "kept_runs": counts.judged, "fuzzed_runs": counts.fuzzed}
+        bound: dict[str, object] = {"cases": self.steps, "kept_runs": counts.judged}
+        bound |= {} if counts.fuzzed is None else {"fuzzed_runs": counts.fuzzed}
         bound |= {"seed": counts.seed}
         outcome = Outcome(o.id, Verdict.UNKNOWN, "", bound=bound, details=details)
         if o.name in self.broken:
@@ -350,10 +344,8 @@ class Bench:
             )
         if each.hits:
             bound["triggered"] = min(each.hits)
-        summary = (
-            f"{self.steps} steps of {counts.judged} runs judged, none breaks it (what was new in {counts.fuzzed} runs "
-            f"of libFuzzer, seed {counts.seed})"
-        )
+        source = "drawn" if counts.fuzzed is None else f"what was new in {counts.fuzzed} runs of libFuzzer"
+        summary = f"{self.steps} steps of {counts.judged} runs judged, none breaks it ({source}, seed {counts.seed})"
         return replace(outcome, verdict=Verdict.TESTED, summary=summary)
 
     def _doubt(self, undecided: int, counts: Counts, unclear: bool) -> str:
@@ -370,31 +362,34 @@ class Bench:
         return ""
 
     def _claim(self, claim: Obligation, counts: Counts, faulty: Broken | None, stopped: bool) -> Outcome:
-        bound: dict[str, object] = {"runs": counts.fuzzed, "failures": int(faulty is not None), "seed": counts.seed}
+        runs = counts.judged if counts.fuzzed is None else counts.fuzzed
+        bound: dict[str, object] = {"runs": runs, "failures": int(faulty is not None), "seed": counts.seed}
         outcome = Outcome(claim.id, Verdict.UNKNOWN, "", bound=bound)
         if faulty is not None:
             shown = faulty.shown()
             return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
         if stopped or not self.steps or counts.judged < counts.kept:
             return replace(outcome, summary=self._doubt(0, counts, stopped))
+        if counts.fuzzed is None:
+            return Outcome(claim.id, Verdict.NOT_RUN, f"the sanitizer of addresses is clang's: {clang().install}")
         summary = f"{counts.fuzzed} runs with sanitizers of addresses and undefined behaviour, none reports a fault"
         return replace(outcome, verdict=Verdict.TESTED, summary=f"{summary} (seed {counts.seed})")
 
 
-def _of(data: Any, sort: Sort | None) -> bool:
+def _of(data: Any, sort: s.Sort | None) -> bool:
     """Whether the adapter gave a value by the function of its type; memory that is no output has none."""
     match sort, data:
         case None, _:
             return True
-        case SequenceSort(item=item), {"l": list(items)}:
+        case s.SequenceSort(item=item), {"l": list(items)}:
             return all(_of(each, item) for each in items)
-        case RealSort(), {"f": _}:
+        case s.RealSort(), {"f": _}:
             return True
-        case ((IntegerSort() | NaturalSort()), {"i": _}):
+        case ((s.IntegerSort() | s.NaturalSort()), {"i": _}):
             return True
-        case BoolSort(), bool():
+        case s.BoolSort(), bool():
             return True
-        case EnumSort(), str():
+        case s.EnumSort(), str():
             return True
     return False
 
@@ -411,27 +406,27 @@ def _single(data: Any) -> bool:
             return True
 
 
-def _simple(sort: Sort) -> Any:
-    if isinstance(sort, EnumSort):
+def _simple(sort: s.Sort) -> Any:
+    if isinstance(sort, s.EnumSort):
         return sort.members[0]
-    return [] if isinstance(sort, SequenceSort) else {"truth": False, "integer": 0, "real": 0.0}[sort_name(sort)]
+    return [] if isinstance(sort, s.SequenceSort) else {"truth": False, "integer": 0, "real": 0.0}[sort_name(sort)]
 
 
-def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
+def _values(sort: s.Sort, made: Drawable, single: bool) -> list[Any]:
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return [True]
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return list(members)
-        case RealSort():
+        case s.RealSort():
             step, near = (next_single, as_single) if single else (math.nextafter, float)
             found = [n for r in made.reals for n in (r, step(r, math.inf), step(r, -math.inf))]
             return [near(n) for n in found if math.isfinite(n)]
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             one = _values(item, made, single)
             return [[_simple(item)] * n for n in made.lengths] + [row for v in one for row in ([v], [_simple(item), v])]
         case _:  # a whole number: the source is refused when it is read where a port is of any other sort
-            return [n for n in made.integers if n >= 0 or not isinstance(sort, NaturalSort)]
+            return [n for n in made.integers if n >= 0 or not isinstance(sort, s.NaturalSort)]
 
 
 def _finite(value: Any) -> Any:

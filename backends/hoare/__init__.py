@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from avow.backend_kit.given import file, schema
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import z3_tool
 from avow.base.verdict import Link, Verdict
@@ -101,6 +101,15 @@ class Hoare(Backend):
         from .backend import files
 
         return files(job)
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        """A verification condition each; what belongs to no single guarantee belongs to all."""
+        from .backend import file_stem
+
+        stems = {name: f"{file_stem(name)}." for name in job.method.guarantees}
+        for path in (folder / name for name in names if name.endswith(".smt2")):
+            of = tuple(name for name, stem in stems.items() if path.name.startswith(stem))
+            yield OutsideCheck(path, ("z3", path), of or tuple(stems), prints="unsat")
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from .backend import settle

@@ -26,8 +26,7 @@ from avow.solving.questions import Entailment, entails
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import formulas_script
-from avow.solving.translation import Unsupported
-from avow.solving.z3_sorts import Sorts
+from avow.solving.translation import Unsupported, new_session
 
 from .memory import knowing, remembered
 from .outline import one_line, outline
@@ -77,6 +76,7 @@ def _undated(job: Job) -> tuple[Diagnostic, ...]:
 # -- export ------------------------------------------------------------------------------------------------------------
 
 
+@new_session()
 def files(job: Job) -> Mapping[str, str]:
     """Triples, proof outlines and verification conditions of every obligation; nothing where the job is at fault."""
     try:
@@ -85,31 +85,31 @@ def files(job: Job) -> Mapping[str, str]:
     except Rejected:
         return {}
     made: dict[str, str] = {}
-    beside = Sorts()
     for name, condition in work.firsts.items():
-        made[f"{name}.first.smt2"] = _script(work.every_run, condition, beside)
+        made[f"{name}.first.smt2"] = _script(work.every_run, condition)
     for found in (*all_triples.values(), work.kept):
         for triple in found:
-            made[f"{_stem(triple)}.hoare"] = _triple_text(triple, work)
+            made[f"{file_stem(triple.name)}.hoare"] = _triple_text(triple, work)
             if triple.fidelity != TRUE:
                 same = Condition("fidelity", (), triple.fidelity, "the triple says what the contract's formulas say")
-                made[f"{_stem(triple)}.fidelity.smt2"] = _script(triple, same, beside)
+                made[f"{file_stem(triple.name)}.fidelity.smt2"] = _script(triple, same)
             try:
-                made[f"{_stem(triple)}.outline.txt"] = outline(triple, work.checked.program.body)
+                made[f"{file_stem(triple.name)}.outline.txt"] = outline(triple, work.checked.program.body)
                 for condition in conditions(triple, work.checked.program.body):
-                    made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition, beside)
+                    made[f"{file_stem(triple.name)}.{condition.name}.smt2"] = _script(triple, condition)
             except (TooLarge, RecursionError) as error:
-                made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
+                made[f"{file_stem(triple.name)}.outline.txt"] = f"no outline: {error}\n"
     try:
         for condition in run_conditions(work.every_run, work.checked.program):
-            made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition, beside)
+            made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition)
     except (TooLarge, RecursionError):
         pass  # each triple's outline says so
     return made
 
 
-def _stem(triple: Triple) -> str:
-    return "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "_" for c in triple.name)
+def file_stem(name: str) -> str:
+    """What the names of a triple's files begin with."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "_" for c in name)
 
 
 def _triple_text(triple: Triple, work: Work) -> str:
@@ -117,14 +117,13 @@ def _triple_text(triple: Triple, work: Work) -> str:
     return f"{{{one_line(triple.full_pre)}}}\n{body}\n{{{one_line(triple.post)}}}\n"
 
 
-def _script(triple: Triple, condition: Condition, beside: Sorts) -> str:
+def _script(triple: Triple, condition: Condition) -> str:
     """`unsat` means that the condition holds."""
     formulas = {f"H{k}": h for k, h in enumerate(condition.hypotheses, start=1)}
     try:
         return formulas_script(
             {**formulas, "goal": Not(condition.goal)},
             comment=f"{triple.name}: {condition.what}; valid if unsat",
-            beside=beside,
         )
     except Unsupported as error:
         return f"; not expressible in SMT-LIB: {' '.join(error.what.split())}\n"
@@ -205,7 +204,7 @@ def _obligation(
     deadline = until(from_seconds(limits.seconds))
     settled = [_settled(_triple, triple, work, deadline) for triple in found]
     log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
-    logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
+    logs[f"{file_stem(found[0].name)}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
     worst = next(
         (s for v in (Verdict.REFUTED, Verdict.ERROR, Verdict.UNKNOWN) for s in settled if s.verdict is v), None
     )

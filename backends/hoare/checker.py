@@ -9,20 +9,9 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.records import dataclass
 from avow.base.suggestions import did_you_mean
 from avow.formulas.formula import substitute
+from avow.language import sorts as s
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort, show_term
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    SequenceSort,
-    Sort,
-    TupleSort,
-    components,
-)
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 
 from . import syntax
@@ -64,17 +53,17 @@ def check(source: syntax.Source, contract: Contract, node: Node, table: Table) -
     return checker.run(table)
 
 
-def _covers(term: Term, sort: Sort, used: set[Variable]) -> bool:
+def _covers(term: Term, sort: s.Sort, used: set[Variable]) -> bool:
     """Whether a term can have every value of an input's sort, whatever the terms of other inputs have: it is made of
     variables that are free to take them. Those are then used up."""
     match term:
         case Variable() | Apply(function=Variable()):
             head = term if isinstance(term, Variable) else term.function
             assert isinstance(head, Variable)
-            free = head not in used and (term.sort == sort or (term.sort, sort) == (INTEGER, NATURAL))
+            free = head not in used and (term.sort == sort or (term.sort, sort) == (s.INTEGER, s.NATURAL))
             used.add(head)
             return free
-        case TupleTerm(items=items) if isinstance(sort, TupleSort):
+        case TupleTerm(items=items) if isinstance(sort, s.TupleSort):
             return all(_covers(item, part, used) for item, part in zip(items, sort.items, strict=True))
         case _:  # no value that is written down
             return False
@@ -85,7 +74,7 @@ class _Checker:
         self.source, self.node = source, node
         self.names = Names(vocabulary(contract, node))
         self.problems: list[Diagnostic] = []
-        self.assigned_names = {s.target.name for s, _ in assignments(source.body, self.names)}
+        self.assigned_names = {statement.target.name for statement, _ in assignments(source.body, self.names)}
         self.given: dict[str, Variable] = {}
         self.ghosts: dict[Variable, Variable] = {}
         self.ports: dict[str, Term] = {}
@@ -116,14 +105,14 @@ class _Checker:
     def _declarations(self) -> None:
         types = self.names.vocabulary.types
         for declaration in self.source.declarations:
-            unknown = [s for s in (*declaration.parameters, declaration.sort) if s not in types]
+            unknown = [name for name in (*declaration.parameters, declaration.sort) if name not in types]
             for word in unknown:
                 self._problem("HOARE200", f"there is no type `{word}`", declaration.span, did_you_mean(word, [*types]))
             if unknown:
                 continue
-            sort: Sort = types[declaration.sort]
+            sort: s.Sort = types[declaration.sort]
             if declaration.parameters:
-                sort = FunctionSort(tuple(types[p] for p in declaration.parameters), sort)
+                sort = s.FunctionSort(tuple(types[p] for p in declaration.parameters), sort)
             for name in declaration.names:
                 if name.name in self.names.sorts:
                     self._problem("HOARE200", f"`{name.name}` is declared twice", name.span)
@@ -142,7 +131,7 @@ class _Checker:
         while known != len(self.names.sorts):  # what one line of the table says helps to read another
             known = len(self.names.sorts)
             for entry in entries:
-                expect(entry.meaning, BOOL if entry.parameters is not None else entry.port.sort, self.names)
+                expect(entry.meaning, s.BOOL if entry.parameters is not None else entry.port.sort, self.names)
             spread(self.source.body, self.names)
         words = self.names.vocabulary
         for name in sorted(self.names.sorts):
@@ -183,14 +172,14 @@ class _Checker:
             port = self._port(pattern.function, key, span)
             names = [a.name for a in pattern.arguments if isinstance(a, syntax.Name)]
             sort = port.sort
-            if not isinstance(sort, FunctionSort) or sort.result != BOOL:
+            if not isinstance(sort, s.FunctionSort) or sort.result != s.BOOL:
                 raise rejected(
                     "HOARE400", f"`{key}`: {port.role}.{port.name} is {show_sort(port.sort)}, no relation", span
                 )
             if len(names) != len(sort.parameters) or len(set(names)) != len(names):
                 message = f"`{key}` needs {len(sort.parameters)} different names for its arguments"
                 raise rejected("HOARE400", message, span)
-            parameters = tuple(variable(n, s) for n, s in zip(names, sort.parameters, strict=True))
+            parameters = tuple(variable(n, part) for n, part in zip(names, sort.parameters, strict=True))
             return _Entry(port, parameters, meaning, span)
         raise rejected("HOARE400", f"`{key}` is neither a port (in.r) nor a relation with names (out.done(i))", span)
 
@@ -243,7 +232,7 @@ class _Checker:
         """What a line of the table says; of a whole port without parameters."""
         if entry.parameters is None:
             whole = fit(term(entry.meaning, Scope(self.names)), entry.port.sort, entry.span)
-            if isinstance(entry.port.sort, FunctionSort) and not isinstance(whole, Variable):
+            if isinstance(entry.port.sort, s.FunctionSort) and not isinstance(whole, Variable):
                 message = "a function can only be read as a function variable of the program"
                 raise rejected("HOARE400", message, entry.span)
             return Predicate((), whole)
@@ -286,7 +275,7 @@ class _Checker:
     # -- statements ----------------------------------------------------------------------------------------------------
 
     def _block(self, body: tuple[syntax.Statement, ...], scope: Scope) -> Block:
-        made = (self._attempt(lambda s=s: self._statement(s, scope)) for s in body)  # type: ignore[misc]
+        made = (self._attempt(lambda each=each: self._statement(each, scope)) for each in body)  # type: ignore[misc]
         return tuple(statement for statement in made if statement is not None)
 
     def _statement(self, statement: syntax.Statement, scope: Scope) -> Statement:
@@ -311,7 +300,7 @@ class _Checker:
 
     def _measure(self, variant: syntax.Expression, scope: Scope) -> Term:
         measure = term(variant, scope)
-        if measure.sort not in (INTEGER, NATURAL):
+        if measure.sort not in (s.INTEGER, s.NATURAL):
             raise rejected("HOARE300", f"a variant is an integer; this is {show_sort(measure.sort)}", variant.span)
         return measure
 
@@ -324,24 +313,24 @@ class _Checker:
         if sort is None:
             value = term(statement.value, scope)  # says what is wrong with it, if something is
             if statement.arguments:
-                known = [n for n, s in self.names.sorts.items() if isinstance(s, FunctionSort)]
+                known = [n for n, part in self.names.sorts.items() if isinstance(part, s.FunctionSort)]
                 hint = (
                     did_you_mean(name.name, known)
                     or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
                 )
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
             raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show_sort(value.sort)}?)", name.span)
-        if UNKNOWN in components(sort):
+        if UNKNOWN in s.components(sort):
             wanted = f"declare it: VAR {name.name} : T; with a type T of the contract"
             raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, wanted)
         target = variable(name.name, sort)
         if not statement.arguments:
             value = fit(term(statement.value, scope), sort, statement.value.span)
-            if isinstance(sort, FunctionSort) and not isinstance(value, Variable):
+            if isinstance(sort, s.FunctionSort) and not isinstance(value, Variable):
                 raise rejected("HOARE300", "only a whole map can be assigned to a map", statement.value.span)
             return Assign(target, value, statement.span)
-        if not isinstance(sort, FunctionSort):
-            whole = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, SequenceSort) else None
+        if not isinstance(sort, s.FunctionSort):
+            whole = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, s.SequenceSort) else None
             raise rejected("HOARE300", f"`{name.name}` is {show_sort(sort)}, no map", name.span, whole)
         if len(statement.arguments) != len(sort.parameters):
             message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
@@ -360,7 +349,7 @@ class _Checker:
         if name.name not in words.constructors or words.constructors[name.name][0] != subject.sort:
             known = [c for c, (data, _) in words.constructors.items() if data == subject.sort]
             message = f"`{name.name}` does not make values of {show_sort(subject.sort)}"
-            if isinstance(subject.sort, EnumSort) or (isinstance(subject.sort, DataSort) and not known):
+            if isinstance(subject.sort, s.EnumSort) or (isinstance(subject.sort, s.DataSort) and not known):
                 hint = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
                 raise rejected("HOARE300", message, name.span, hint)
             raise rejected("HOARE300", message, name.span, did_you_mean(name.name, known))

@@ -11,20 +11,7 @@ from typing import assert_never
 
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value
-from avow.language.sorts import (
-    INTEGER,
-    NATURAL,
-    REAL,
-    STRING,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-    Sort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.language.subterms import subterms
 from avow.language.terms import Compare, Length, Literal, Term, Variable
 from avow.solving.models import default_value
@@ -35,7 +22,7 @@ from .program import Assign, If, Match, Program, Skip, Statement, Update, While,
 from .triples import Triple
 from .tuning import GUESS_EFFORT, INPUTS_TRIED, LENGTHS, VALUE_DEPTH
 
-NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
+NUMERIC: tuple[s.Sort, ...] = (s.NATURAL, s.INTEGER, s.REAL)
 
 
 def starting_from(triple: Triple, program: Program) -> tuple[Variable, ...]:
@@ -53,11 +40,11 @@ def guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> I
     ghosts = frozenset(program.ghosts.values())
     free = [v for v in wanted if v not in ghosts]
     finite = {v: pool for v in free if (pool := _pool(v.sort, small)) is not None}
-    sequences = [v for v in free if isinstance(v.sort, SequenceSort)][:3]
+    sequences = [v for v in free if isinstance(v.sort, s.SequenceSort)][:3]
     bases = []
     for extra in (
         (),
-        *((Compare("==", Length(v, NATURAL), Literal(n, NATURAL)),) for v in sequences for n in (1, 2, 3)),
+        *((Compare("==", Length(v, s.NATURAL), Literal(n, s.NATURAL)),) for v in sequences for n in (1, 2, 3)),
     ):
         found = solve([pre, *extra], effort=GUESS_EFFORT)
         if found.status == "sat" or not extra:
@@ -74,11 +61,11 @@ def guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> I
         yield {**base, **{v: draw.value(v.sort) for v in free if v not in base or rng.random() < 0.7}}
 
 
-def _pool(sort: Sort, small: Iterable[Fraction]) -> list[Value] | None:
+def _pool(sort: s.Sort, small: Iterable[Fraction]) -> list[Value] | None:
     match sort:
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return [Element(m) for m in members]
-        case BoolSort():
+        case s.BoolSort():
             return [False, True]
         case _ if sort in NUMERIC:
             return [stored(n, sort) for n in small if fits(n, sort)]
@@ -91,31 +78,31 @@ class Draw:
     def __init__(self, rng: random.Random, numbers: list[Fraction], strings: list[str]) -> None:
         self.rng, self.numbers, self.strings = rng, numbers, strings
 
-    def value(self, sort: Sort, depth: int = 0) -> Value:
+    def value(self, sort: s.Sort, depth: int = 0) -> Value:
         rng = self.rng
         match sort:
-            case EnumSort(members=members):
+            case s.EnumSort(members=members):
                 return Element(rng.choice(members))
-            case BoolSort():
+            case s.BoolSort():
                 return rng.random() < 0.5
-            case TupleSort(items=items):
+            case s.TupleSort(items=items):
                 return tuple(self.value(item, depth + 1) for item in items)
-            case SequenceSort(item=item):
+            case s.SequenceSort(item=item):
                 length = rng.choice(LENGTHS) if depth < VALUE_DEPTH else 0
                 return SequenceValue(tuple(self.value(item, depth + 1) for _ in range(length)))
-            case DataSort(constructors=constructors):
-                plain = [c for c in constructors if not any(isinstance(p, DataSort) for p in c.parameters)]
+            case s.DataSort(constructors=constructors):
+                plain = [c for c in constructors if not any(isinstance(p, s.DataSort) for p in c.parameters)]
                 made = rng.choice(plain if plain and depth >= VALUE_DEPTH else constructors)
                 return Data(made.name, tuple(self.value(p, depth + 1) for p in made.parameters))
-            case FunctionSort(parameters=parameters, result=result):
+            case s.FunctionSort(parameters=parameters, result=result):
                 points = [tuple(self.value(p, depth + 1) for p in parameters) for _ in range(rng.randrange(4))]
                 default = self.value(result, depth + 1)
                 return FunctionValue({point: self.value(result, depth + 1) for point in points}, default)
-            case OpaqueSort(name=name):
+            case s.OpaqueSort(name=name):
                 return Opaque(name, rng.randrange(3))
             case _ if sort in NUMERIC:
                 return stored(rng.choice([n for n in self.numbers if fits(n, sort)]), sort)
-            case _ if sort == STRING:
+            case _ if sort == s.STRING:
                 return rng.choice(self.strings)
         return default_value(sort)
 
@@ -182,11 +169,11 @@ def _simplest_between(low: Fraction, high: Fraction) -> Fraction:
     return middle
 
 
-def fits(number: Fraction, sort: Sort) -> bool:
+def fits(number: Fraction, sort: s.Sort) -> bool:
     """Whether a number is one of the sort's."""
-    return sort == REAL or (number.denominator == 1 and (sort == INTEGER or number >= 0))
+    return sort == s.REAL or (number.denominator == 1 and (sort == s.INTEGER or number >= 0))
 
 
-def stored(number: Fraction, sort: Sort) -> Value:
+def stored(number: Fraction, sort: s.Sort) -> Value:
     """The number as values of the sort are kept."""
-    return number if sort == REAL else int(number)
+    return number if sort == s.REAL else int(number)

@@ -10,31 +10,15 @@ from dataclasses import field
 from typing import assert_never
 
 from avow.base.records import dataclass
+from avow.language import sorts as s
 from avow.language.contract import Contract, Node
-from avow.language.sorts import (
-    BOOL,
-    BUILTINS,
-    INTEGER,
-    NATURAL,
-    REAL,
-    STRING,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-    Sort,
-    TupleSort,
-    components,
-)
 from avow.language.terms import EnumValue, Term
 
 from . import syntax
 
-_NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
+_NUMBERS: tuple[s.Sort, ...] = (s.NATURAL, s.INTEGER, s.REAL)
 _ARITHMETIC = frozenset("+-*/")
-UNKNOWN = OpaqueSort("?")
+UNKNOWN = s.OpaqueSort("?")
 """Of what an empty sequence is: whatever its place says. No contract can declare a type of this name."""
 
 
@@ -42,9 +26,9 @@ UNKNOWN = OpaqueSort("?")
 class Vocabulary:
     """The contract's own words: types, elements of enumerations, constructors, constants."""
 
-    types: Mapping[str, Sort]
+    types: Mapping[str, s.Sort]
     values: Mapping[str, Term]
-    constructors: Mapping[str, tuple[DataSort, Constructor]]
+    constructors: Mapping[str, tuple[s.DataSort, s.Constructor]]
 
 
 @dataclass(slots=True)
@@ -52,61 +36,61 @@ class Names:
     """The sort of every name known so far."""
 
     vocabulary: Vocabulary
-    sorts: dict[str, Sort] = field(default_factory=dict)
+    sorts: dict[str, s.Sort] = field(default_factory=dict)
     inferred: set[str] = field(default_factory=set)
     """Those whose sort was read off assignments, and may still widen."""
 
 
 def vocabulary(contract: Contract, node: Node) -> Vocabulary:
-    types = {**BUILTINS, **dict(contract.types)}
+    types = {**s.BUILTINS, **dict(contract.types)}
     values: dict[str, Term] = dict(contract.constants)
-    constructors: dict[str, tuple[DataSort, Constructor]] = {}
-    for sort in components(*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))):
+    constructors: dict[str, tuple[s.DataSort, s.Constructor]] = {}
+    for sort in s.components(*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))):
         match sort:
-            case EnumSort(members=members):
+            case s.EnumSort(members=members):
                 values.update((member, EnumValue(member, sort)) for member in members)
-            case DataSort(constructors=made):
+            case s.DataSort(constructors=made):
                 constructors.update((c.name, (sort, c)) for c in made)
             case _:  # declares no element
                 pass
     return Vocabulary(types, values, constructors)
 
 
-def join(one: Sort | None, other: Sort | None) -> Sort | None:
+def join(one: s.Sort | None, other: s.Sort | None) -> s.Sort | None:
     """The narrowest sort that holds both: numbers widen; anything else stays what it was first."""
     if one is None or other is None:
         return one or other
     if one == UNKNOWN:
         return other
     match one, other:
-        case TupleSort(items=ones), TupleSort(items=others) if len(ones) == len(others):
-            return TupleSort(tuple(join(a, b) or a for a, b in zip(ones, others, strict=True)))
-        case SequenceSort(item=a), SequenceSort(item=b):
-            return SequenceSort(join(a, b) or a)
+        case s.TupleSort(items=ones), s.TupleSort(items=others) if len(ones) == len(others):
+            return s.TupleSort(tuple(join(a, b) or a for a, b in zip(ones, others, strict=True)))
+        case s.SequenceSort(item=a), s.SequenceSort(item=b):
+            return s.SequenceSort(join(a, b) or a)
     if one in _NUMBERS and other in _NUMBERS:
         return _NUMBERS[max(_NUMBERS.index(one), _NUMBERS.index(other))]
     return one
 
 
-def _estimate(expression: syntax.Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
+def _estimate(expression: syntax.Expression, names: Names, local: Mapping[str, s.Sort]) -> s.Sort | None:
     """The sort that an expression seems to have, if its names' sorts are known."""
     match expression:
         case syntax.Number(whole=whole):
-            return NATURAL if whole else REAL
+            return s.NATURAL if whole else s.REAL
         case syntax.Truth() | syntax.Member() | syntax.Inside() | syntax.Chain() | syntax.Quantification():
-            return BOOL
+            return s.BOOL
         case syntax.Tuple(items=items):
             sorts = [_estimate(item, names, local) for item in items]
-            return TupleSort(tuple(s for s in sorts if s is not None)) if None not in sorts else None
+            return s.TupleSort(tuple(part for part in sorts if part is not None)) if None not in sorts else None
         case syntax.Sequence(items=items):
-            item: Sort | None = UNKNOWN
+            item: s.Sort | None = UNKNOWN
             for each in items:
                 item = join(item, _estimate(each, names, local))
-            return SequenceSort(item or UNKNOWN)
+            return s.SequenceSort(item or UNKNOWN)
         case syntax.Call(function=syntax.Name(name="length", prefix=None)) if "length" not in names.sorts:
-            return NATURAL
+            return s.NATURAL
         case syntax.Text():
-            return STRING
+            return s.STRING
         case syntax.Name(name=name, prefix=None):
             if name in local:
                 return local[name]
@@ -122,31 +106,31 @@ def _estimate(expression: syntax.Expression, names: Names, local: Mapping[str, S
             if function.prefix is None and function.name in names.vocabulary.constructors:
                 return names.vocabulary.constructors[function.name][0]
             sort = names.sorts.get(function.name) if function.prefix is None else None
-            if isinstance(sort, SequenceSort):
+            if isinstance(sort, s.SequenceSort):
                 return sort.item
-            return sort.result if isinstance(sort, FunctionSort) else None
+            return sort.result if isinstance(sort, s.FunctionSort) else None
         case syntax.Unary(operator="-", operand=operand):
-            return join(INTEGER, _estimate(operand, names, local))
+            return join(s.INTEGER, _estimate(operand, names, local))
         case syntax.Binary(operator="/"):
-            return REAL
+            return s.REAL
         case syntax.Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
             sort = join(_estimate(left, names, local), _estimate(right, names, local))
-            return join(INTEGER, sort) if operator == "-" else sort
+            return join(s.INTEGER, sort) if operator == "-" else sort
         case syntax.Unary() | syntax.Binary():  # a comparison or a connective
-            return BOOL
+            return s.BOOL
         case _:
             assert_never(expression)
 
 
-def expect(expression: syntax.Expression, sort: Sort, names: Names) -> None:
+def expect(expression: syntax.Expression, sort: s.Sort, names: Names) -> None:
     """Give unknown names the sort that the place asks for: `f(i)` for a REAL makes f a function to REAL."""
     match expression:
         case syntax.Name(name=name, prefix=None) if name not in names.vocabulary.values:
             names.sorts.setdefault(name, sort)
-        case syntax.Tuple(items=items) if isinstance(sort, TupleSort):
+        case syntax.Tuple(items=items) if isinstance(sort, s.TupleSort):
             for item, part in zip(items, sort.items, strict=False):
                 expect(item, part, names)
-        case syntax.Sequence(items=items) if isinstance(sort, SequenceSort):
+        case syntax.Sequence(items=items) if isinstance(sort, s.SequenceSort):
             for item in items:
                 expect(item, sort.item, names)
         case syntax.Call(function=syntax.Name(name=name, prefix=None), arguments=arguments):
@@ -157,7 +141,7 @@ def expect(expression: syntax.Expression, sort: Sort, names: Names) -> None:
             elif name not in names.sorts and name != "length":
                 known = [_estimate(argument, names, {}) for argument in arguments]
                 if all(k is not None for k in known):
-                    names.sorts[name] = FunctionSort(tuple(k for k in known if k is not None), sort)
+                    names.sorts[name] = s.FunctionSort(tuple(k for k in known if k is not None), sort)
         case _:  # says nothing of a name's sort
             pass
 
@@ -179,25 +163,27 @@ def spread(body: tuple[syntax.Statement, ...], names: Names) -> None:
                 learnt = True
 
 
-def assignments(body: tuple[syntax.Statement, ...], names: Names) -> Iterator[tuple[syntax.Assign, Mapping[str, Sort]]]:
+def assignments(
+    body: tuple[syntax.Statement, ...], names: Names
+) -> Iterator[tuple[syntax.Assign, Mapping[str, s.Sort]]]:
     """Every assignment, with the sorts of the MATCH variables around it."""
-    stack: list[tuple[syntax.Statement, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
+    stack: list[tuple[syntax.Statement, Mapping[str, s.Sort]]] = [(statement, {}) for statement in reversed(body)]
     while stack:
         statement, local = stack.pop()
         match statement:
             case syntax.Assign():
                 yield statement, local
             case syntax.If(then=then, otherwise=otherwise):
-                stack.extend((s, local) for s in reversed((*then, *otherwise)))
+                stack.extend((statement, local) for statement in reversed((*then, *otherwise)))
             case syntax.Match(constructor=constructor, variables=variables, then=then, otherwise=otherwise):
                 inner = dict(local)
                 if constructor.name in names.vocabulary.constructors:
                     parameters = names.vocabulary.constructors[constructor.name][1].parameters
                     inner.update((v.name, p) for v, p in zip(variables, parameters, strict=False))
-                stack.extend((s, local) for s in reversed(otherwise))
-                stack.extend((s, inner) for s in reversed(then))
+                stack.extend((statement, local) for statement in reversed(otherwise))
+                stack.extend((statement, inner) for statement in reversed(then))
             case syntax.While(body=inside):
-                stack.extend((s, local) for s in reversed(inside))
+                stack.extend((statement, local) for statement in reversed(inside))
             case syntax.Skip():  # holds no statement
                 pass
             case _:

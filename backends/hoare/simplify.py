@@ -11,119 +11,103 @@ from fractions import Fraction
 
 from avow.formulas.formula import conjunction, disjunction, free_variables, opposite
 from avow.formulas.traversal import transform
+from avow.language import terms as t
 from avow.language.bounds import constant
 from avow.language.sorts import BOOL
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Compare,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    SetTerm,
-    Term,
-)
 
 
-def simplify(term: Term) -> Term:
+def simplify(term: t.Term) -> t.Term:
     """An equivalent formula, seldom longer."""
     return transform(term, _step)
 
 
-def _step(term: Term) -> Term:
+def _step(term: t.Term) -> t.Term:
     match term:
-        case Not(body=body):
+        case t.Not(body=body):
             return opposite(body)
-        case And(items=items):
+        case t.And(items=items):
             return _and(items)
-        case Or(items=items):
-            flat = tuple(dict.fromkeys(_flat(disjunction(items), Or)))
+        case t.Or(items=items):
+            flat = tuple(dict.fromkeys(_flat(disjunction(items), t.Or)))
             if any(opposite(item) in flat for item in flat):
-                return TRUE
-            atoms = [opposite(item) for item in flat if not isinstance(item, And | Implies)]
-            return disjunction(_known(item, atoms) if isinstance(item, And) else item for item in flat)
-        case Implies(left=left, right=right):
+                return t.TRUE
+            atoms = [opposite(item) for item in flat if not isinstance(item, t.And | t.Implies)]
+            return disjunction(_known(item, atoms) if isinstance(item, t.And) else item for item in flat)
+        case t.Implies(left=left, right=right):
             return _implies(left, right)
-        case Iff(left=left, right=right):
+        case t.Iff(left=left, right=right):
             if left == right:
-                return TRUE
+                return t.TRUE
             for one, other in ((left, right), (right, left)):
-                if one == TRUE:
+                if one == t.TRUE:
                     return other
-                if one == FALSE:
+                if one == t.FALSE:
                     return opposite(other)
             return term
-        case Compare():
+        case t.Compare():
             return _compare(term)
-        case Quantified(quantifier=Quantifier.UNIQUE, body=body):
+        case t.Quantified(quantifier=t.Quantifier.UNIQUE, body=body):
             return (
-                FALSE if body == FALSE else term
+                t.FALSE if body == t.FALSE else term
             )  # of what always holds there is one only where the sort has one value
-        case Quantified(quantifier=quantifier, variables=variables, body=body, span=span):
+        case t.Quantified(quantifier=quantifier, variables=variables, body=body, span=span):
             used = free_variables(body)  # no sort is empty
             kept = tuple(v for v in variables if v in used)
             if len(kept) == len(variables):
                 return term
-            return Quantified(quantifier, kept, body, span) if kept else body
-        case In(item=item, collection=SetTerm(items=items)):
-            tests = [_compare(Compare("==", item, choice)) if item.sort != BOOL else term for choice in items]
-            return TRUE if TRUE in tests else FALSE if all(test == FALSE for test in tests) else term
+            return t.Quantified(quantifier, kept, body, span) if kept else body
+        case t.In(item=item, collection=t.SetTerm(items=items)):
+            tests = [_compare(t.Compare("==", item, choice)) if item.sort != BOOL else term for choice in items]
+            return t.TRUE if t.TRUE in tests else t.FALSE if all(test == t.FALSE for test in tests) else term
         case _:  # nothing to simplify at its head
             return term
 
 
-def _implies(left: Term, right: Term) -> Term:
-    if left == TRUE:
+def _implies(left: t.Term, right: t.Term) -> t.Term:
+    if left == t.TRUE:
         return right
-    if right == TRUE or left in (FALSE, right):
-        return TRUE
-    if right == FALSE:
+    if right == t.TRUE or left in (t.FALSE, right):
+        return t.TRUE
+    if right == t.FALSE:
         return opposite(left)
-    if isinstance(right, Implies):
+    if isinstance(right, t.Implies):
         return _implies(conjunction((left, right.left)), right.right)
-    known = _known(right, _flat(left, And))
-    return _implies(left, known) if known != right else Implies(left, right)
+    known = _known(right, _flat(left, t.And))
+    return _implies(left, known) if known != right else t.Implies(left, right)
 
 
-def _and(items: tuple[Term, ...]) -> Term:
-    flat = tuple(dict.fromkeys(_flat(conjunction(items), And)))
+def _and(items: tuple[t.Term, ...]) -> t.Term:
+    flat = tuple(dict.fromkeys(_flat(conjunction(items), t.And)))
     if any(opposite(item) in flat for item in flat):
-        return FALSE
+        return t.FALSE
     merged = _merged(flat)
     merged = _bounds(merged)
-    if FALSE in merged:
-        return FALSE
-    facts = [item for item in merged if not isinstance(item, Implies | Or | And)]
+    if t.FALSE in merged:
+        return t.FALSE
+    facts = [item for item in merged if not isinstance(item, t.Implies | t.Or | t.And)]
     result = tuple(item if item in facts else _known(item, facts) for item in merged)
     if result != items:
         return _and(result) if result != flat else conjunction(result)
     return conjunction(result)
 
 
-def _merged(items: tuple[Term, ...]) -> tuple[Term, ...]:
+def _merged(items: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
     """``(a -> q) and (not a -> q)`` is q."""
     result = list(items)
     for item in items:
-        if isinstance(item, Implies) and item in result:
-            other = Implies(opposite(item.left), item.right)
+        if isinstance(item, t.Implies) and item in result:
+            other = t.Implies(opposite(item.left), item.right)
             if other in result:
                 result[result.index(item)] = item.right
                 result.remove(other)
     return tuple(result)
 
 
-def _bounds(items: tuple[Term, ...]) -> tuple[Term, ...]:
+def _bounds(items: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
     """Of several constant bounds of one term only the tightest; FALSE where they leave nothing."""
-    best: dict[tuple[Term, bool], tuple[Fraction, bool, Term]] = {}
-    loose: set[Term] = set()
+    best: dict[tuple[t.Term, bool], tuple[Fraction, bool, t.Term]] = {}
+    loose: set[t.Term] = set()
     for item in items:
         found = _bound(item)
         if found is None:
@@ -144,13 +128,13 @@ def _bounds(items: tuple[Term, ...]) -> tuple[Term, ...]:
     for (term, is_lower), (value, strict, _) in best.items():
         upper = best.get((term, False)) if is_lower else None
         if upper is not None and (value > upper[0] or (value == upper[0] and (strict or upper[1]))):
-            return (FALSE,)
+            return (t.FALSE,)
     return tuple(item for item in items if item not in loose)
 
 
-def _bound(item: Term) -> tuple[Term, bool, Fraction, bool] | None:
+def _bound(item: t.Term) -> tuple[t.Term, bool, Fraction, bool] | None:
     """(term, is it a lower bound, the number, is it strict)."""
-    if not isinstance(item, Compare) or item.operator not in {"<", "<=", ">", ">="}:
+    if not isinstance(item, t.Compare) or item.operator not in {"<", "<=", ">", ">="}:
         return None
     one, other = constant(item.left), constant(item.right)
     if (one is None) == (other is None):
@@ -162,30 +146,30 @@ def _bound(item: Term) -> tuple[Term, bool, Fraction, bool] | None:
     return item.right, item.operator.startswith("<"), one, strict
 
 
-def _known(term: Term, facts: Iterable[Term]) -> Term:
+def _known(term: t.Term, facts: Iterable[t.Term]) -> t.Term:
     """The term where the facts hold: a fact in it is true, its opposite false."""
-    bound = {v for part in subterms(term) if isinstance(part, Quantified) for v in part.variables}
+    bound = {v for part in subterms(term) if isinstance(part, t.Quantified) for v in part.variables}
     usable = [f for f in facts if not (bound & free_variables(f))]
     yes, no = set(usable), {opposite(f) for f in usable}
     if not any(part in yes or part in no for part in subterms(term)):
         return term
-    return transform(term, lambda part: TRUE if part in yes else FALSE if part in no else _step(part))
+    return transform(term, lambda part: t.TRUE if part in yes else t.FALSE if part in no else _step(part))
 
 
-def _flat(term: Term, kind: type[And] | type[Or]) -> tuple[Term, ...]:
-    return term.items if isinstance(term, And | Or) and isinstance(term, kind) else (term,)
+def _flat(term: t.Term, kind: type[t.And] | type[t.Or]) -> tuple[t.Term, ...]:
+    return term.items if isinstance(term, t.And | t.Or) and isinstance(term, kind) else (term,)
 
 
-def _compare(term: Compare) -> Term:
+def _compare(term: t.Compare) -> t.Term:
     left, right = term.left, term.right
     if left.sort == BOOL:
-        same = _step(Iff(left, right))
+        same = _step(t.Iff(left, right))
         return same if term.operator == "==" else opposite(same)
     if left == right:
-        return TRUE if term.operator in {"==", "<=", ">="} else FALSE
-    if isinstance(left, EnumValue) and isinstance(right, EnumValue):
-        return FALSE if term.operator == "==" else TRUE
-    if isinstance(left, Construct) and isinstance(right, Construct):
+        return t.TRUE if term.operator in {"==", "<=", ">="} else t.FALSE
+    if isinstance(left, t.EnumValue) and isinstance(right, t.EnumValue):
+        return t.FALSE if term.operator == "==" else t.TRUE
+    if isinstance(left, t.Construct) and isinstance(right, t.Construct):
         return _constructs(term.operator, left, right)
     one, other = constant(left), constant(right)
     if one is not None and other is not None:
@@ -197,14 +181,14 @@ def _compare(term: Compare) -> Term:
             ">": one > other,
             ">=": one >= other,
         }
-        return TRUE if holds[term.operator] else FALSE
+        return t.TRUE if holds[term.operator] else t.FALSE
     return term
 
 
-def _constructs(operator: str, left: Construct, right: Construct) -> Term:
+def _constructs(operator: str, left: t.Construct, right: t.Construct) -> t.Term:
     """Constructors are injective, and differ from each other."""
     if left.constructor != right.constructor:
-        return FALSE if operator == "==" else TRUE
+        return t.FALSE if operator == "==" else t.TRUE
     pairs = zip(left.arguments, right.arguments, strict=True)
-    same = _and(tuple(_compare(Compare("==", a, b)) for a, b in pairs))
+    same = _and(tuple(_compare(t.Compare("==", a, b)) for a, b in pairs))
     return same if operator == "==" else opposite(same)

@@ -17,23 +17,9 @@ from avow.formulas.formula import conjunction, equation, free_variables, negatio
 from avow.formulas.one_point_rule import solved
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
+from avow.language import terms as t
 from avow.language.contract import Clause, Node
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
-from avow.language.terms import (
-    TRUE,
-    And,
-    Apply,
-    Compare,
-    Iff,
-    Implies,
-    Literal,
-    Not,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 
 from .checker import Checked
 from .program import Reading, variable
@@ -46,9 +32,9 @@ class Stated:
     quantifiers that an equation of `pre` determined and that the simplified triple no longer has, each with its value
     in terms of those after it."""
 
-    pre: Term
-    post: Term
-    fixed: tuple[tuple[Variable, Term], ...] = ()
+    pre: t.Term
+    post: t.Term
+    fixed: tuple[tuple[t.Variable, t.Term], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +44,9 @@ class Triple:
     name: str
     """``low``, or ``low.2`` where a guarantee makes several."""
     obligation: str
-    pre: Term
-    post: Term
-    ghosts: tuple[tuple[Variable, Variable], ...]
+    pre: t.Term
+    post: t.Term
+    ghosts: tuple[tuple[t.Variable, t.Variable], ...]
     """(variable, its ghost): also part of the precondition, as equations."""
     stated: Stated | None = None
     """What it was simplified from; None where it is as the contract has it."""
@@ -71,22 +57,22 @@ class Triple:
         return self if self.stated is None else replace(self, pre=self.stated.pre, post=self.stated.post, stated=None)
 
     @property
-    def fidelity(self) -> Term:
+    def fidelity(self) -> t.Term:
         """What must be valid for the simplified triple to claim what the stated one claims, no less and no more. The
         program changes nothing that `pre` speaks of, so that the precondition still holds at the end."""
         if self.stated is None or self.stated == Stated(self.pre, self.post):
-            return TRUE
+            return t.TRUE
         was, fixed = self.stated, [equation(c, value) for c, value in self.stated.fixed]
         return conjunction(
             (
-                Implies(was.pre, conjunction((*fixed, self.pre))),
-                Implies(conjunction((*fixed, self.pre)), was.pre),
-                Implies(was.pre, Iff(was.post, self.post)),
+                t.Implies(was.pre, conjunction((*fixed, self.pre))),
+                t.Implies(conjunction((*fixed, self.pre)), was.pre),
+                t.Implies(was.pre, t.Iff(was.post, self.post)),
             )
         )
 
     @property
-    def full_pre(self) -> Term:
+    def full_pre(self) -> t.Term:
         """The precondition with the ghosts' equations."""
         return conjunction((*(equation(v, g) for v, g in self.ghosts), self.pre))
 
@@ -97,7 +83,7 @@ def triples(obligation: str, clause: Clause, node: Node, checked: Checked) -> tu
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     parts = tuple(_split(rename_apart(clause.formula, names)))
-    found: dict[tuple[Term, Term, Stated], None] = {}
+    found: dict[tuple[t.Term, t.Term, Stated], None] = {}
     for outer, conditions, consequent in parts:
         goal = _translate_formula(consequent, checked.reading, clause)
         read = [_translate_formula(c, checked.reading, clause) for c in conditions]
@@ -117,32 +103,32 @@ def every_run(node: Node, checked: Checked) -> Triple:
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
-    stated = Stated(conjunction(assumed), TRUE)
-    return Triple("every-run", "", simplify(stated.pre), TRUE, ghosts, stated)
+    stated = Stated(conjunction(assumed), t.TRUE)
+    return Triple("every-run", "", simplify(stated.pre), t.TRUE, ghosts, stated)
 
 
 # -- the guarantee, taken apart ----------------------------------------------------------------------------------------
 
-_Part = tuple[tuple[Variable, ...], tuple[Term, ...], Term]
+_Part = tuple[tuple[t.Variable, ...], tuple[t.Term, ...], t.Term]
 """Constants for outer quantifiers, conditions on inputs, consequent; still in the contract's words."""
 
 
-def _split(formula: Term) -> Iterator[_Part]:
+def _split(formula: t.Term) -> Iterator[_Part]:
     stack: list[_Part] = [((), (), formula)]
     while stack:
         outer, conditions, goal = stack.pop()
         match goal:
-            case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
+            case t.Quantified(quantifier=t.Quantifier.FORALL, variables=variables, body=body):
                 stack.append(((*outer, *variables), conditions, body))
-            case And(items=items):
+            case t.And(items=items):
                 stack.extend((outer, conditions, item) for item in reversed(items))
-            case Implies(left=left, right=right):
+            case t.Implies(left=left, right=right):
                 early, late = _sides(left)
                 if late:
-                    yield outer, (*conditions, *early), Implies(conjunction(late), right)
+                    yield outer, (*conditions, *early), t.Implies(conjunction(late), right)
                 else:
                     stack.append((outer, (*conditions, *early), right))
-            case Iff(left=left, right=right) if _is_input(left) != _is_input(right):
+            case t.Iff(left=left, right=right) if _is_input(left) != _is_input(right):
                 cause, effect = (left, right) if _is_input(left) else (right, left)
                 stack.append((outer, (*conditions, negation(cause)), negation(effect)))
                 stack.append((outer, (*conditions, cause), effect))
@@ -150,55 +136,55 @@ def _split(formula: Term) -> Iterator[_Part]:
                 yield outer, conditions, goal
 
 
-def _sides(antecedent: Term) -> tuple[list[Term], list[Term]]:
+def _sides(antecedent: t.Term) -> tuple[list[t.Term], list[t.Term]]:
     """The conjuncts that speak of inputs only, and the others."""
     parts = conjuncts(antecedent, True)
     return [p for p in parts if _is_input(p)], [p for p in parts if not _is_input(p)]
 
 
-def _is_input(term: Term) -> bool:
-    return all(v.role is not Role.OUTPUT for v in free_variables(term))
+def _is_input(term: t.Term) -> bool:
+    return all(v.role is not t.Role.OUTPUT for v in free_variables(term))
 
 
 # -- the contract's words in the program's -----------------------------------------------------------------------------
 
 
-def translate(clause: Clause, reading: Reading, names: set[str]) -> Term:
+def translate(clause: Clause, reading: Reading, names: set[str]) -> t.Term:
     """A clause over the program's variables. Raises Rejected."""
     return _translate_formula(rename_apart(clause.formula, names), reading, clause)
 
 
-def _translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
+def _translate_formula(formula: t.Term, reading: Reading, clause: Clause) -> t.Term:
     """The formula with every port read as the plan or the names say; bound names are apart already. Raises Rejected."""
-    missing: list[Variable] = []
-    widened: list[Term] = []
+    missing: list[t.Variable] = []
+    widened: list[t.Term] = []
 
-    def port(current: Variable) -> Term:
+    def port(current: t.Variable) -> t.Term:
         found = reading.terms.get((current.role, current.name))
         if found is None:
             missing.append(current)
             return current
-        if current.sort == NATURAL and found.sort == INTEGER and current.role is Role.OUTPUT:
-            widened.append(Compare(">=", found, Literal(0, INTEGER)))
+        if current.sort == NATURAL and found.sort == INTEGER and current.role is t.Role.OUTPUT:
+            widened.append(t.Compare(">=", found, t.Literal(0, INTEGER)))
         return found
 
-    def steps(current: Term) -> Steps[Term]:
-        if isinstance(current, Variable):
-            return current if current.role is Role.BOUND else port(current)
-        if isinstance(current, Compare) and isinstance(current.left.sort, FunctionSort):
-            pointwise: Term = yield steps(_pointwise(current))
+    def steps(current: t.Term) -> Steps[t.Term]:
+        if isinstance(current, t.Variable):
+            return current if current.role is t.Role.BOUND else port(current)
+        if isinstance(current, t.Compare) and isinstance(current.left.sort, FunctionSort):
+            pointwise: t.Term = yield steps(_pointwise(current))
             return pointwise
-        if isinstance(current, Apply) and isinstance(current.function, Variable):
+        if isinstance(current, t.Apply) and isinstance(current.function, t.Variable):
             predicate = reading.predicates.get((current.function.role, current.function.name))
             if predicate is not None:
-                arguments: list[Term] = []
+                arguments: list[t.Term] = []
                 for child in current.arguments:
-                    argument: Term = yield steps(child)
+                    argument: t.Term = yield steps(child)
                     arguments.append(argument)
                 return substitute(predicate.meaning, dict(zip(predicate.parameters, arguments, strict=True)))
-        parts: list[Term] = []
+        parts: list[t.Term] = []
         for child in current.children:
-            part: Term = yield steps(child)
+            part: t.Term = yield steps(child)
             parts.append(part)
         return current.rebuild(tuple(parts)) if parts else current
 
@@ -208,16 +194,16 @@ def _translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
     return conjunction((*dict.fromkeys(widened), result))
 
 
-def _pointwise(compared: Compare) -> Term:
+def _pointwise(compared: t.Compare) -> t.Term:
     sort = compared.left.sort
     assert isinstance(sort, FunctionSort)
     points = tuple(variable(f"at~{k}", s) for k, s in enumerate(sort.parameters))
-    left, right = (Apply(side, points, sort.result) for side in (compared.left, compared.right))
-    everywhere = Quantified(Quantifier.FORALL, points, equation(left, right))
-    return everywhere if compared.operator == "==" else Not(everywhere)
+    left, right = (t.Apply(side, points, sort.result) for side in (compared.left, compared.right))
+    everywhere = t.Quantified(t.Quantifier.FORALL, points, equation(left, right))
+    return everywhere if compared.operator == "==" else t.Not(everywhere)
 
 
-def _missing(port: Variable, clause: Clause) -> Diagnostic:
+def _missing(port: t.Variable, clause: Clause) -> Diagnostic:
     return Diagnostic(
         "HOARE400",
         f"{clause.kind} {clause.name} speaks of {port.qualified}, for which the program has nothing",
@@ -229,10 +215,12 @@ def _missing(port: Variable, clause: Clause) -> Diagnostic:
 # -- constants that an equation determines -----------------------------------------------------------------------------
 
 
-def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Term) -> tuple[Term, Term, Stated]:
+def _solved(
+    outer: tuple[t.Variable, ...], hypotheses: tuple[t.Term, ...], goal: t.Term
+) -> tuple[t.Term, t.Term, Stated]:
     """Simplify, and put away constants of outer quantifiers that an equation determines (the one-point rule)."""
     was_pre = conjunction(hypotheses)
-    pre, post, fixed = simplify(was_pre), simplify(goal), list[tuple[Variable, Term]]()
+    pre, post, fixed = simplify(was_pre), simplify(goal), list[tuple[t.Variable, t.Term]]()
     for constant in outer:
         for part in conjuncts(pre, True):
             found = solved(part, (constant,)) if constant in part.children else None

@@ -17,21 +17,9 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import conjunction, equation, free_variables, negation
 from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
+from avow.language import terms as t
 from avow.language.sorts import REAL, BoolSort, EnumSort
 from avow.language.subterms import subterms
-from avow.language.terms import (
-    TRUE,
-    Apply,
-    Arithmetic,
-    Compare,
-    Literal,
-    Negative,
-    Not,
-    Or,
-    Term,
-    Variable,
-    Widen,
-)
 from avow.solving.limits import spent, until
 from avow.solving.questions import entails, solve
 from avow.solving.replay import replay
@@ -75,7 +63,7 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], effort
     return None
 
 
-def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[Variable, Value]) -> Breach | None:
+def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[t.Variable, Value]) -> Breach | None:
     """Run the program on the values; a breach if the precondition holds of them and the postcondition fails: those that
     the contract states."""
     start = _first_state(triple, program, values)
@@ -96,7 +84,7 @@ def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[V
     return Breach(start, end, f"{one_line(triple.post)} is demanded; the program ends with {outcome or 'it false'}")
 
 
-def _first_state(triple: Triple, program: Program, values: Mapping[Variable, Value]) -> State | None:
+def _first_state(triple: Triple, program: Program, values: Mapping[t.Variable, Value]) -> State | None:
     """The program's first state on these values, with the ghosts and the constants that simplifying put away; None
     where it is not certain that the stated precondition holds of them."""
     start: State = {v.name: value for v, value in values.items()}
@@ -110,7 +98,7 @@ def _first_state(triple: Triple, program: Program, values: Mapping[Variable, Val
     return start if _holds(triple.as_stated.pre, start) else None
 
 
-def _holds(term: Term, state: Mapping[str, Value]) -> bool:
+def _holds(term: t.Term, state: Mapping[str, Value]) -> bool:
     """Whether a formula certainly holds in a state."""
     try:
         return evaluate(term, state) is True
@@ -123,11 +111,11 @@ def _holds(term: Term, state: Mapping[str, Value]) -> bool:
 
 
 def _models(
-    condition: Condition, program: Program, wanted: tuple[Variable, ...], effort: int
-) -> Iterator[dict[Variable, Value]]:
+    condition: Condition, program: Program, wanted: tuple[t.Variable, ...], effort: int
+) -> Iterator[dict[t.Variable, Value]]:
     """The solver's inputs: first with every number a simple one, then as they come."""
-    formulas: list[Term] = [*condition.hypotheses, Not(condition.goal)]
-    fixed: list[Term] = []
+    formulas: list[t.Term] = [*condition.hypotheses, t.Not(condition.goal)]
+    fixed: list[t.Term] = []
     between, at = numbers((*formulas, *expressions(program)))
     for term in _observed(formulas, program):
         for pool in (between, at):
@@ -139,7 +127,7 @@ def _models(
                 continue
             number = _value(term, tried.values)
             if number is not None:
-                fixed.append(Compare("==", term, value_term(stored(number, term.sort), term.sort)))
+                fixed.append(t.Compare("==", term, value_term(stored(number, term.sort), term.sort)))
                 break
     for extra in ([fixed] if fixed else []) + [[]]:
         found = solve([*formulas, *extra], effort=effort)
@@ -147,31 +135,31 @@ def _models(
             yield filled(found.values, wanted)
 
 
-def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
+def _observed(formulas: Sequence[t.Term], program: Program) -> list[t.Term]:
     """What is compared of the inputs' numbers: ``r``, ``level_at(i)``."""
-    found: dict[Term, None] = {}
+    found: dict[t.Term, None] = {}
     inputs = frozenset(program.state)
     for formula in formulas:
-        stack = [side for part in subterms(formula) if isinstance(part, Compare) for side in (part.left, part.right)]
+        stack = [side for part in subterms(formula) if isinstance(part, t.Compare) for side in (part.left, part.right)]
         while stack:
             part = stack.pop()
-            if isinstance(part, Arithmetic | Negative | Widen):
+            if isinstance(part, t.Arithmetic | t.Negative | t.Widen):
                 stack.extend(part.children)
-            is_application = isinstance(part, Apply) and all(isinstance(a, Variable) for a in part.arguments)
-            named = isinstance(part, Variable) or is_application
+            is_application = isinstance(part, t.Apply) and all(isinstance(a, t.Variable) for a in part.arguments)
+            named = isinstance(part, t.Variable) or is_application
             if named and part.sort in NUMERIC and free_variables(part) <= inputs:
                 found.setdefault(part)
     return list(found)[:4]
 
 
-def _one_of(term: Term, pool: Iterable[Fraction]) -> Term | None:
+def _one_of(term: t.Term, pool: Iterable[Fraction]) -> t.Term | None:
     choices = tuple(
-        Compare("==", term, value_term(stored(n, term.sort), term.sort)) for n in pool if fits(n, term.sort)
+        t.Compare("==", term, value_term(stored(n, term.sort), term.sort)) for n in pool if fits(n, term.sort)
     )
-    return Or(choices) if choices else None
+    return t.Or(choices) if choices else None
 
 
-def _value(term: Term, values: Mapping[Variable, Value]) -> Fraction | None:
+def _value(term: t.Term, values: Mapping[t.Variable, Value]) -> Fraction | None:
     try:
         value = evaluate(term, {v.name: value for v, value in values.items()})
     except NotEvaluable:
@@ -208,7 +196,9 @@ def endless_run(triple: Triple, program: Program, effort: int) -> Breach | None:
     return None
 
 
-def _candidates(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> Iterator[Mapping[Variable, Value]]:
+def _candidates(
+    triple: Triple, program: Program, wanted: tuple[t.Variable, ...]
+) -> Iterator[Mapping[t.Variable, Value]]:
     """First the solver's: inputs from which a loop's first round changes nothing, or from which it is entered; then
     guesses. What is said of loops passed before is only what their invariants say: each is tried by running."""
     for loop in (s for s in statements(program.body) if isinstance(s, While)):
@@ -223,9 +213,9 @@ def _candidates(triple: Triple, program: Program, wanted: tuple[Variable, ...]) 
     yield from guesses(triple, program, wanted)
 
 
-def _reached(block: Block, loop: While, goal: Term) -> Term:
+def _reached(block: Block, loop: While, goal: t.Term) -> t.Term:
     """What holds where a run comes to the loop, the first time, with the goal true. A guide, not a proof."""
-    found: list[Term] = []
+    found: list[t.Term] = []
     for at, statement in enumerate(block):
         match statement:
             case While() if statement == loop:
@@ -234,25 +224,25 @@ def _reached(block: Block, loop: While, goal: Term) -> Term:
                 inner = conjunction((condition, _reached(body, loop, goal)))
             case If(condition=condition, then=then, otherwise=otherwise):
                 yes, no = (_reached(part, loop, goal) for part in (then, otherwise))
-                inner = Or((conjunction((condition, yes)), conjunction((negation(condition), no))))
+                inner = t.Or((conjunction((condition, yes)), conjunction((negation(condition), no))))
             case Skip() | Assign() | Update() | Match():  # holds no loop
                 continue
             case _:
                 assert_never(statement)
-        found.append(negation(weakest(block[:at], negation(inner), Conditions(TRUE))))
-    return Or((Literal(False, TRUE.sort), *found))
+        found.append(negation(weakest(block[:at], negation(inner), Conditions(t.TRUE))))
+    return t.Or((t.Literal(False, t.TRUE.sort), *found))
 
 
-def _no_change(loop: While) -> Term:
+def _no_change(loop: While) -> t.Term:
     """That a round of the loop is entered and leaves everything as it was."""
     before = {
         s.target: variable(f"{s.target.name}~before", s.target.sort)
         for s in statements(loop.body)
         if isinstance(s, Assign | Update)
     }
-    kept = [equation(v, old) for v, old in before.items() if v.sort in NUMERIC or v.sort == TRUE.sort]
+    kept = [equation(v, old) for v, old in before.items() if v.sort in NUMERIC or v.sort == t.TRUE.sort]
     try:
-        changed = weakest(loop.body, negation(conjunction(kept)), Conditions(TRUE))
+        changed = weakest(loop.body, negation(conjunction(kept)), Conditions(t.TRUE))
     except TooLarge:
         return loop.condition
     return conjunction((loop.condition, *kept, negation(changed)))
@@ -276,30 +266,30 @@ def goes_on(loop: While, heads: Sequence[State], program: Program) -> bool:
     try:
         while True:
             known = [loop.condition, *kept]
-            after = {c: weakest(loop.body, c, Conditions(TRUE)) for c in kept}
+            after = {c: weakest(loop.body, c, Conditions(t.TRUE)) for c in kept}
             lost = {c for c, before in after.items() if not _implied(known, before)}
             if not lost:
                 again = conjunction((defined(loop.condition), loop.condition))
-                return _implied(known, weakest(loop.body, again, Conditions(TRUE)))
+                return _implied(known, weakest(loop.body, again, Conditions(t.TRUE)))
             kept = [c for c in kept if c not in lost]
     except (TooLarge, RecursionError):
         return False
 
 
-def _implied(known: Sequence[Term], goal: Term) -> bool:
+def _implied(known: Sequence[t.Term], goal: t.Term) -> bool:
     return entails(known, goal, effort=LASTING_EFFORT).verdict is Verdict.PROVED
 
 
-def _true(term: Term, state: State) -> bool:
+def _true(term: t.Term, state: State) -> bool:
     try:
         return evaluate(term, state) is True
     except NotEvaluable:
         return False
 
 
-def _common(heads: Sequence[State], program: Program) -> Iterator[Term]:
+def _common(heads: Sequence[State], program: Program) -> Iterator[t.Term]:
     """What does not change from state to state, and which way the numbers and their differences go."""
-    numbers: list[tuple[Term, list[Fraction]]] = []
+    numbers: list[tuple[t.Term, list[Fraction]]] = []
     for v in (v for v in program.state if all(v.name in state for state in heads)):
         seen = [state[v.name] for state in heads]
         plain = v.sort in NUMERIC or isinstance(v.sort, BoolSort | EnumSort)
@@ -307,18 +297,18 @@ def _common(heads: Sequence[State], program: Program) -> Iterator[Term]:
             yield equation(v, value_term(seen[0], v.sort))
         if v.sort in NUMERIC:
             numbers.append((v, [Fraction(value) for value in seen if isinstance(value, int | Fraction)]))
-    pairs: list[tuple[Term, list[Fraction]]] = [
-        (Arithmetic("-", _real(one), _real(other), REAL), [a - b for a, b in zip(first, second, strict=True)])
+    pairs: list[tuple[t.Term, list[Fraction]]] = [
+        (t.Arithmetic("-", _real(one), _real(other), REAL), [a - b for a, b in zip(first, second, strict=True)])
         for (one, first), (other, second) in combinations(numbers, 2)
     ]
     for term, values in (*numbers, *pairs):
-        end = Literal(values[-1], REAL)
+        end = t.Literal(values[-1], REAL)
         steps = [b - a for a, b in pairwise(values)]
         if all(step >= 0 for step in steps):
-            yield Compare(">=", _real(term), end)
+            yield t.Compare(">=", _real(term), end)
         if all(step <= 0 for step in steps):
-            yield Compare("<=", _real(term), end)
+            yield t.Compare("<=", _real(term), end)
 
 
-def _real(term: Term) -> Term:
-    return term if term.sort == REAL else Widen(term, REAL)
+def _real(term: t.Term) -> t.Term:
+    return term if term.sort == REAL else t.Widen(term, REAL)

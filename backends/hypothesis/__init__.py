@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.given import READING, file, schema, whole_number
 from avow.backend_kit.one_step import unsaid
-from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
@@ -29,7 +29,7 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, or of the node's own class, generated from the contract"
-    version = "10"
+    version = "11"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False
@@ -75,6 +75,11 @@ class HypothesisBackend(Backend):
         from .backend import files
 
         return files(job)
+
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        for name in names:
+            if name.endswith(".py"):
+                yield OutsideCheck(folder / name, ("pytest", folder / name), job.method.guarantees)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from .backend import settle

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
 import re
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.base.codec import canonical, document
+from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
@@ -27,7 +27,7 @@ from avow.solving.replay import opaque_sorts
 
 from . import callbacks, export
 from .convention import ANY, EXACT
-from .exchange import Answer, TooDeep, Tried
+from .exchange import QUESTION, Answer, Question, Tried
 from .judging import failure_bound
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
@@ -35,13 +35,13 @@ from .tuning import CONFIDENCE, REJECTED_CASES
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
     try:
+        found = subject(job)
         if callbacks.wanted(job):
-            subject(job)
             return callbacks.problems(job)
-        export.files(job, subject(job))
+        export.files(job, found)
     except Rejected as rejected:
         return rejected.diagnostics
-    except (TooDeep, RecursionError):
+    except RecursionError:
         return (Diagnostic("HYPO105", "a formula of this node is nested too deeply to be tested", job.node.span),)
     return ()
 
@@ -51,7 +51,7 @@ def files(job: Job) -> Mapping[str, str]:
         return {}
     try:
         return export.files(job, subject(job))
-    except (Rejected, TooDeep, RecursionError):
+    except (Rejected, RecursionError):
         return {}
 
 
@@ -72,10 +72,8 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         place = Path(scratch)
         for name, text in files(job).items():
             (place / name).write_text(text, encoding="utf-8")
-        kept = [case if isinstance(case, list) else [case] for cases in job.kept.values() for case in cases]
-        (place / export.KEPT).write_text(canonical(kept), encoding="utf-8")
         done, answer = _run(job, place, limits)
-    command = (Path(sys.executable).name, *done.command[1:3]) if done else ()
+    command = ("pytest", export.test_name(job))
     logs = {"hypothesis.log": done.stdout + done.stderr} if done and (done.stdout + done.stderr).strip() else {}
     if answer is None:
         why = _silence(done, limits)
@@ -86,7 +84,8 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     refuting = export.numbers(job) == ANY
     exact = export.numbers(job) == EXACT
     outcomes = tuple(
-        _counted(_outcome(o, answer, limits.seed, refuting, exact), job.clause(o), job.node) for o in job.obligations
+        _counted(_outcome(o, answer, limits.seed, export.cases(job), refuting, exact), job.clause(o), job.node)
+        for o in job.obligations
     )
     if answer.crash_trace is not None:
         numbers = "exact" if exact else "float64"
@@ -95,19 +94,47 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     return Report(outcomes, "hypothesis", version, command, logs, answer.observed, answer.isolation)
 
 
+def _question(job: Job) -> Question:
+    unit = subject(job)
+    guarantees = tuple(map(job.clause, job.obligations))
+    inputs = tuple(p for p in job.node.inputs if p.variable.qualified not in unit.left_out)
+    return Question(
+        test=export.test_name(job),
+        root=job.root.resolve(),
+        path=unit.path.resolve(),
+        function=unit.function,
+        driven=unit.driven,
+        source=unit.source,
+        held=unit.held,
+        accepted=unit.accepted,
+        cases=export.cases(job),
+        length=export.run_length([c.formula for c in (*job.node.assumptions, *guarantees)]),
+        numbers=export.numbers(job),
+        names=export.port_names(inputs),
+        inputs=inputs,
+        outputs=tuple(p for p in job.node.outputs if p.variable.qualified not in unit.left_out),
+        left_out=tuple(sorted(unit.left_out)),
+        assumptions=job.node.assumptions,
+        guarantees=guarantees,
+        untranslated=export.untranslated(job, unit),
+        kept=tuple(tuple(case if isinstance(case, list) else [case]) for cases in job.kept.values() for case in cases),
+    )
+
+
 def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, Answer | None]:
-    """The judge's answer, if it gave one."""
+    """What Avow's run of the generated test came to, if it ended well."""
+    (place / QUESTION).write_bytes(pickle.dumps(_question(job)))
+    (place / "run.py").write_text("from avow.backends.hypothesis.running import main\n\nmain()\n", encoding="utf-8")
     seconds = max(1.0, limits.seconds * 0.8)
     try:
         return judge.ask(
             Answer,
-            export.test_name(job),
+            "run.py",
             [str(seconds), str(limits.seed)],
             cwd=place,
             seconds=limits.seconds,
             megabytes=limits.megabytes,
             env={
-                "AVOW_SYSTEM_ROOT": str(job.root.resolve()),
                 "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
                 "PYTHONDONTWRITEBYTECODE": "",  # or every run would compile the same modules
                 "PYTHONHASHSEED": "0",
@@ -126,22 +153,19 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 
 
-def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, exact: bool) -> Outcome:
-    own, valid = answer.guarantees[obligation.name], answer.valid
-    bound: dict[str, object] = {"cases": valid, "edge_cases": answer.edges, "rejected": answer.rejected, "seed": seed}
-    triggers = [{"trigger": t.trigger, "met": t.drawn, "met_at_edges": t.at_edges} for t in own.triggers]
-    details: dict[str, object] = {"triggers": triggers}
+def _outcome(obligation: Obligation, answer: Answer, seed: int, wanted: int, refuting: bool, exact: bool) -> Outcome:
+    own = answer.guarantees[obligation.name]
+    bound: dict[str, object] = {"cases": answer.valid, "rejected": answer.rejected, "seed": seed}
+    details: dict[str, object] = {"triggers": [{"trigger": t.trigger, "met": t.cases} for t in own.triggers]}
     if answer.left_out:
         details["left out"] = list(answer.left_out)
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
     if own.failure is not None:
-        told = f"guarantee {obligation.name} does not hold of these{_inexact(own.failure) if exact else ''}"
-        if own.asked:
-            told += f"; not of a process that is asked this alone, but of one that was asked the same {own.asked} times"
-        shown = Counterexample(own.failure, told, own.trace)
+        why = f"guarantee {obligation.name} does not hold of these{_inexact(own.failure) if exact else ''}"
+        shown = Counterexample(own.failure, why, own.trace)
         details[CASE] = own.case
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
-    if answer.silent:  # whatever else was found: it is of a subject that might have answered
+    if answer.silent:  # whatever else was found: it is of a unit that might have answered
         why = f"{answer.silent}: that says nothing of what it would answer, and the next run asks again"
         return replace(outcome, verdict=Verdict.ERROR, summary=why, details={**details, RETRY: True})
     if answer.fault:
@@ -160,42 +184,43 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, refuting: bool, 
         case = ", ".join(f"{name} = {value}" for name, value in answer.unsteady)
         why = f"undeclared input: asked the same again from its start, another process answers otherwise ({case})"
         return replace(outcome, summary=why)
-    why = _doubt(answer, own)
+    why = _doubt(answer, own, wanted)
     if why:
         return replace(outcome, summary=why)
-    unmet = [t.trigger for t in own.triggers if not (t.drawn or t.at_edges)]
+    unmet = [t.trigger for t in own.triggers if not t.cases]
     if unmet:
-        why = f"in none of {valid + answer.edges} cases was its condition met: {unmet[0]}"
+        why = f"in none of {answer.valid} cases was its condition met: {unmet[0]}"
         return replace(outcome, summary=why, vacuous=True)
+    return _tested(outcome, answer, own, wanted, seed)
+
+
+def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int) -> Outcome:
+    """That no case breaks it, and what so many cases justify."""
     # steps of one run hang together where the contract remembers: then runs are what is counted
-    drawn = valid if answer.runs is None else answer.runs
-    hits = [t.drawn if answer.runs is None else t.in_runs for t in own.triggers]
-    least = min(hits, default=drawn)
-    bound["confidence"] = CONFIDENCE
-    bound["failure_probability_below"] = round(failure_bound(drawn), 6)
+    counted = answer.valid if answer.runs is None else answer.runs
+    hits = [t.cases if answer.runs is None else t.in_runs for t in own.triggers]
+    least = min(hits, default=counted)
+    bound = {**outcome.bound, "confidence": CONFIDENCE, "failure_probability_below": round(failure_bound(counted), 6)}
     if hits:
         bound["triggered"] = least
         bound["failure_probability_when_triggered_below"] = round(failure_bound(least), 6)
-    details["meaning"] = (
+    meaning = (
         "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
         "below the bound; it is no probability about the robot's own inputs"
     )
-    edges = f" and {answer.edges} at thresholds" if answer.edges else ""
+    replayed = f", {answer.replayed} that refuted it or a neighbour before" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
-        edges += f", {answer.replayed} that refuted it or a neighbour before"
-    if answer.repeated:
-        bound["repeated"] = answer.repeated
-        edges += f", {answer.repeated} times the same"
     chance = f"95 %: below {failure_bound(least):.2g} of such {'cases' if answer.runs is None else 'runs'} fail"
-    cases = f"{valid} drawn cases"
+    cases = f"{answer.valid} drawn cases"
     if answer.runs is not None:
-        bound["runs"] = drawn
-        cases = f"{drawn} drawn run{'s'[: drawn != 1]} of {valid} steps"
-    summary = f"{cases}{edges}, none breaks it (seed {seed}; {chance})"
-    if valid < answer.wanted:
-        summary += f"; the generator has no more than these, of {answer.wanted} wanted"
-    return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+        bound["runs"] = counted
+        cases = f"{counted} drawn run{'s'[: counted != 1]} of {answer.valid} steps"
+    summary = f"{cases}{replayed}, none breaks it (seed {seed}; {chance})"
+    if answer.valid < wanted:
+        summary += f"; the generator has no more than these, of {wanted} wanted"
+    details = {**outcome.details, "meaning": meaning}
+    return replace(outcome, verdict=Verdict.TESTED, summary=summary, bound=bound, details=details)
 
 
 def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
@@ -209,11 +234,9 @@ def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
     return replace(outcome, rests_on=(*outcome.rests_on, made))
 
 
-def _doubt(answer: Answer, own: Tried) -> str:
+def _doubt(answer: Answer, own: Tried, wanted: int) -> str:
     """Why the cases do not count, if they do not."""
-    valid, rejected, wanted = answer.valid, answer.rejected, answer.wanted
-    if answer.stopped.startswith("no values"):
-        return f"inputs cannot be generated: {answer.stopped.partition(': ')[2]}"
+    valid, rejected = answer.valid, answer.rejected
     if valid == 0 or answer.stopped == "assumptions" or (valid < wanted and rejected > REJECTED_CASES * valid):
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
     if answer.stopped == "time":
@@ -221,7 +244,7 @@ def _doubt(answer: Answer, own: Tried) -> str:
     if answer.stopped == "again":
         return "the time ended before the subject was asked again whether another process answers the same"
     if own.undecided:
-        return f"{own.undecided} of {valid + answer.edges} cases could not be judged"
+        return f"{own.undecided} of {valid} cases could not be judged"
     if answer.undecided:
         return f"of {answer.undecided} generated inputs it could not be told whether they meet the assumptions"
     return ""

@@ -7,36 +7,20 @@ infinities) is tried apart, and so is the negative zero.
 
 from __future__ import annotations
 
-import contextlib
-import os
-import sys
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
-from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
-from avow.base.codec import from_text
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, SequenceValue, Value, show
+from avow.language import sorts
 from avow.language.printer import show_sort
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
 
-from .exchange import Pairs, Question
-from .generate import Inputs
-from .pools import parse_cell
+from .exchange import Pairs
+
+Inputs = dict[str, Value]
+Case = tuple[Inputs, dict[str, Value]]
+"""What a unit was given in one step, and its outputs."""
 
 
 class Malformed(Exception):  # noqa: N818 - it names what is wrong
@@ -66,41 +50,41 @@ def sent(value: Value) -> Any:
             return {"t": [sent(item) for item in value]}
 
 
-def received(data: Any, sort: Sort, what: str) -> Value:
+def received(data: Any, sort: sorts.Sort, what: str) -> Value:
     """The value of the sort that the host's data stands for. Raises Malformed, in terms of `what`."""
     match sort, data:
-        case BoolSort(), bool():
+        case sorts.BoolSort(), bool():
             return data
-        case ((IntegerSort() | NaturalSort() | RealSort()), int()) if not isinstance(data, bool):
+        case ((sorts.IntegerSort() | sorts.NaturalSort() | sorts.RealSort()), int()) if not isinstance(data, bool):
             return received({"q": [data, 1]}, sort, what)  # as `sent` has it
-        case ((IntegerSort() | NaturalSort() | RealSort()), {"q": [numerator, denominator]}):
+        case ((sorts.IntegerSort() | sorts.NaturalSort() | sorts.RealSort()), {"q": [numerator, denominator]}):
             number = Fraction(int(numerator), int(denominator))
-            if isinstance(sort, RealSort):
+            if isinstance(sort, sorts.RealSort):
                 return number
-            if number.denominator == 1 and (number >= 0 or isinstance(sort, IntegerSort)):
+            if number.denominator == 1 and (number >= 0 or isinstance(sort, sorts.IntegerSort)):
                 return int(number)
-        case StringSort(), str():
+        case sorts.StringSort(), str():
             return data
-        case EnumSort(members=members), str() if data in members:
+        case sorts.EnumSort(members=members), str() if data in members:
             return Element(data)
-        case OpaqueSort(name=name), str() if data.startswith(f"{name}#") and data[len(name) + 1 :].isdecimal():
+        case sorts.OpaqueSort(name=name), str() if data.startswith(f"{name}#") and data[len(name) + 1 :].isdecimal():
             return Opaque(name, int(data[len(name) + 1 :]))
-        case DataSort(), _:
+        case sorts.DataSort(), _:
             made = _data(data, sort, what)
             if made is not None:
                 return made
-        case TupleSort(items=items), {"t": parts} if len(parts) == len(items):
+        case sorts.TupleSort(items=items), {"t": parts} if len(parts) == len(items):
             return tuple(received(part, item, what) for part, item in zip(parts, items, strict=True))
-        case TupleSort(items=items, labels=labels), {"m": pairs} if sorted(map(_label, pairs)) == sorted(labels):
+        case sorts.TupleSort(items=items, labels=labels), {"m": pairs} if sorted(map(_label, pairs)) == sorted(labels):
             named = {_label(pair): pair[1] for pair in pairs}
             return tuple(received(named[label], item, what) for label, item in zip(labels, items, strict=True))
-        case SequenceSort(item=item), {"t": parts}:
+        case sorts.SequenceSort(item=item), {"t": parts}:
             return SequenceValue(tuple(received(part, item, what) for part in parts))
-        case FunctionSort(), _:
+        case sorts.FunctionSort(), _:
             table = _function(data, sort, what)
             if table is not None:
                 return table
-        case SetSort(), _:
+        case sorts.SetSort(), _:
             pass
     raise Malformed(f"{what} is {_shown(data)}, which is no value of {show_sort(sort)}")
 
@@ -110,7 +94,7 @@ def _label(pair: Any) -> str:
     return pair[0] if isinstance(pair[0], str) else ""
 
 
-def _data(data: Any, sort: DataSort, what: str) -> Value | None:
+def _data(data: Any, sort: sorts.DataSort, what: str) -> Value | None:
     name, arguments = (data, []) if isinstance(data, str) else _head(data)
     for constructor in sort.constructors:
         if constructor.name == name and len(constructor.parameters) == len(arguments):
@@ -127,9 +111,9 @@ def _head(data: Any) -> tuple[str | None, list[Any]]:
             return None, []
 
 
-def _function(data: Any, sort: FunctionSort, what: str) -> Value | None:
+def _function(data: Any, sort: sorts.FunctionSort, what: str) -> Value | None:
     """A Table; a set of points, for a relation; a dict from points, with `...` for the default."""
-    relation = isinstance(sort.result, BoolSort)
+    relation = isinstance(sort.result, sorts.BoolSort)
     rows: list[tuple[Any, Any]]
     match data:
         case {"f": points, "d": rest}:
@@ -153,7 +137,7 @@ def _function(data: Any, sort: FunctionSort, what: str) -> Value | None:
     return FunctionValue({p: v for p, v in table.items() if v != other}, other)
 
 
-def _point(data: Any, parameters: Sequence[Sort], what: str) -> tuple[Value, ...]:
+def _point(data: Any, parameters: Sequence[sorts.Sort], what: str) -> tuple[Value, ...]:
     place = f"a point of {what}"
     match data:
         case {"t": parts} if len(parts) == len(parameters):
@@ -186,7 +170,7 @@ def _shown(data: Any) -> str:
             return repr(data)
 
 
-def outputs(data: Any, ports: Mapping[str, Sort]) -> dict[str, Value]:
+def outputs(data: Any, ports: Mapping[str, sorts.Sort]) -> dict[str, Value]:
     """Every output from what the subject returned: a dict by name, or the one output itself. Raises Malformed."""
     found: dict[str, Any] = {}
     names = set(ports)
@@ -209,9 +193,6 @@ def outputs(data: Any, ports: Mapping[str, Sort]) -> dict[str, Value]:
 
 
 # -- cases in the contract's words -------------------------------------------------------------------------------------
-
-
-Case = tuple[Inputs, dict[str, Value]]
 
 
 def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
@@ -248,28 +229,6 @@ SPECIAL = {"-0": "-0x0.0p+0", "NaN": "nan", "infinity": "inf", "-infinity": "-in
 """In words, and as Python reads them (`float.fromhex`)."""
 
 
-def rounded(value: Value) -> Value:
-    """Every REAL in it as the nearest double."""
-    match value:
-        case Fraction():
-            try:
-                return Fraction(float(value))
-            except OverflowError:
-                return Fraction(sys.float_info.max) * (1 if value > 0 else -1)
-        case Data(constructor=constructor, arguments=arguments):
-            return Data(constructor, tuple(map(rounded, arguments)))
-        case SequenceValue(items=items):
-            return SequenceValue(tuple(map(rounded, items)))
-        case FunctionValue(table=table, default=default):
-            other = rounded(default)
-            points = {tuple(map(rounded, point)): rounded(v) for point, v in table.items()}
-            return FunctionValue({point: v for point, v in points.items() if v != other}, other)
-        case tuple():
-            return tuple(map(rounded, value))
-        case _:  # no number, or a whole one
-            return value
-
-
 def _as_double(data: Any) -> Any:
     """What `sent` made of a rounded value, with doubles in it."""
     match data:
@@ -283,45 +242,93 @@ def _as_double(data: Any) -> Any:
             return data
 
 
-# -- what lies beside a generated test: kept cases, the scenario's rows ------------------------------------------------
+# -- values of the generated test --------------------------------------------------------------------------------------
 
 
-def kept_inputs(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
-    """The kept cases that are inputs of the contract as it is now; of a run, those of its steps."""
-    found: list[Inputs] = []
-    for case in (step for run in kept_runs(path) for step in run):
-        with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
-            found.append({name: received(case[name], sort, name) for name, sort in sorts.items()})
-    return tuple(found)
+def as_value(given: Any, sort: sorts.Sort) -> Value:
+    """The contract's value that the generated test drew. Raises ValueError, OverflowError: no number."""
+    match sort:
+        case sorts.BoolSort() | sorts.StringSort() | sorts.IntegerSort() | sorts.NaturalSort():
+            return given  # type: ignore[no-any-return]
+        case sorts.RealSort():
+            return Fraction(given)
+        case sorts.EnumSort():
+            return Element(given)
+        case sorts.OpaqueSort(name=name):
+            return Opaque(name, int(given.removeprefix(f"{name}#")))
+        case sorts.DataSort():
+            constructor, *arguments = given
+            parameters = sort.constructor(constructor).parameters
+            return Data(constructor, tuple(map(as_value, arguments, parameters)))
+        case sorts.TupleSort(items=items):
+            return tuple(map(as_value, given, items))
+        case sorts.SequenceSort(item=item):
+            return SequenceValue(tuple(as_value(one, item) for one in given))
+        case sorts.FunctionSort(parameters=parameters, result=result):
+            default = as_value(given.default, result)
+            rows = {tuple(map(as_value, point, parameters)): as_value(v, result) for point, v in given.table.items()}
+            return FunctionValue({point: value for point, value in rows.items() if value != default}, default)
+        case sorts.SetSort():
+            raise ValueError("a set is no input")
+        case _:
+            assert_never(sort)
 
 
-def kept_runs(path: Path) -> tuple[tuple[Any, ...], ...]:
-    """The kept cases as data: each the inputs of the steps of a run; of a function that is asked one step, of one."""
-    return from_text(tuple[tuple[Any, ...], ...], path.read_bytes()) if path.is_file() else ()
+def as_plain(value: Value, table: Any) -> Any:
+    """A value as the generated test has it; `table` is its class of functions."""
+    match value:
+        case Element(name=name):
+            return name
+        case Opaque():
+            return str(value)
+        case Data(constructor=constructor, arguments=arguments):
+            return (constructor, *(as_plain(one, table) for one in arguments))
+        case SequenceValue(items=items) | (tuple() as items):
+            return tuple(as_plain(item, table) for item in items)
+        case FunctionValue(table=rows, default=default):
+            points = {tuple(as_plain(p, table) for p in point): as_plain(v, table) for point, v in rows.items()}
+            return table(points, as_plain(default, table))
+        case _:  # a number, a truth value, a text
+            return value
 
 
-def table_rows(
-    scenario: Mapping[str, Sequence[Sequence[str]]], sorts: Mapping[str, Sort]
-) -> dict[str, tuple[tuple[Value, ...], ...]]:
-    """The scenario's rows for the ports that it interprets, as values; a row that does not fit is left out."""
-    found: dict[str, tuple[tuple[Value, ...], ...]] = {}
-    for name, table in scenario.items():
-        sort = sorts.get(name)
-        if isinstance(sort, FunctionSort):
-            columns = sort.parameters if isinstance(sort.result, BoolSort) else (*sort.parameters, sort.result)
-            read = [tuple(parse_cell(cell, s) for cell, s in zip(row, columns, strict=False)) for row in table]
-            fitting = [row for row in read if len(row) == len(columns) and None not in row]
-            found[name] = tuple(tuple(v for v in row if v is not None) for row in fitting)
-    return found
+# -- a driven class (`avow.drive.steps`) -------------------------------------------------------------------------------
 
 
-def system_root(asked: Question, folder: Path) -> Path:
-    """The system's folder: known from the environment, or beside the artifacts."""
-    root = os.environ.get("AVOW_SYSTEM_ROOT")
-    if root:
-        return Path(root)
-    for parent in folder.resolve().parents:
-        candidate = parent / "contracts" / asked.folder
-        if (candidate / asked.subject.file).is_file():
-            return candidate
-    return folder
+def as_step(value: Value, *, doubles: bool) -> Any:
+    """An input as a driven class gets it. Raises Malformed."""
+    match value:
+        case bool():
+            return value
+        case Fraction():
+            return {"f": float(value).hex()} if doubles else {"q": [str(value.numerator), str(value.denominator)]}
+        case int():
+            return {"i": str(value)}
+        case Element(name=name):
+            return name
+        case SequenceValue(items=items):
+            return {"l": [as_step(item, doubles=doubles) for item in items]}
+        case Data(constructor=constructor, arguments=arguments):
+            return {"t": [constructor, *(as_step(one, doubles=doubles) for one in arguments)]}
+        case tuple():
+            return {"t": [as_step(item, doubles=doubles) for item in value]}
+        case _:  # `subject` refuses such ports
+            raise Malformed(f"a step class is not given {value}")
+
+
+def from_step(data: Any, but: Collection[str] = ()) -> Any:
+    """What a class returned, as the host of a function has it; `but`: names of a dict that are left out."""
+    match data:
+        case {"f": str(text)}:
+            number = float.fromhex(text)
+            if not math.isfinite(number):
+                return {"?": f"the number {number}"}
+            return {"q": [str(part) for part in number.as_integer_ratio()]}
+        case {"i": str(digits)}:
+            return {"q": [digits, "1"], "w": True}
+        case {"l": items} | {"t": items}:
+            return {"t": [from_step(item) for item in items]}
+        case {"d": pairs}:
+            return {"m": [[key, from_step(value)] for key, value in pairs if key not in but]}
+        case _:  # its own JSON
+            return data

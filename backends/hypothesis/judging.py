@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from avow.backend_kit.programs.judging import Formula
-from avow.evaluation.evaluate import NotEvaluable
-from avow.formulas.conditions import conditions
-from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.conditions import Condition, conditions
+from avow.formulas.formula import free_variables
 from avow.formulas.temporal.cell import CELL
 from avow.formulas.temporal.cells import Records
 from avow.formulas.temporal.responses import due
-from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.subterms import histories
-from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import TRUE, Quantified, Quantifier, Role, Term
 
-from .generate import Inputs
 from .tuning import CONFIDENCE
 
 
@@ -32,83 +28,48 @@ class Judged(Formula):
 
 
 @dataclass(slots=True)
-class Trigger:
-    """A condition that has to be met by some case; `parts` together imply it, where they speak of inputs only."""
-
-    whole: Judged
-    parts: tuple[Judged, ...]
-
-
-@dataclass(slots=True)
 class Guarantee:
-    """A guarantee and the triggers that it has: each has to be met by some case."""
+    """A guarantee and its triggers: the conditions that each have to be met by some case."""
 
     judged: Judged
-    triggers: tuple[Trigger, ...]
+    triggers: tuple[Judged, ...]
+    parts: tuple[tuple[Judged, ...], ...]
+    """Of each trigger, what it is made of: the more of it holds, the nearer a case is."""
     hits: list[int]
-    """How often each trigger was met by a drawn case."""
-    edge_hits: list[int]
-    """How often by a case at a threshold, which was not drawn."""
+    """How often each trigger was met."""
     run_hits: list[int]
     """In how many runs each was met."""
     undecided: int = 0
-    failure: tuple[Inputs, dict[str, Value]] | None = None
 
 
-def judged(name: str, formula: Term, text: str, records: Records) -> Judged:
+def judged(name: str, formula: Term, records: Records) -> Judged:
     """A clause; what it remembers of other steps is among the records."""
     made = Formula.made(name, records.clause(formula) if histories(formula) else formula)
     ports = sorted(v.name for v in free_variables(made.term) if v.role is Role.INPUT and CELL not in v.name)
-    return Judged(name, made.term, made.evaluator, text, tuple(ports))
+    return Judged(name, made.term, made.evaluator, _shown(formula), tuple(ports))
 
 
-def guarantee(name: str, formula: Term, text: str, records: Records) -> Guarantee:
+def guarantee(name: str, formula: Term, records: Records) -> Guarantee:
     """The guarantee with its triggers; of a response, that all of what it demands came due."""
     response = due(formula)
+    parts: list[tuple[Judged, ...]] = []
     if response is None:
-        found = tuple(_trigger(name, c.outer, c.parts, records) for c in conditions(formula))
+        met = conditions(formula)
+        found = tuple(judged(name, c.formula, records) for c in met)
+        each = (tuple(judged(name, Condition(c.outer, (part,)).formula, records) for part in c.parts) for c in met)
+        parts = [several if len(several) > 1 else () for several in each]
     elif response.full == TRUE:
         found = ()
     else:
-        aim = _trigger(name, response.outer, response.triggers, records)
-        full = judged(name, _bound(response.outer, response.full), f"{aim.whole.text}, and what it demands", records)
-        found = (Trigger(full, aim.parts),)
+        used = tuple(v for v in response.outer if v in free_variables(response.full))
+        full = Quantified(Quantifier.EXISTS, used, response.full) if used else response.full
+        found, parts = (judged(name, full, records),), [()]
     none = [0] * len(found)
-    return Guarantee(judged(name, formula, text, records), found, list(none), list(none), list(none))
+    return Guarantee(judged(name, formula, records), found, tuple(parts), none, list(none))
 
 
-def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, ...] | None:
-    """The inputs that the first failing part speaks of; None where none fails (or none can be evaluated)."""
-    for part in parts:
-        if part.evaluator is None or not part.ports:
-            continue
-        try:
-            if not part.evaluator(values):
-                return part.ports
-        except NotEvaluable:
-            continue
-    return None
-
-
-def _trigger(name: str, outer: tuple[Variable, ...], given: tuple[Term, ...], records: Records) -> Trigger:
-    joined = conjunction(given)
-    items = joined.items if isinstance(joined, And) else (joined,)
-    bound = frozenset(outer)
-    alone = [item for item in items if not free_variables(item) & bound]
-    together = conjunction(item for item in items if free_variables(item) & bound)
-    whole = _bound(outer, joined)
-    parts = [judged(name, part, "", records) for part in (*alone, _bound(outer, together)) if _of_inputs(part)]
-    return Trigger(judged(name, whole, show_term(whole, "unicode").replace("\n", " "), records), tuple(parts))
-
-
-def _bound(outer: tuple[Variable, ...], formula: Term) -> Term:
-    free = free_variables(formula)
-    used = tuple(v for v in outer if v in free)
-    return Quantified(Quantifier.EXISTS, used, formula) if used else formula
-
-
-def _of_inputs(formula: Term) -> bool:
-    return all(v.role is Role.INPUT for v in free_variables(formula))
+def _shown(formula: Term) -> str:
+    return show_term(formula, "unicode").replace("\n", " ")
 
 
 def failure_bound(cases: int) -> float:

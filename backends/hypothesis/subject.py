@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.given import existing_file
 from avow.backend_kit.protocol import Job
@@ -38,12 +39,25 @@ class SubjectFile:
     path: Path
     function: str
     """The function; of a class that is driven, how, as JSON (`avow.drive.steps`)."""
-    memory: tuple[str, ...] = ()
+    held: Mapping[str, str] = field(default_factory=dict)
+    """Of a driven class, the attribute that holds each port of its memory."""
     driven: bool = False
     source: bool = False
     """Whether it is the node's own class."""
+    class_name: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    wants_parameters: bool = False
+    accepted: frozenset[str] | None = None
+    """The inputs that it takes by name; None: all."""
     left_out: frozenset[str] = frozenset()
     """Ports by qualified name that no clause speaks of: inputs that the class is not given, outputs not looked at."""
+
+    @property
+    def memory(self) -> tuple[str, ...]:
+        return tuple(sorted(self.held))
+
+    def takes(self, name: str) -> bool:
+        return self.accepted is None or name in self.accepted
 
 
 def subject(job: Job) -> SubjectFile:
@@ -65,7 +79,11 @@ def subject(job: Job) -> SubjectFile:
         if not isinstance(declared, ast.ClassDef):
             where = job.source.place.at("source", "class")
             raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{job.source.class_name}`", where))
-        return _without(found, _method(declared, "step"), job) if job.source.kind is Driving.STEP else found
+        if job.source.kind is not Driving.STEP:
+            return found
+        begun = _method(declared, "__init__")
+        found = replace(found, wants_parameters=begun is not None and len(begun.args.args) > 1)
+        return _without(found, _method(declared, "step"), job)
     if found.function not in defined:
         message = f"`{found.name}` defines no function `{found.function}`"
         raise Rejected(Diagnostic("HYPO102", message, place, hint=did_you_mean(found.function, defined)))
@@ -74,7 +92,8 @@ def subject(job: Job) -> SubjectFile:
         problems = _arguments(definition, found, job)
         if problems:
             raise Rejected(*problems)
-    if isinstance(definition, ast.ClassDef) and (step := _method(definition, "step")) is not None:
+        return replace(found, accepted=_accepted(definition.args))
+    if isinstance(definition, ast.ClassDef) and (step := _inherited(definition, "step", defined)) is not None:
         return _step_class(found, definition, step, job)
     return found
 
@@ -99,7 +118,7 @@ def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.Function
     if problems:
         raise Rejected(*problems)
     spec = {"class": definition.name, "params": coded({}), "memory": {}, "attributes": []}
-    return SubjectFile(found.name, found.path, json.dumps(spec), (), True)
+    return SubjectFile(found.name, found.path, json.dumps(spec), driven=True, class_name=definition.name)
 
 
 def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> SubjectFile:
@@ -120,6 +139,24 @@ def _without(found: SubjectFile, step: ast.FunctionDef | None, job: Job) -> Subj
             raise Rejected(Diagnostic("HYPO106", f"a step class is not given what {port.name} is", place))
         left.add(called)
     return replace(found, left_out=frozenset(left))
+
+
+def _accepted(arguments: ast.arguments) -> frozenset[str] | None:
+    return None if arguments.kwarg is not None else frozenset(a.arg for a in (*arguments.args, *arguments.kwonlyargs))
+
+
+def _inherited(definition: ast.ClassDef, name: str, defined: Mapping[str, ast.AST]) -> ast.FunctionDef | None:
+    """A class' method, its own or that of a base in the same file."""
+    seen: list[ast.ClassDef] = []
+    waiting = [definition]
+    while waiting:
+        one = waiting.pop(0)
+        seen.append(one)
+        if (method := _method(one, name)) is not None:
+            return method
+        bases = [defined.get(base.id) for base in one.bases if isinstance(base, ast.Name)]
+        waiting += [base for base in bases if isinstance(base, ast.ClassDef) and base not in seen]
+    return None
 
 
 def _method(definition: ast.ClassDef, name: str) -> ast.FunctionDef | None:
@@ -148,13 +185,15 @@ def _declared(job: Job, source: Source) -> SubjectFile:
     path = inside(job.root, source.python)
     if path is None or not path.is_file():
         raise Rejected(Diagnostic("HYPO101", f"there is no file `{source.python}` in the system's folder", place))
-    params, faults = parameters(job.root, source)
+    params, faults = parameters(job.root, source, job.system.plan.ros.names.placed(job.node.name).name)
     if source.numbers is Numbers.FLOAT32:
         faults += (Diagnostic("HYPO106", "a Python class computes with float64, not float32", place),)
     if faults:
         raise Rejected(*faults)
     spec = {"class": source.class_name, "params": coded(dict(params)), "memory": dict(source.memory), "attributes": []}
-    return SubjectFile(source.python, path, json.dumps(spec), tuple(sorted(source.memory)), True, True)
+    return SubjectFile(
+        source.python, path, json.dumps(spec), dict(source.memory), True, True, source.class_name, dict(params)
+    )
 
 
 def parameter_files(job: Job) -> tuple[Path, ...]:

@@ -43,7 +43,6 @@ class Reading:
             self.params,
             dict(self.source.memory),
             tuple(self.step.start) if self.step is not None else (),
-            ("python", *(o.id for o in self.job.every)),
         )
 
     @property
@@ -93,7 +92,7 @@ def load(job: Job) -> Reading:
     except (OSError, ValueError, RecursionError, MemoryError, AssertionError) as error:
         message = f"`{source.python}` cannot be read: {error}"
         faults.append(Diagnostic("PYTHON100", message, source.place.at("source", "python")))
-    params, wrong = parameters(job.root, source)
+    params, wrong = parameters(job.root, source, job.system.plan.ros.names.placed(job.node.name).name)
     faults += wrong
     if faults or tree is None or path is None:
         raise Rejected(*faults)

@@ -12,32 +12,15 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.formulas.formula import conjunction, disjunction, equation, negation
+from avow.language import terms as t
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, FunctionSort, Sort
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    Apply,
-    Arithmetic,
-    Compare,
-    Conditional,
-    EnumValue,
-    Iff,
-    Implies,
-    Literal,
-    Negative,
-    Not,
-    Role,
-    Term,
-    Variable,
-    Widen,
-)
 
 from . import program
 from .program import Expr, assigned
 from .rounding import finite, gaps, no_overflow, rounded
 from .tuning import BESIDE, MOST_NAMES, UNROLLED
 
-ZERO = Literal(0, INTEGER)
+ZERO = t.Literal(0, INTEGER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +28,8 @@ class Check:
     """`goal` follows from the first `facts` of the facts, where `guard` holds."""
 
     facts: int
-    guard: Term
-    goal: Term
+    guard: t.Term
+    goal: t.Term
     what: str
     line: int
     candidate: Candidate | None = None
@@ -59,16 +42,16 @@ class Candidate:
 
     loop: str
     text: str
-    build: Callable[[Turn], Term | None] = field(compare=False, repr=False)
+    build: Callable[[Turn], t.Term | None] = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
     """A loop at some moment: the names' values, how many turns are done, and what the names were before the first."""
 
-    values: Mapping[str, Term]
-    done: Term
-    entry: Mapping[str, Term]
+    values: Mapping[str, t.Term]
+    done: t.Term
+    entry: Mapping[str, t.Term]
     loop: program.For
     carried: tuple[str, ...]
 
@@ -78,15 +61,15 @@ class End:
     """A way out of the step: where `guard` holds, with the first `facts` of the facts."""
 
     facts: int
-    guard: Term
-    outputs: Mapping[str, Term]
+    guard: t.Term
+    outputs: Mapping[str, t.Term]
     line: int
 
 
 @dataclass(slots=True)
 class State:
-    path: Term
-    values: dict[str, Term]
+    path: t.Term
+    values: dict[str, t.Term]
 
 
 class TooMuch(Exception):  # noqa: N818 - it names what happened
@@ -107,43 +90,43 @@ class Run:
     gaps: tuple[Fraction, ...]
     """Numbers of the contract that may be no doubles."""
     candidates: Sequence[Candidate]
-    facts: list[Term] = field(default_factory=list)
+    facts: list[t.Term] = field(default_factory=list)
     checks: list[Check] = field(default_factory=list)
     ends: list[End] = field(default_factory=list)
     loops: list[tuple[program.For, Turn]] = field(default_factory=list)
     rounds: list[int] = field(default_factory=list)
     """Lines where something is rounded."""
-    _doubles: list[Term] = field(default_factory=list)
+    _doubles: list[t.Term] = field(default_factory=list)
     """Inputs, which rounding does not pass."""
     _fresh: int = 0
-    _exits: list[list[tuple[State, Term | None]]] = field(default_factory=list)
+    _exits: list[list[tuple[State, t.Term | None]]] = field(default_factory=list)
     _left: list[list[tuple[State, str]]] = field(default_factory=list)
 
     # -- naming ------------------------------------------------------------------------------------------
 
-    def fresh(self, hint: str, sort: Sort) -> Variable:
+    def fresh(self, hint: str, sort: Sort) -> t.Variable:
         self._fresh += 1
         if self._fresh > MOST_NAMES:
             raise TooMuch
-        return Variable(Role.BOUND, f"{hint}.{self._fresh}", sort)
+        return t.Variable(t.Role.BOUND, f"{hint}.{self._fresh}", sort)
 
-    def named(self, hint: str, term: Term) -> Term:
+    def named(self, hint: str, term: t.Term) -> t.Term:
         """A name for a term, unless it is short anyhow."""
-        if isinstance(term, Variable | Literal | EnumValue) or (
-            isinstance(term, Widen | Negative | Not) and isinstance(term.children[0], Variable)
+        if isinstance(term, t.Variable | t.Literal | t.EnumValue) or (
+            isinstance(term, t.Widen | t.Negative | t.Not) and isinstance(term.children[0], t.Variable)
         ):
             return term
         name = self.fresh(hint, INTEGER if term.sort == NATURAL else term.sort)
         self.facts.append(equation(name, term))
         return name
 
-    def check(self, state: State, goal: Term, what: str, line: int, candidate: Candidate | None = None) -> None:
-        if goal != TRUE:
+    def check(self, state: State, goal: t.Term, what: str, line: int, candidate: Candidate | None = None) -> None:
+        if goal != t.TRUE:
             self.checks.append(Check(len(self.facts), state.path, goal, what, line, candidate))
 
     # -- the step ----------------------------------------------------------------------------------------
 
-    def whole(self, inputs: Mapping[str, Term]) -> None:
+    def whole(self, inputs: Mapping[str, t.Term]) -> None:
         """`inputs` are the names that a step starts with: ``in.x``, ``self.x``; of a sequence ``in.s#`` its length."""
         values = dict(inputs)
         for name, value in self.step.start.items():
@@ -153,10 +136,10 @@ class Run:
                 self.double(term)
                 self._doubles.append(term)
         self._exits.append([])
-        self.block(self.step.body, State(TRUE, values), top=True)
+        self.block(self.step.body, State(t.TRUE, values), top=True)
         self._exits.pop()
 
-    def double(self, term: Term) -> None:
+    def double(self, term: t.Term) -> None:
         """What is known of any double."""
         if not self.exact:
             self.facts += [finite(term), *gaps(term, self.gaps)]
@@ -197,17 +180,17 @@ class Run:
                 self._left[-1].append((state, word))
                 return None
 
-    def split(self, state: State, condition: Term) -> State:
+    def split(self, state: State, condition: t.Term) -> State:
         return State(self.named("path", conjunction((state.path, condition))), dict(state.values))
 
     def meet(self, one: State | None, other: State | None) -> State | None:
         """Where two paths, of which a run takes at most one, come together."""
         if one is None or other is None:
             return one or other
-        values: dict[str, Term] = {}
+        values: dict[str, t.Term] = {}
         for name in one.values.keys() & other.values.keys():
             a, b = one.values[name], other.values[name]
-            values[name] = a if a == b else self.named(name, Conditional(one.path, a, b, wider(a.sort, b.sort)))
+            values[name] = a if a == b else self.named(name, t.Conditional(one.path, a, b, wider(a.sort, b.sort)))
         return State(self.named("path", disjunction((one.path, other.path))), values)
 
     # -- loops -------------------------------------------------------------------------------------------
@@ -236,18 +219,18 @@ class Run:
             head[name] = self.fresh(name, widest(head[name].sort))
         done = self.fresh("done", INTEGER)
         at = Turn(head, done, entry, loop, carried)
-        assumed: list[Term] = [Compare("<=", ZERO, done), Compare("<=", done, count)]
+        assumed: list[t.Term] = [t.Compare("<=", ZERO, done), t.Compare("<=", done, count)]
         before = len(self.facts)
         for name in carried:
             if head[name].sort == REAL:
                 self.double(head[name])
         assumed += [goal for c in own if (goal := c.build(at)) is not None]
         doubles, self.facts[before:] = self.facts[before:], []
-        self.facts += [Implies(state.path, fact) for fact in (*assumed, *doubles)]
+        self.facts += [t.Implies(state.path, fact) for fact in (*assumed, *doubles)]
         # where no turn is left to be done
-        over = self.split(State(state.path, head), Compare("==", done, count))
+        over = self.split(State(state.path, head), t.Compare("==", done, count))
         over.values = {name: over.values[name] for name in state.values}
-        turn = self.split(State(state.path, head), Compare("<", done, count))
+        turn = self.split(State(state.path, head), t.Compare("<", done, count))
         turn.values[loop.counter] = done
         self._left.append([])
         end = self.block(loop.body, turn, top)
@@ -256,7 +239,7 @@ class Run:
             if word == "continue":
                 after = Turn(gone.values, plus(done, 1), entry, loop, carried)
                 for candidate in own:
-                    goal = candidate.build(after) or FALSE
+                    goal = candidate.build(after) or t.FALSE
                     self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
         result: State | None = over
         for gone, word in leaving:
@@ -273,7 +256,7 @@ class Run:
         for k in range(turns):
             if current is None:
                 break
-            current.values[loop.counter] = Literal(k, INTEGER)
+            current.values[loop.counter] = t.Literal(k, INTEGER)
             self._left.append([])
             current = self.block(loop.body, current, top)
             for gone, word in self._left.pop():
@@ -288,31 +271,31 @@ class Run:
 
     # -- expressions -------------------------------------------------------------------------------------
 
-    def constant(self, value: bool | int | float | str) -> Term:
+    def constant(self, value: bool | int | float | str) -> t.Term:
         match value:
             case bool():
-                return Literal(value, BOOL)
+                return t.Literal(value, BOOL)
             case int():
-                return Literal(value, INTEGER)
+                return t.Literal(value, INTEGER)
             case float():
-                return Literal(Fraction(value), REAL)
+                return t.Literal(Fraction(value), REAL)
             case str():
-                return EnumValue(value, self.sorts[value])
+                return t.EnumValue(value, self.sorts[value])
 
-    def value(self, expression: Expr, state: State) -> Term:
+    def value(self, expression: Expr, state: State) -> t.Term:
         match expression:
             case program.Const(value=value):
                 return self.constant(value)
             case program.Name(name=name):
                 return state.values[name]
             case program.Convert(body=body, line=line):
-                return self.rounded(Widen(self.value(body, state), REAL), (), False, state, line)
+                return self.rounded(t.Widen(self.value(body, state), REAL), (), False, state, line)
             case program.Unary(operator="-", body=body):
                 term = self.value(body, state)
-                return Negative(term, INTEGER if term.sort == NATURAL else term.sort)
+                return t.Negative(term, INTEGER if term.sort == NATURAL else term.sort)
             case program.Unary(operator="abs", body=body):
                 term = self.named("value", self.value(body, state))
-                return Conditional(Compare("<", term, zero(term)), Negative(term, term.sort), term, term.sort)
+                return t.Conditional(t.Compare("<", term, zero(term)), t.Negative(term, term.sort), term, term.sort)
             case program.Unary(body=body):
                 return negation(self.value(body, state))
             case program.Binary():
@@ -326,43 +309,43 @@ class Run:
                 condition = self.named("test", self.value(test, state))
                 yes = self.value(then, self.split(state, condition))
                 no = self.value(otherwise, self.split(state, negation(condition)))
-                return Conditional(condition, yes, no, wider(yes.sort, no.sort))
+                return t.Conditional(condition, yes, no, wider(yes.sort, no.sort))
             case program.Extreme(operator=operator, items=items):
                 found = [self.named("value", self.value(item, state)) for item in items]
                 best = found[0]
                 for item in found[1:]:
-                    nearer = Compare("<" if operator == "min" else ">", item, best)
-                    best = self.named(operator, Conditional(nearer, item, best, wider(item.sort, best.sort)))
+                    nearer = t.Compare("<" if operator == "min" else ">", item, best)
+                    best = self.named(operator, t.Conditional(nearer, item, best, wider(item.sort, best.sort)))
                 return best
             case program.Length(view=view):
                 whole = state.values[f"in.{view.sequence}#"]
                 if view.stop is not None:
-                    stop = Literal(view.stop, INTEGER)
-                    whole = Conditional(Compare("<", whole, stop), whole, stop, INTEGER)
+                    stop = t.Literal(view.stop, INTEGER)
+                    whole = t.Conditional(t.Compare("<", whole, stop), whole, stop, INTEGER)
                 if not view.start:
                     return whole
-                rest = self.named("rest", Arithmetic("-", whole, Literal(view.start, INTEGER), INTEGER))
-                return Conditional(Compare("<", rest, ZERO), ZERO, rest, INTEGER)
+                rest = self.named("rest", t.Arithmetic("-", whole, t.Literal(view.start, INTEGER), INTEGER))
+                return t.Conditional(t.Compare("<", rest, ZERO), ZERO, rest, INTEGER)
             case program.Item(view=view, index=index, line=line):
                 at = self.named("index", self.value(index, state))
                 size = self.value(program.Length(view), state)
-                inside = conjunction((Compare("<=", ZERO, at), Compare("<", at, size)))
+                inside = conjunction((t.Compare("<=", ZERO, at), t.Compare("<", at, size)))
                 self.check(state, inside, "the index lies in the sequence", line)
-                place = Arithmetic("+", Literal(view.start, INTEGER), at, INTEGER) if view.start else at
+                place = t.Arithmetic("+", t.Literal(view.start, INTEGER), at, INTEGER) if view.start else at
                 elements = state.values[f"in.{view.sequence}"]
                 assert isinstance(elements.sort, FunctionSort)
-                item = self.named("item", Apply(elements, (place,), elements.sort.result))
+                item = self.named("item", t.Apply(elements, (place,), elements.sort.result))
                 before = len(self.facts)
                 if item.sort == REAL:
                     self.double(item)
                 if elements.sort.result == NATURAL:
-                    self.facts.append(Compare(">=", item, ZERO))
-                self.facts[before:] = [Implies(inside, fact) for fact in self.facts[before:]]
+                    self.facts.append(t.Compare(">=", item, ZERO))
+                self.facts[before:] = [t.Implies(inside, fact) for fact in self.facts[before:]]
                 return item
             case program.Inlined(body=body):
                 return self.inlined(body, state)
 
-    def inlined(self, body: Sequence[program.Statement], state: State) -> Term:
+    def inlined(self, body: Sequence[program.Statement], state: State) -> t.Term:
         self._exits.append([])
         inside = State(state.path, dict(state.values))
         self.block(body, inside)
@@ -374,7 +357,7 @@ class Run:
             result = (
                 result
                 if result == value
-                else self.named("result", Conditional(found.path, result, value, wider(result.sort, value.sort)))
+                else self.named("result", t.Conditional(found.path, result, value, wider(result.sort, value.sort)))
             )
             met = self.meet(found, other)
             assert met is not None
@@ -383,9 +366,9 @@ class Run:
         state.values.update({name: found.values[name] for name in state.values if name in found.values})
         return result
 
-    def junction(self, operator: str, items: Sequence[Expr], state: State) -> Term:
+    def junction(self, operator: str, items: Sequence[Expr], state: State) -> t.Term:
         """Cut short: an item is only looked at where those before it do not decide."""
-        found: list[Term] = []
+        found: list[t.Term] = []
         current = state
         for item in items:
             term = self.named("truth", self.value(item, current))
@@ -393,52 +376,52 @@ class Run:
             current = self.split(current, term if operator == "and" else negation(term))
         return conjunction(found) if operator == "and" else disjunction(found)
 
-    def compared(self, operator: str, one: Term, other: Term) -> Term:
+    def compared(self, operator: str, one: t.Term, other: t.Term) -> t.Term:
         if one.sort == BOOL:
-            alike = Iff(one, other)
-            return alike if operator == "==" else Not(alike)
+            alike = t.Iff(one, other)
+            return alike if operator == "==" else t.Not(alike)
         if one.sort != other.sort and REAL in (one.sort, other.sort):
-            one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
-        return Compare(operator, one, other)
+            one, other = (term if term.sort == REAL else t.Widen(term, REAL) for term in (one, other))
+        return t.Compare(operator, one, other)
 
-    def arithmetic(self, expression: program.Binary, state: State) -> Term:
+    def arithmetic(self, expression: program.Binary, state: State) -> t.Term:
         one = self.named("left", self.value(expression.left, state))
         other = self.named("right", self.value(expression.right, state))
         operator, line = expression.operator, expression.line
         if operator in ("//", "%"):
             return self.floored(operator, one, other, state, line)
         if operator == "/":
-            self.check(state, Compare("!=", other, zero(other)), "the divisor is not zero", line)
+            self.check(state, t.Compare("!=", other, zero(other)), "the divisor is not zero", line)
             doubles = (one, other) if one.sort == REAL else ()
-            one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
-            if isinstance(other, Literal) and other.value:
-                inverse = Literal(1 / Fraction(other.value), REAL)
-                quotient: Term = Arithmetic("*", one, inverse, REAL)
+            one, other = (term if term.sort == REAL else t.Widen(term, REAL) for term in (one, other))
+            if isinstance(other, t.Literal) and other.value:
+                inverse = t.Literal(1 / Fraction(other.value), REAL)
+                quotient: t.Term = t.Arithmetic("*", one, inverse, REAL)
             else:
                 quotient = self.fresh("quotient", REAL)
-                product = Arithmetic("*", quotient, other, REAL)
-                self.facts.append(Implies(Compare("!=", other, zero(other)), Compare("==", product, one)))
+                product = t.Arithmetic("*", quotient, other, REAL)
+                self.facts.append(t.Implies(t.Compare("!=", other, zero(other)), t.Compare("==", product, one)))
             return self.rounded(quotient, doubles, True, state, line)
         whole = one.sort != REAL
-        exact = Arithmetic(operator, one, other, INTEGER if whole else REAL)
+        exact = t.Arithmetic(operator, one, other, INTEGER if whole else REAL)
         return exact if whole else self.rounded(exact, (one, other), operator == "*", state, line)
 
-    def floored(self, operator: str, one: Term, other: Term, state: State, line: int) -> Term:
+    def floored(self, operator: str, one: t.Term, other: t.Term, state: State, line: int) -> t.Term:
         """``//`` and ``%`` of ints: the quotient is rounded down, the remainder has the divisor's sign
         (https://docs.python.org/3/reference/expressions.html#binary-arithmetic-operations)."""
-        self.check(state, Compare("!=", other, ZERO), "the divisor is not zero", line)
+        self.check(state, t.Compare("!=", other, ZERO), "the divisor is not zero", line)
         quotient, rest = self.fresh("floored", INTEGER), self.fresh("remainder", INTEGER)
-        whole = Arithmetic("+", Arithmetic("*", quotient, other, INTEGER), rest, INTEGER)
-        above = conjunction((Compare("<=", ZERO, rest), Compare("<", rest, other)))
-        below = conjunction((Compare("<", other, rest), Compare("<=", rest, ZERO)))
+        whole = t.Arithmetic("+", t.Arithmetic("*", quotient, other, INTEGER), rest, INTEGER)
+        above = conjunction((t.Compare("<=", ZERO, rest), t.Compare("<", rest, other)))
+        below = conjunction((t.Compare("<", other, rest), t.Compare("<=", rest, ZERO)))
         self.facts += [
-            Implies(Compare("!=", other, ZERO), Compare("==", one, whole)),
-            Implies(Compare("<", ZERO, other), above),
-            Implies(Compare("<", other, ZERO), below),
+            t.Implies(t.Compare("!=", other, ZERO), t.Compare("==", one, whole)),
+            t.Implies(t.Compare("<", ZERO, other), above),
+            t.Implies(t.Compare("<", other, ZERO), below),
         ]
         return quotient if operator == "//" else rest
 
-    def rounded(self, exact: Term, doubles: Sequence[Term], products: bool, state: State, line: int) -> Term:
+    def rounded(self, exact: t.Term, doubles: Sequence[t.Term], products: bool, state: State, line: int) -> t.Term:
         """The double next to an exact result, and the condition that there is one."""
         self.rounds.append(line)
         if self.exact:
@@ -446,20 +429,20 @@ class Run:
         exact = self.named("exact", exact)
         self.check(state, no_overflow(exact), "the result is no infinity", line)
         result = self.fresh("rounded", REAL)
-        variables = [t for t in (*doubles, *self._doubles[:BESIDE]) if not isinstance(t, Literal)]
+        variables = [term for term in (*doubles, *self._doubles[:BESIDE]) if not isinstance(term, t.Literal)]
         self.facts.append(rounded(result, exact, products=products, beside=variables, at=self.thresholds))
         self.facts += gaps(result, self.gaps)
         return result
 
 
-def zero(term: Term) -> Literal:
-    return Literal(Fraction(0), REAL) if term.sort == REAL else ZERO
+def zero(term: t.Term) -> t.Literal:
+    return t.Literal(Fraction(0), REAL) if term.sort == REAL else ZERO
 
 
-def plus(term: Term, more: Term | int) -> Term:
+def plus(term: t.Term, more: t.Term | int) -> t.Term:
     if isinstance(more, int):
-        return term if more == 0 else Arithmetic("+", term, Literal(more, INTEGER), INTEGER)
-    return Arithmetic("+", term, more, INTEGER)
+        return term if more == 0 else t.Arithmetic("+", term, t.Literal(more, INTEGER), INTEGER)
+    return t.Arithmetic("+", term, more, INTEGER)
 
 
 def wider(one: Sort, other: Sort) -> Sort:

@@ -12,22 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any, assert_never
 
 from avow.backend_kit.programs.judging import to_return
+from avow.language import sorts as s
 from avow.language.contract import Node
-from avow.language.sorts import (
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
 
 from . import program
 from .expressions import Expressions
@@ -36,18 +22,26 @@ from .tuning import INLINED_DEPTH
 from .whole_file import Parts, Refusal, bound_names, plain_arguments
 
 
-def kind_of(sort: Sort) -> Kind | None:
+def kind_of(sort: s.Sort) -> Kind | None:
     """What a value of the sort is in Python; None: nothing that a step may have."""
     match sort:
-        case BoolSort():
+        case s.BoolSort():
             return Kind.BOOL
-        case RealSort():
+        case s.RealSort():
             return Kind.FLOAT
-        case IntegerSort() | NaturalSort():
+        case s.IntegerSort() | s.NaturalSort():
             return Kind.INT
-        case EnumSort():
+        case s.EnumSort():
             return Kind.TEXT
-        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+        case (
+            s.StringSort()
+            | s.DataSort()
+            | s.OpaqueSort()
+            | s.FunctionSort()
+            | s.TupleSort()
+            | s.SequenceSort()
+            | s.SetSort()
+        ):
             # held by no number, truth value or text
             return None
         case _:
@@ -149,7 +143,7 @@ class Translator(Expressions):
             raise Refusal(step.lineno, f"step does not take the input {missing[0]}")
         sequences: dict[str, Kind] = {}
         for name, port in given.items():
-            item = kind_of(port.sort.item) if isinstance(port.sort, SequenceSort) else None
+            item = kind_of(port.sort.item) if isinstance(port.sort, s.SequenceSort) else None
             kind = kind_of(port.sort)
             if item is not None:
                 sequences[name] = item

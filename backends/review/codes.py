@@ -34,8 +34,8 @@ CODES = register(
     declare(
         "REV112",
         "wrong date",
-        "A date is no date, still to come, or long before any contract; or the review expires, or was renewed, before "
-        "it was made.",
+        "A date is not a date, is in the future, or is before the year 2000; or the review expires, or was renewed, "
+        "before it was made.",
         "Write dates as 2026-11-21.",
     ),
     declare(

@@ -3,7 +3,7 @@
 Messages become values by rules (`options`, `rules`, `reading`). The engine (`engine`) judges the clauses of one node
 (`watched`): by the latest values; by those of the inputs that an answer answered (`pairing`); or, of a clause that
 speaks of other steps (`memory`), in the order of the steps (`word`). A `session` has the engines of several nodes,
-`compiled` makes them fast on recorded lines, and `live` brings them the messages of a running graph.
+`columns` counts the events of a trace at which every clause holds, and `live` brings the messages of a running graph.
 """
 
 from __future__ import annotations

@@ -212,8 +212,9 @@ def ask(
     """An answer, which will be judged once it is known what it may have answered."""
     assert monitor.pairing is not None
     pairing, now = monitor.pairing, time_of(event)
-    if any(n not in values or n in monitor.supposed for n in watched.names if n not in monitor.paired):
-        watched.tally.early += 1
+    missing = [n for n in watched.names if n not in monitor.paired and (n not in values or n in monitor.supposed)]
+    if missing:
+        watched.tally.too_early(missing)
         pairing.count(watched, ticks(now))
         return
     own = tuple(n for n in speaks(monitor, watched) if n in values)
@@ -237,7 +238,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         return
     cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
     if cases == EARLY:
-        tally.early += 1
+        tally.too_early(watched.paired)
         return
     if isinstance(cases, str):
         tally.unsure(cases)
@@ -258,7 +259,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         said = watched.said
         if verdict is Fault.EXCUSED:
             said += "; but an assumption does not hold"
-        event, heard = pairing.event_of(asked), asked.heard
+        event, heard = asked.event, asked.heard
         if heard is None:
             heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
         wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])

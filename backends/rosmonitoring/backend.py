@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, Report, Translated
+from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCheck, Report, Translated
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Severity
-from avow.base.files import inside
+from avow.base.files import inside, read_text
 from avow.base.tools import Tool
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
@@ -29,7 +31,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "8"
+    version = "10"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -47,14 +49,11 @@ class RosMonitoringBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        try:
-            version: str | None = metadata.version("rosbags")
-        except metadata.PackageNotFoundError:
-            version = None
-        return (Tool("rosbags", version, None, "pip install 'avow[bags]'", package="rosbags"),)
+        return (Tool("rosbags", metadata.version("rosbags"), None, "pip install rosbags", package="rosbags"),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from avow.formulas.formula import free_variables
+        from avow.ros.bags import digest_trace
 
         from .memory import unmonitored
         from .options import setup
@@ -63,11 +62,14 @@ class RosMonitoringBackend(Backend):
 
         found, faults = setup(job.system, job.node, job.method.options)
         problems = [*faults, *readings(found, job.method.options.at("mapping")), *overheads(job)[1]]
-        for at, name in enumerate(_traces(job)):
-            path = inside(job.root, name)
-            if path is None or not path.exists():
-                span = job.method.options.at("traces", at)
+        for at, (name, digest) in enumerate(_traces(job).items()):
+            path, span = inside(job.root, name), job.method.options.at("traces", at)
+            if path is None or not (digest or path.exists()):
                 problems.append(Diagnostic("MON102", f"traces: there is no file {name!r} in the system's folder", span))
+            elif digest and path.exists() and (there := digest_trace(path)) != digest:
+                message = f"traces: {name!r} is not the recording that the plan names: its digest is {there}"
+                hint = "put the recording there, or write this digest if it is the one that is meant"
+                problems.append(Diagnostic("MON102", message, span, hint=hint))
         for obligation in job.obligations:
             clause = job.clause(obligation)
             problems += unholdable(found, clause)
@@ -116,6 +118,20 @@ class RosMonitoringBackend(Backend):
             f"{stem}_monitor.json": document(report) + "\n",
         }
 
+    def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
+        """RML's own compiler and monitor on each recording that is a file of JSON lines."""
+        from .configuration import identifier
+
+        rml = folder / f"{identifier('', job.node.name)}.rml"
+        traces = [path for path in map(partial(inside, job.root), _traces(job)) if path and path.suffix == ".jsonl"]
+        refused = json.loads(read_text(rml.with_name(f"{rml.stem}_monitor.json")))["not_in_rml"]
+        said = tuple(name for name in job.method.guarantees if name not in refused)
+        for trace in traces if said else ():
+            compiled = rml.with_suffix(".pl")
+            compiler = ("java -jar rml-compiler.jar --input", rml, "--output", compiled)
+            words = (*compiler, "&& monitor.sh", compiled, trace, "--silent")
+            yield OutsideCheck(rml, words, said, prints="Execution terminated correctly")
+
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
         from .configuration import identifier
@@ -151,6 +167,7 @@ class RosMonitoringBackend(Backend):
         return discharge(job, _traces(job), limits)
 
 
-def _traces(job: Job) -> list[str]:
-    found = job.options.get("traces")
-    return [t for t in found if isinstance(t, str)] if isinstance(found, list) else []
+def _traces(job: Job) -> dict[str, str]:
+    from .observing import recordings
+
+    return recordings(job.method.options)

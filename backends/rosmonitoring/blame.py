@@ -202,6 +202,5 @@ def _inputs(node: Node, clause: str) -> list[str]:
 
 def _failing(monitor: Monitor) -> bool:
     """Whether an assumption does not hold of the values that are known now."""
-    monitor.catch_up()
     known = (a for a in monitor.assumptions if a.steps is None and monitor.values.keys() >= set(a.names))
     return any(assumed.truth_of(monitor.values, monitor.solver) is False for assumed in known)

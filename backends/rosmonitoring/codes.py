@@ -52,12 +52,6 @@ CODES = register(
     declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
     declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
     declare(
-        "MON202",
-        "bags not installed",
-        "Reading bags needs a package that is not installed.",
-        "`pip install 'avow[bags]'`.",
-    ),
-    declare(
         "MON203", "not a bag", "The file is no ROS bag that can be read.", "Record it again, or export JSON lines."
     ),
     declare(

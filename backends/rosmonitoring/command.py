@@ -3,31 +3,39 @@
 from __future__ import annotations
 
 import io
+import signal
 import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import click
 
+from avow.backend_kit.timeline import picture
 from avow.base.codec import document
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import listed
 from avow.base.suggestions import did_you_mean
+from avow.base.workspace import system_folder
+from avow.ros.bags import digest_trace
+from avow.system.load import load_system
+from avow.system.plan import System
 
+from .configuration import of_system
 from .coverage import coverage
+from .engine import Monitor
+from .judged import Recorder, Telling
+from .lanes import Marks, signals, timeline
+from .observing import method_of
+from .options import origin
+from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from avow.system.plan import System
-
-    from .engine import Monitor
-    from .judged import Recorder
-    from .lanes import Marks
-    from .session import Session
-    from .watched import Violation
+from .watched import Violation
 
 
 @click.command()
@@ -35,11 +43,16 @@ if TYPE_CHECKING:
 @click.argument("trace", required=False)
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
-@click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {VIOLATIONS_SHOWN}.")
+@click.option(
+    "--all",
+    "show_all",
+    is_flag=True,
+    help=f"Show every violation, not only the first {VIOLATIONS_SHOWN} of each clause.",
+)
 @click.option(
     "--live",
     metavar="GRAPH",
-    help="Judge a running graph: ros1[:http://host:11311], dds[:DOMAIN], rosbridge:ws://host:9090.",
+    help="Judge a running graph: ros1[:http://host:11311], ros2[:DOMAIN] (over DDS), rosbridge:ws://host:9090.",
 )
 @click.option(
     "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."
@@ -85,11 +98,9 @@ def command(
     that runs. Code 1 where something
     was broken or nothing could be judged, 2 where an input cannot be used.
     """
-    from avow.base.workspace import system_folder
-    from avow.system.load import load_system
 
     loaded = load_system(system_folder(system))
-    telling = _Telling(as_json, show_all, timeline, mcap)
+    telling = _Output(as_json, show_all, timeline, mcap)
     files = [path.resolve() for path in (record, timeline, mcap, configuration) if path is not None]
     files += [Path(trace).resolve()] if trace is not None and trace != "-" else []
     if len(set(files)) < len(files):
@@ -122,7 +133,7 @@ def command(
 
 
 @dataclass(frozen=True, slots=True)
-class _Telling:
+class _Output:
     """How the verdicts are told."""
 
     as_json: bool
@@ -133,17 +144,12 @@ class _Telling:
     @property
     def monitor(self) -> type[Monitor]:
         """Those that judge."""
-        from .engine import Monitor
-        from .judged import Telling
 
         return Monitor if self.mcap is None else Telling
 
 
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
-    from .configuration import of_system
-    from .observing import method_of
-    from .session import session
 
     setups = [monitor.setup for monitor in session(system, nodes).monitors]
     options = [method_of(system, setup.node.name) for setup in setups]
@@ -154,10 +160,9 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
 
 def _live(
     system: System, nodes: tuple[str, ...], live: str,
-    how: tuple[float | None, str, bool, Path | None, str | None], telling: _Telling,
+    how: tuple[float | None, str, bool, Path | None, str | None], telling: _Output,
 ) -> int:  # fmt: skip
     from .live.follow import follow, graph_of
-    from .session import session
 
     seconds, host, enforce, record, verdicts = how
     running = session(system, nodes, make=telling.monitor)
@@ -170,9 +175,6 @@ def _live(
 @contextmanager
 def _until(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Whether so many seconds have passed, or Ctrl-C was pressed; a second one interrupts at once."""
-    import signal
-    import threading
-    import time
 
     interrupted = threading.Event()
     end = None if seconds is None else time.monotonic() + seconds
@@ -192,8 +194,7 @@ def _warn(text: str) -> None:
     click.echo(text, err=True)
 
 
-def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling) -> int:
-    from .session import session
+def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Output) -> int:
 
     running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
     # each with the line of the event at which it was found; the last line's where it took the whole run
@@ -201,23 +202,21 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling
     return _told(running, found, trace, telling)
 
 
-def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Telling) -> int:
+def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Output) -> int:
     """Show what was found, and what became of each clause; the exit code."""
-    from .lanes import Marks
-    from .session import violation_json
-    from .traces import digest_trace
 
     shown: list[dict[str, Any]] = []
-    count = 0
+    counts = Counter[tuple[str, str, str]]()
     marks = Marks()
     with ExitStack() as stack:
         recorder = None if telling.mcap is None else stack.enter_context(_recorder(running, telling.mcap))
         for line, violation in violations:
-            count += 1
+            about = violation.node, violation.clause, violation.fault.value
+            counts[about] += 1
             marks.note(violation)
             if recorder is not None:
                 recorder.found(violation)
-            if not telling.show_all and count > VIOLATIONS_SHOWN:
+            if not telling.show_all and counts[about] > VIOLATIONS_SHOWN:
                 continue
             if telling.as_json:
                 shown.append({**violation_json(violation), "line": line})
@@ -230,15 +229,15 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
         click.echo(document(whole))
     else:
-        if not telling.show_all and count > VIOLATIONS_SHOWN:
-            click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")
+        for (node, clause, fault), count in () if telling.show_all else counts.items():
+            if count > VIOLATIONS_SHOWN:
+                click.echo(f"… and {count - VIOLATIONS_SHOWN} more of {node}.{clause}: {fault} (--all shows them)")
         _print_summary(running)
     return 0 if running.clean and _anything_judged(running) and not running.unmonitored() else 1
 
 
 def _recorder(running: Session, path: Path) -> Recorder:
     """An MCAP that hears each judgement. Raises Rejected."""
-    from .judged import Recorder, Telling
 
     recorder = Recorder(path)
     for monitor in running.monitors:
@@ -249,10 +248,6 @@ def _recorder(running: Session, path: Path) -> Recorder:
 
 def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
     """The timeline of all guarantees that were judged. Raises Rejected."""
-    from avow.backend_kit.timeline import picture
-
-    from .lanes import signals, timeline
-    from .options import origin
 
     setups = [monitor.setup for monitor in running.monitors]
     heard = signals(setups, trace, origin(running.system), running.events, marks, running.listens)
@@ -263,7 +258,6 @@ def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
 
 def _write(path: Path, text: str) -> None:
     """Raises Rejected."""
-    from avow.base.diagnostics import Diagnostic, Rejected
 
     try:
         path.write_text(text, encoding="utf-8")
@@ -296,6 +290,9 @@ def _print_summary(running: Session) -> None:
         click.echo(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
     if unmonitored := running.unmonitored():
         click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
+        for name, remedy in unmonitored.items():
+            if remedy:
+                click.echo(f"  {name}: {remedy}")
     if running.unheard:
         told = listed([f"{topic} ({count})" for topic, count in running.unheard.items()], 10)
         click.echo(f"topics of the trace that no clause speaks of, and their events: {told}")
@@ -303,18 +300,16 @@ def _print_summary(running: Session) -> None:
         for topic in list(running.unheard)[:10]:
             if meant := did_you_mean(topic, running.topics):
                 click.echo(f"  {topic}: {meant}")
-    faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
-    fine = (
-        "nothing broken"
-        if _anything_judged(running)
-        else "nothing was judged: no clause ever had a value for all that it speaks of"
-    )
-    click.echo(f"{running.events} events: {faults or fine}")
+    summary = [f"{count} × {fault}" for fault, count in running.counts.items()]
+    if not any(True for _ in running.clauses()):
+        summary.append("nothing was judged: write what a node promises in place of `to_write`")
+    elif not _anything_judged(running):
+        summary.append("nothing was judged: no clause ever had a value for all that it speaks of")
+    click.echo(f"{running.events} events: {', '.join(summary) or 'nothing broken'}")
 
 
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:
     from .live.serve import HOST, serve
-    from .session import session
 
     session(system, nodes)  # a fault of the plan is told now, not at the first connection
 

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from avow.backend_kit.programs.callbacks import SECOND, Driver, Event, Run, driver, unusable
 from avow.base.codec import document
+from avow.base.files import write_out
+from avow.base.workspace import system_folder
+from avow.ros.bags import fields_of
+from avow.system.load import load_system
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from avow.backend_kit.programs.callbacks import Driver, Event, Run
+from .numbers import exact
+from .traces import read_trace
+from .tuning import DIFFERENCES
 
 
 @click.command()
@@ -52,10 +57,6 @@ def command(
     Code 1 where the class raises, or publishes otherwise than the recording; 2 where it asks for something of ROS that
     is not driven, or where what it publishes hangs on a clock or on chance.
     """
-    from avow.backend_kit.programs.callbacks import driver, unusable
-    from avow.base.files import write_out
-    from avow.base.workspace import system_folder
-    from avow.system.load import load_system
 
     if replay and trace is None:
         raise click.UsageError("--replay compares with a TRACE")
@@ -100,10 +101,6 @@ def command(
 
 def _recorded(found: Driver, trace: Path) -> Iterator[tuple[Event, Any]]:
     """The trace's messages on topics that the class hears or says, in the order of the trace. Raises Rejected."""
-    from avow.backend_kit.programs.callbacks import SECOND, Event, unusable
-
-    from .numbers import exact
-    from .traces import read_trace
 
     before = 0
     for recorded in read_trace(trace, wanted=lambda topic: _whole(topic) in found.carried):
@@ -124,7 +121,6 @@ def _whole(topic: str) -> str:
 
 def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
     """Events as lines of a trace."""
-    from avow.backend_kit.programs.callbacks import SECOND
 
     for event in events:
         whole, part = divmod(event.at, SECOND)
@@ -133,18 +129,20 @@ def _lines(found: Driver, events: Iterable[Event]) -> Iterator[str]:
 
 
 def _different(found: Driver, recorded: tuple[tuple[Event, Any], ...], run: Run) -> Iterator[str]:
-    """Topic by topic the first publication that is not as recorded."""
-    from avow.ros.bags import fields_of
+    """Topic by topic the publications that are not as recorded, the first of them in full."""
 
     for topic in sorted(run.spoken):
         said = [event for event in run.said if event.topic == topic]
         before = [raw for event, raw in recorded if event.topic == topic]
-        for number, (event, raw) in enumerate(zip(said, before, strict=False), start=1):
-            if not found.said_as(topic, event.data, raw):
-                there = json.dumps(fields_of(raw), default=str)
-                here = next(_lines(found, (event,)))
-                yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
-                break
-        else:
-            if len(said) != len(before):
-                yield f"{topic}: {len(said)} published, {len(before)} recorded"
+        pairs = enumerate(zip(said, before, strict=False), start=1)
+        wrong = [(k, event, raw) for k, (event, raw) in pairs if not found.said_as(topic, event.data, raw)]
+        for number, event, raw in wrong[:DIFFERENCES]:
+            there = json.dumps(
+                fields_of(raw), default=lambda part: part.decode() if isinstance(part, bytes) else str(part)
+            )
+            here = next(_lines(found, (event,)))
+            yield f"{topic}: publication {number} is {here}, and was recorded as {there}"
+        if len(wrong) > DIFFERENCES:
+            yield f"{topic}: {len(wrong)} publications differ, of {len(said)}; the last is {wrong[-1][0]}"
+        if len(said) != len(before):
+            yield f"{topic}: {len(said)} published, {len(before)} recorded"

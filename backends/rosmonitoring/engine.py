@@ -9,7 +9,7 @@ environment's door, not the node's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -50,7 +50,7 @@ from .word import Message, Word, follow, word_of
 
 @dataclass(slots=True)
 class Monitor:
-    """Feed it events with `step`. `guarantees` are the names of those to judge (all by default)."""
+    """Feed it events with `step`. `guarantees` are the names of those to judge (by default all that are written)."""
 
     setup: Setup
     guarantees: Iterable[str] | None = None
@@ -64,8 +64,6 @@ class Monitor:
     """The topics of the messages so far."""
     at: dict[str, tuple[int, str]] = field(default_factory=dict)
     """Which message each variable's value is of: as `Heard`."""
-    catch_up: Callable[[], object] = field(default=lambda: None, repr=False)
-    """Brings it up to date where events were passed over."""
     _seen: set[str] = field(default_factory=set)
     versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
@@ -118,9 +116,10 @@ class Monitor:
         answers, self.paired = self.setup.answers, self.setup.heard
         spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
         self.assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
-        wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
-        watched = [c for c in node.clauses if c.kind is ClauseKind.ASSUMPTION or wanted is None or c.name in wanted]
+        written = (c.name for c in node.guarantees if not c.unwritten)
+        wanted = set(written if self.guarantees is None else self.guarantees)
+        watched = [c for c in node.clauses if c.kind is ClauseKind.ASSUMPTION or c.name in wanted]
         self.word = word_of(self.setup, watched)
         if self.word is None and answers is not None and answers.by != "arrival":
             self.pairing = Pairing(answers)
@@ -215,7 +214,8 @@ class Monitor:
             try:
                 new = read(event, old)
             except MappingError as error:
-                found.append(self.violation(Fault.MAPPING, name, event, str(error)))
+                if self.tallies:  # of a node that has promised nothing yet, no value is missed
+                    found.append(self.violation(Fault.MAPPING, name, event, str(error)))
                 self.miss({name})
                 # Its value is now unknown: what needs it waits for the next good message.
                 if of_latest(self.setup.rules[name]):
@@ -326,7 +326,7 @@ class Monitor:
             if names is None or names & set(self.carried(topic))
         ]
 
-    # -- for `compiled`, which passes over events that change only values ----------------------------------------------
+    # -- for `columns`, which take over events that change only values -------------------------------------------------
 
     @property
     def by_values(self) -> bool:
@@ -334,11 +334,9 @@ class Monitor:
         for the next."""
         return self.so_far is None and self._clock is None
 
-    def reader(self, name: str) -> Reader | None:
-        """What reads a variable's messages; None of one whose value is made of several."""
-        if not of_latest(self.setup.rules.get(name)):
-            return None
-        return next((read for all_ in self._readers.values() for of, read in all_ if of == name), None)
+    def reader_of(self, name: str) -> Reader:
+        """What reads a variable that messages carry."""
+        return next(read for readers in self._readers.values() for of, read in readers if of == name)
 
     def carried(self, topic: str) -> tuple[str, ...]:
         """The variables that a topic's messages carry."""
@@ -349,6 +347,7 @@ class Monitor:
         topic = same_topic(str(event["topic"]))
         self.at.update(dict.fromkeys(self.carried(topic), (place, publisher(event))))
         self.timing.caught_up(event, topic, self.carried(topic))
+        self.supposed.difference_update(self.carried(topic))
         for name, read in self._readers[topic]:
             old = self.values.get(name)
             new = read(event, old)
@@ -374,6 +373,8 @@ class Monitor:
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
+            if watched in self._timed and (why := self.timing.standing):
+                watched.tally.withdrawn(why)
         found = sure(self, found, over=True)
         found, self.in_doubt = [*self.in_doubt, *found], []
         return withdraw(self, found) if self.backwards else found

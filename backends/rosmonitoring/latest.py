@@ -98,12 +98,12 @@ def judge_latest(
 ) -> None:
     """Judge a clause at an event; `answer`: the parts of the answer, where they came apart."""
     values, steps, tally = monitor.known(watched, answer), watched.steps, watched.tally
-    missing = any(name not in values for name in watched.names)
+    missing = [name for name in watched.names if name not in values]
     supposed = any(name in monitor.supposed for name in watched.names)
     lost = False
     if steps is None:
         if missing:
-            tally.early += 1
+            tally.too_early(missing)
             return
         key = (*[monitor.versions[n] for n in watched.names], supposed)
         if key != watched.key or watched.held or answer is not None:
@@ -116,7 +116,7 @@ def judge_latest(
             if steps.unsaid:
                 tally.published -= 1  # what it responds to, which has no value yet, did not come about
             else:
-                tally.early += 1
+                tally.too_early(missing)
             if steps.answers or steps.stepped:
                 monitor.lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
             return
@@ -125,6 +125,12 @@ def judge_latest(
         watched.truth = steps.step(watched, values, monitor.solver, monitor.events, supposed)
     if monitor.so_far is not None:
         monitor.so_far.note(watched)
+    if steps is not None:
+        still = watched.truth is False and steps.missed
+        steps.missed = steps.awaits and not watched.truth and (steps.missed or watched.truth is False)
+        if still:
+            tally.overdue += 1
+            return
     if watched.truth is None and lost:
         tally.forgotten += 1
         return

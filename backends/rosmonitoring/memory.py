@@ -140,12 +140,10 @@ class Memory:
         """After the latest step, a response is demanded of later ones (or may be)."""
         self.lost = False
         """Steps went by unseen, and not all is known again."""
-        self.alone = False
-        """It speaks of arrivals alone."""
+        self.alone = False  # it speaks of arrivals alone
         self.every = False
         """Its steps are all messages of what it speaks of: a node that dies would never see what it has to answer."""
-        self.answers = False
-        """Its steps are answers of the node."""
+        self.answers = False  # its steps are answers of the node
         self.unsaid = frozenset[str]()
         """The outputs of a response to inputs: as long as one of them was never heard, it has not come."""
         self.mute = False
@@ -154,6 +152,8 @@ class Memory:
         """The event of its latest step."""
         self.broke = False
         """It was broken there, which is told, and need not be told of the silence that begins with it."""
+        self.awaits = self.missed = False
+        """It wants something within a limit, which did not come in time (that is told) and has not come since."""
         self.judged: Mapping[str, Value] = {}
         """The valuation of that step."""
         self.silence = silence
@@ -254,7 +254,7 @@ class Memory:
         """A run begins anew: what waited is cut."""
         self._keeper.restart()
         self._arrived.clear()
-        self.lost = self.open = False
+        self.lost = self.open = self.missed = False
         if self.silence is not None:
             self.silence.latest, self.silence.elapsed, self.silence.told = None, Fraction(0), False
 
@@ -338,6 +338,8 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         read = {v for term in (formula, *(c.now for c in records.cells)) for v in free_variables(term)}
         arrivals = tuple(v for v in read if is_arrival(v))
         steps = Memory(tuple(records.cells), formula, waiting, silence, arrivals, setup.leeway)
+        response = responding(clause.formula)
+        steps.awaits = response is not None and not response[0] and response[2].operator is Past.WITHIN
         steps.every = in_time and (bool(arrivals) or _answers_inputs(clause.formula))
         names = {n for c in records.cells for n in free_names(c.now) - {p.name for p in c.parameters}}
         names |= free_names(waiting) if waiting is not None else set()
@@ -446,7 +448,8 @@ def overdue(timed: Sequence[Watched], event: Mapping[str, Any]) -> list[tuple[Wa
     for watched in timed:
         assert watched.steps is not None
         watched.steps.begins(now)
-        if (deadline := watched.steps.late(now)) is not None:
+        if (deadline := watched.steps.late(now)) is not None and not watched.steps.missed:
+            watched.steps.missed = watched.steps.awaits
             watched.truth, watched.tally.published = False, watched.tally.published + 1
             found.append((watched, deadline))
     return sorted(found, key=lambda each: (each[1], each[0].clause.kind is not ClauseKind.ASSUMPTION))

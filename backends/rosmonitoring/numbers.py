@@ -1,4 +1,7 @@
-"""Numbers of a trace, exact: a decimal means what its digits say, not the nearest binary fraction."""
+"""Numbers of a trace, exact: a decimal means what its digits say, not the nearest binary fraction.
+
+A JSON number with a point or an exponent is kept as its digits, in `bytes`, until somebody needs its value.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +10,6 @@ import math
 from fractions import Fraction
 
 from .tuning import NUMBER_LENGTH
-
-
-class Decimal:
-    """A JSON number with a point or an exponent, kept as its text until somebody needs its value."""
-
-    __slots__ = ("text",)
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-
-    def __repr__(self) -> str:
-        return self.text
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Decimal) and other.text == self.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
 
 
 class Exact(Fraction):
@@ -47,8 +32,8 @@ class NotANumber(Exception):  # noqa: N818 - it names what was found
 
 def exact(raw: object) -> Fraction | int:
     """The value of a number as it came from JSON or from a bag, or as it is. Raises NotANumber."""
-    if isinstance(raw, Decimal):
-        return _fraction(raw.text)
+    if isinstance(raw, bytes):
+        return _fraction(raw.decode())
     if isinstance(raw, Fraction):
         return raw
     if isinstance(raw, int) and not isinstance(raw, bool):

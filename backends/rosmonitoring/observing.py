@@ -5,29 +5,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from avow.base.diagnostics import Rejected
 from avow.base.suggestions import suggest
 from avow.formulas.values import FunctionValue, Value
+from avow.language import sorts as s
 from avow.language.contract import Node, Port
-from avow.language.sorts import (
-    BOOL,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    Sort,
-    StringSort,
-    TupleSort,
-    components,
-)
 from avow.language.terms import Variable
 from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message, Nested, NoField, Scalar, Wire
 from avow.system.graph import dataflow
@@ -72,22 +58,22 @@ class Observed:
 def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
     """The rule, or why the variable cannot be observed. Raises Wrong, and Undecided where fields have to be named."""
     sort, variable = at.port.sort, at.variable
-    if isinstance(sort, OpaqueSort):
+    if isinstance(sort, s.OpaqueSort):
         return f"{variable.qualified} is of an unspecified sort"
     initial = literal(entry["initial"], sort, "initial") if entry.get("initial") is not None else None
-    if isinstance(sort, DataSort) and "constructor" in entry:
+    if isinstance(sort, s.DataSort) and "constructor" in entry:
         return _choice(at, sort, entry, initial)
     named = "field" in entry or "fields" in entry
-    if isinstance(sort, DataSort) and not named:
+    if isinstance(sort, s.DataSort) and not named:
         constructors = ", ".join(c.name for c in sort.constructors)
         return f"the plan does not say how a message names one of {constructors}"
-    result = sort.result if isinstance(sort, FunctionSort) and sort.result != BOOL else None
+    result = sort.result if isinstance(sort, s.FunctionSort) and sort.result != s.BOOL else None
     if result is not None and "elsewhere" not in entry:
         return f"{variable.qualified} is a total function, and the plan does not say its value `elsewhere`"
     elsewhere = entry.get("elsewhere")
     default = None if elsewhere is None else literal(elsewhere, result or sort, "elsewhere")
     hold = Hold(entry.get("hold", "latest"))
-    if hold is Hold.SEEN and initial is None and isinstance(sort, FunctionSort) and sort.result == BOOL:
+    if hold is Hold.SEEN and initial is None and isinstance(sort, s.FunctionSort) and sort.result == s.BOOL:
         initial = FunctionValue({}, False)
     take = Take(entry["take"]) if "take" in entry else None
     gaps = frozenset(gap for gap in Gap if entry.get(gap.value) == "none")
@@ -102,12 +88,12 @@ def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
     return rule
 
 
-def _paths(entry: Mapping[str, Any], sort: Sort) -> tuple[FieldPath, ...]:
+def _paths(entry: Mapping[str, Any], sort: s.Sort) -> tuple[FieldPath, ...]:
     """The fields that the plan names. Raises Wrong."""
     key = "field" if "field" in entry else "fields"
     paths = tuple(map(path, [entry["field"]] if key == "field" else entry["fields"]))
     wanted = len(parts_of(sort))
-    if isinstance(sort, TupleSort) and len(paths) > 1:  # a field for each part; one field holds them all
+    if isinstance(sort, s.TupleSort) and len(paths) > 1:  # a field for each part; one field holds them all
         wanted = len(sort.items)
     if len(paths) != wanted:
         raise Wrong(f"{wanted} field{'s are' if wanted > 1 else ' is'} wanted, not {len(paths)}", "fields")
@@ -128,6 +114,8 @@ def _wires(
 ) -> tuple[tuple[Wire | None, ...], Mapping[str, str]]:
     """What each field is, by the definition, and what the message's words and numbers mean. Raises Wrong."""
     names: dict[str, str] = dict(entry.get("values", {}))
+    enums = (part for part in s.components(at.port.sort) if isinstance(part, s.EnumSort))
+    _check_crossed(names, [member for part in enums for member in part.members])
     message = at.message
     if isinstance(message, str):
         return (), names
@@ -143,21 +131,21 @@ def _wires(
     except NoField as error:
         raise Wrong(str(error), "field" if "field" in entry else "fields") from None
     sort = at.port.sort
-    sorts = sort.items if isinstance(sort, TupleSort) and len(paths) > 1 else parts_of(sort)
+    sorts = sort.items if isinstance(sort, s.TupleSort) and len(paths) > 1 else parts_of(sort)
     for way, (wire, holder), part in zip(paths, found, sorts, strict=True):
         if take is not None:
             _check_take(way, wire, part, take, at.known)
             continue
-        if not fits(part, wire, at.known) and not isinstance(part, DataSort):
+        if not fits(part, wire, at.known) and not isinstance(part, s.DataSort):
             raise Wrong(f"{shown(way) or 'the message'} is {wire}, which cannot be read as {_said(part)}", "field")
-        if isinstance(part, EnumSort) and isinstance(wire, Scalar):
+        if isinstance(part, s.EnumSort) and isinstance(wire, Scalar):
             names = words(part, wire, holder, entry.get("values", {}))
             _check_words(way, wire, part, holder, names, bool(entry.get("values")))
     return tuple(wire for wire, _ in found), names
 
 
 def _check_words(
-    way: FieldPath, wire: Scalar, sort: EnumSort, holder: Message, names: Mapping[str, str], said: bool
+    way: FieldPath, wire: Scalar, sort: s.EnumSort, holder: Message, names: Mapping[str, str], said: bool
 ) -> None:
     if wire.name not in INTEGERS:
         return
@@ -175,13 +163,23 @@ def _check_words(
         )
 
 
-def _check_take(way: FieldPath, wire: Wire, sort: Sort, take: Take, known: Definitions) -> None:
+def _check_crossed(names: Mapping[str, str], elements: Sequence[str]) -> None:
+    """A word that is an element's own name means that element."""
+    own = {element.casefold(): element for element in elements}
+    for word, element in names.items():
+        meant = own.get(word.casefold(), element)
+        if meant != element:
+            hint = f"leave {word} out of `values`, or give the elements other names"
+            raise Wrong(f"{word!r} is to mean {element}, and {meant} is an element too", "values", word, hint=hint)
+
+
+def _check_take(way: FieldPath, wire: Wire, sort: s.Sort, take: Take, known: Definitions) -> None:
     if not isinstance(wire, Array):
         raise Wrong(f"{shown(way)} is {wire}, and no array", "take")
     if take is Take.COUNT:
-        if not isinstance(sort, RealSort | IntegerSort | NaturalSort):
+        if not isinstance(sort, s.RealSort | s.IntegerSort | s.NaturalSort):
             raise Wrong(f"`count` is a number, and not {_said(sort)}", "take")
-    elif not isinstance(sort, RealSort | IntegerSort | NaturalSort) or not fits(sort, wire.item, known):
+    elif not isinstance(sort, s.RealSort | s.IntegerSort | s.NaturalSort) or not fits(sort, wire.item, known):
         raise Wrong(f"the items of {shown(way)} are {wire.item}, which cannot be read as {_said(sort)}", "take")
 
 
@@ -191,30 +189,32 @@ def _check_gaps(rule: Fields) -> None:
     if (rule.gaps or rule.take in (Take.MIN, Take.MAX)) and rule.wires == ():
         key = "take" if rule.take else next(iter(rule.gaps)).value
         raise Wrong("the message's type has to be known for that", key, hint=SOURCES)
-    silent = rule.gaps and not isinstance(sort, FunctionSort) and rule.elsewhere is None and rule.take is not Take.COUNT
+    silent = (
+        rule.gaps and not isinstance(sort, s.FunctionSort) and rule.elsewhere is None and rule.take is not Take.COUNT
+    )
     if silent:
         key = sorted(rule.gaps)[0].value
         message = f"{_said(sort)} has a value always: `none` wants a relation, or the value `elsewhere`"
         raise Wrong(message, key)
-    if isinstance(sort, SequenceSort) and rule.gaps:
+    if isinstance(sort, s.SequenceSort) and rule.gaps:
         raise Wrong("a sequence has no place for a missing reading", sorted(rule.gaps)[0].value)
 
 
-def _said(sort: Sort) -> str:
+def _said(sort: s.Sort) -> str:
     match sort:
-        case EnumSort(members=members):
+        case s.EnumSort(members=members):
             return f"one of {{{', '.join(members)}}}"
-        case DataSort(name=name):
+        case s.DataSort(name=name):
             return name
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             return f"<{_said(item)}>"
-        case TupleSort(items=items):
+        case s.TupleSort(items=items):
             return f"({', '.join(map(_said, items))})"
         case _:  # BOOL, REAL, …
             return type(sort).__name__.removesuffix("Sort").upper()
 
 
-def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Value | None) -> Rule:
+def _choice(at: Observed, sort: s.DataSort, entry: Mapping[str, Any], initial: Value | None) -> Rule:
     known = {c.name: c for c in sort.constructors}
     given = {**{k: v for k, v in entry.items() if k in known}, **entry.get("arguments", {})}
     for key in (*entry, *entry.get("arguments", {})):
@@ -238,10 +238,11 @@ def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Val
     for word in names.values():
         if word not in known:
             raise Wrong(f"{sort.name} has no constructor {word!r}", "values", hint=suggest(word, known))
+    _check_crossed(names, list(known))
     return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, at.kind)
 
 
-def _field(at: Observed, way: FieldPath, sort: Sort, *place: str | int) -> Wire | None:
+def _field(at: Observed, way: FieldPath, sort: s.Sort, *place: str | int) -> Wire | None:
     """The type of a field that is to be read as a value of the sort. Raises Wrong."""
     if isinstance(at.message, str):
         return None
@@ -249,7 +250,7 @@ def _field(at: Observed, way: FieldPath, sort: Sort, *place: str | int) -> Wire 
         wire, _ = at.known.at(at.message, way)
     except NoField as error:
         raise Wrong(str(error), *place) from None
-    if isinstance(sort, DataSort):  # a word or a number that names the constructor
+    if isinstance(sort, s.DataSort):  # a word or a number that names the constructor
         usable = isinstance(wire, Scalar) and (wire.name in INTEGERS or wire.name in ("string", "wstring"))
     else:
         usable = fits(sort, wire, at.known)
@@ -291,21 +292,21 @@ _FIELD_KEYS = (
 _FUNCTION_KEYS = ("each", "hold")
 
 
-def check_keys(entry: Mapping[str, Any], sort: Sort) -> None:
+def check_keys(entry: Mapping[str, Any], sort: s.Sort) -> None:
     """Refuses what would be passed over in silence. Raises Wrong."""
     for key in entry:
         if key not in _FIELD_KEYS:
             raise Wrong(f"there is no {key!r} here", key, hint=suggest(key, _FIELD_KEYS))
-        if key in _FUNCTION_KEYS and not isinstance(sort, FunctionSort):
+        if key in _FUNCTION_KEYS and not isinstance(sort, s.FunctionSort):
             raise Wrong(f"{key!r} is for functions and relations", key)
     if "field" in entry and "fields" in entry:
         raise Wrong("either 'field' or 'fields'", "fields")
     gaps = entry.keys() & {"nan", "inf"}
-    if "elsewhere" in entry and not isinstance(sort, FunctionSort) and not gaps and "take" not in entry:
+    if "elsewhere" in entry and not isinstance(sort, s.FunctionSort) and not gaps and "take" not in entry:
         raise Wrong("'elsewhere' is for functions, and for what may have no reading (`nan: none`, `take`)", "elsewhere")
-    parts = tuple(components(sort))
-    members = sorted({m for part in parts if isinstance(part, EnumSort) for m in part.members})
-    if members and not any(isinstance(part, StringSort | DataSort) for part in parts):
+    parts = tuple(s.components(sort))
+    members = sorted({m for part in parts if isinstance(part, s.EnumSort) for m in part.members})
+    if members and not any(isinstance(part, s.StringSort | s.DataSort) for part in parts):
         for name, word in entry.get("values", {}).items():
             if word not in members:
                 hint = suggest(word, members)
@@ -326,7 +327,7 @@ def path(text: str) -> FieldPath:
     return tuple(found)
 
 
-def literal(raw: Any, sort: Sort, key: str) -> Value:
+def literal(raw: Any, sort: s.Sort, key: str) -> Value:
     """A value that the plan gives. Raises Wrong."""
     try:
         return converter(sort)(raw)
@@ -350,6 +351,19 @@ def said(options: Located | None) -> Mapping[str, Any]:
 def mapping_of(options: Located | None) -> Mapping[str, Any]:
     found = said(options).get("mapping")
     return found if isinstance(found, Mapping) else {}
+
+
+def recordings(options: Located | None) -> dict[str, str]:
+    """The traces that a method names, in order, each with its digest where the plan says it, else nothing."""
+    named = said(options).get("traces")
+    found: dict[str, str] = {}
+    for entry in named if isinstance(named, list) else ():
+        match entry:
+            case str(path):
+                found[path] = ""
+            case {"path": str(path), "sha256": str(digest)}:
+                found[path] = digest
+    return found
 
 
 def sources(system: System, node: Node, port: str) -> list[Endpoint]:

@@ -38,6 +38,7 @@ from .observing import (
     named_table,
     observe,
     published,
+    recordings,
     said,
     show_entry,
     sources,
@@ -46,7 +47,7 @@ from .observing import (
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import Answers
 from .reading import from_text, shown
-from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise
+from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise, told_only
 from .traces import carried
 from .tuning import DECIDED_SHARE
 from .wires import MappingError, parts_of, table_of
@@ -127,6 +128,8 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
+    for name, told in told_only(work.rules, work.mapping()):
+        work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
     filtered = work.filtered()
     data = said(options)
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
@@ -179,8 +182,7 @@ def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tu
 
 def _traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
     """The traces that a method names and that are there."""
-    named = said(options).get("traces")
-    paths = (inside(system.plan.root, n) for n in named if isinstance(n, str)) if isinstance(named, list) else ()
+    paths = (inside(system.plan.root, name) for name in recordings(options))
     return tuple(path for path in paths if path is not None and path.exists())
 
 

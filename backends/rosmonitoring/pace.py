@@ -17,7 +17,7 @@ from avow.ros.bags import Event
 from .pairing import time_of
 from .reading import at
 from .rules import FieldPath
-from .tuning import EVENTS_WITHOUT_CLOCK, GRACE, JITTER, RATE_MESSAGES
+from .tuning import EVENTS_WITHOUT_CLOCK, GRACE, JITTER, RATE_MESSAGES, TIMES_ALIKE
 from .wires import MappingError, seconds
 
 RATE = re.compile(r"([0-9]+(?:[.][0-9]+)?) ?Hz ?(?:±|[+]/?-) ?([0-9]+(?:[.][0-9]+)?) ?%")
@@ -71,14 +71,14 @@ class Pace:
 
     rate: Rate
     start: Fraction
-    times: deque[tuple[float, bytes | Fraction]] = field(default_factory=lambda: deque(maxlen=RATE_MESSAGES))
-    """Of the latest messages, in binary and exact."""
+    times: deque[Fraction] = field(default_factory=lambda: deque(maxlen=RATE_MESSAGES))
+    """Of the latest messages."""
     slow: bool = False
     fast: bool = False
 
     def late(self, now: Fraction) -> str:
         """What is wrong at a time, with or without a message then; empty where nothing new is."""
-        since = self._first if len(self.times) == RATE_MESSAGES else self.start
+        since = self.times[0] if len(self.times) == RATE_MESSAGES else self.start
         if self.slow or now - since <= self.rate.most:
             return ""
         self.slow = True
@@ -88,24 +88,19 @@ class Pace:
         """A message has come."""
         found = ""
         if len(self.times) == RATE_MESSAGES:
-            self.slow = self.slow and now - self._first > self.rate.most
-            fast = now - self._first < self.rate.least
-            found = self._said(now - self._first, RATE_MESSAGES) if fast and not self.fast else ""
+            self.slow = self.slow and now - self.times[0] > self.rate.most
+            fast = now - self.times[0] < self.rate.least
+            found = self._said(now - self.times[0], RATE_MESSAGES) if fast and not self.fast else ""
             self.fast = fast
-        self.times.append((float(now), now))
+        self.times.append(now)
         return found
-
-    @property
-    def _first(self) -> Fraction:
-        raw = self.times[0][1]
-        return raw if isinstance(raw, Fraction) else Fraction(raw.decode())
 
     @property
     def deadline(self) -> Fraction | None:
         """When it is too slow unless a message comes; None where that has been told."""
         if self.slow:
             return None
-        return (self._first if len(self.times) == RATE_MESSAGES else self.start) + self.rate.most
+        return (self.times[0] if len(self.times) == RATE_MESSAGES else self.start) + self.rate.most
 
     def _said(self, time: Fraction, count: int) -> str:
         return f"{count} messages in {show(time)} s, and {self.rate.text} is allowed"
@@ -122,11 +117,20 @@ class Passage:
     uncounted: str = ""
     """Why a loss need not show."""
     latest: Fraction | None = None
+    alike: int = 1
+    """Messages so far that have the latest time, one after another."""
+    most_alike: int = 1
+    advanced: bool = False
+    """Whether a message has had another time than the one before."""
 
     def heard(self, event: Event, now: Fraction) -> bool:
         """Whether messages before this one were lost, or come later, by their numbers (which may never be set)."""
         if self.latest is not None and now < self.latest:
             self.disordered += 1
+        if self.latest is not None:
+            self.alike = self.alike + 1 if now == self.latest else 1
+            self.most_alike = max(self.most_alike, self.alike)
+            self.advanced = self.advanced or now != self.latest
         self.latest = now
         number = sequence(event)
         if number is None:
@@ -166,8 +170,6 @@ class Timing:
     paces: dict[str, Pace] = field(default_factory=dict)
     passages: dict[str, Passage] = field(default_factory=dict)
     """By topic."""
-    newest: float = -math.inf
-    """The latest time of a message that was heard."""
     _since: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
     """When each variable with a deadline was last heard of, and whether its silence has been told."""
 
@@ -195,21 +197,34 @@ class Timing:
             if name in names and (wrong := pace.beat(now)):
                 yield name, f"{name} is too fast: {wrong}", False
 
+    @property
+    def standing(self) -> str:
+        """Why the messages' times are no evidence for limits in seconds, if so: they do not go on."""
+        again = {topic: p.most_alike for topic, p in self.passages.items() if p.most_alike > 1}
+        still = {topic: n for topic, n in again.items() if n >= TIMES_ALIKE}
+        if not still and again and not any(p.advanced for p in self.passages.values()):
+            still = again
+        topic = max(still, key=still.__getitem__, default=None)
+        told = "" if topic is None else f"{still[topic]} messages of {topic}, one after another, have one time"
+        return f"{told}: such times say nothing of limits in seconds" if told else ""
+
     def hear(self, event: Event, topic: str, names: Iterable[str]) -> bool:
         """A message of one of the monitor's topics; whether others before it were lost, or came out of order."""
         now = time_of(event)
         missed = self.passages.setdefault(topic, Passage()).heard(event, now)
         self.heard.update(dict.fromkeys(names, float(now)))
-        self.newest = max(self.newest, math.nextafter(float(now), math.inf))
         return missed
 
     def caught_up(self, event: Event, topic: str, names: Iterable[str]) -> None:
-        """Take over the latest of some messages whose times were looked at elsewhere."""
+        """Take over the latest of some messages whose times were looked at elsewhere: each was later than the one
+        before it."""
         now = time_of(event)
         passage = self.passages[topic]
-        passage.latest = now
-        self.newest = max(self.newest, math.nextafter(float(now), math.inf))
+        passage.latest, passage.alike, passage.advanced = now, 1, True
+        if (number := sequence(event)) is not None:
+            passage.last[:] = [number]
         for name in names:
+            self.heard[name] = float(now)
             if name in self._since:
                 self._since[name] = (now, False)
 

@@ -21,11 +21,11 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value, show
+from avow.ros.bags import ENVELOPE
 
-from .numbers import Decimal, NotANumber, exact
+from .numbers import NotANumber, exact
 from .reading import Reader, at
 from .rules import FieldPath
-from .traces import parse_event
 from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS
 from .wires import MappingError, seconds
 
@@ -54,10 +54,13 @@ def ticks(seconds: Fraction) -> Ticks:
     return found.numerator if found.denominator == 1 else found
 
 
-def ticks_of(text: bytes) -> int:
-    """The time that a line has, as `compiled.shapes` knows it: digits, and at most 20 decimals."""
-    whole, _, rest = text.partition(b".")
-    return int(whole + rest) * _SCALES[len(rest)]
+def ticks_at(event: Mapping[str, Any]) -> Ticks:
+    """As `ticks` of an event's time, and faster for plain digits."""
+    try:
+        whole, _, rest = event["time"].partition(b".")
+        return int(whole + rest) * _SCALES[len(rest)]
+    except (AttributeError, ValueError, IndexError):  # no digits, or with an exponent
+        return ticks(time_of(event))
 
 
 _SCALES: tuple[int, ...] = tuple(10 ** (20 - k) for k in range(21))
@@ -68,12 +71,11 @@ class Asked:
     """An answer that waits for its inputs."""
 
     watched: Watched
-    event: Mapping[str, Any] | bytes
-    """The answer's event; its line, where that was not parsed."""
+    event: Mapping[str, Any]
     index: int
     own: tuple[str, ...]
-    """What its verdict depends on, but for the inputs; and what that then was: a line is one whose message has it."""
-    values: tuple[Value | bytes, ...]
+    """What its verdict depends on, but for the inputs; and what that then was: a value, or the event that has it."""
+    values: tuple[Value | Mapping[str, Any], ...]
     inputs: tuple[str, ...]
     time: Ticks
     seconds: float
@@ -84,7 +86,7 @@ class Asked:
     places: tuple[int, ...]
     """Their places in the trace."""
     tokens: tuple[int, ...] | None = None
-    """What stands for those of `values` that the clause speaks of (`compiled.plans.Token`)."""
+    """What stands for those of `values` that the clause speaks of (a code of `columns`)."""
     since: dict[str, float] = field(default_factory=dict)
     """When the oldest message came that each input's value may be of."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
@@ -98,13 +100,13 @@ class Asked:
 
 @dataclass(slots=True, eq=False)
 class Said:
-    """One message of an input. `value` None: it could not be read; a line: it was not read yet. `token` stands for
+    """One message of an input. `value` None: it could not be read; an event: it was not read yet. `token` stands for
     it, where one is known."""
 
     time: Ticks
     seconds: float
     key: object
-    value: Value | bytes | None
+    value: Value | Mapping[str, Any] | None
     place: int
     token: int | None
     used: bool = False
@@ -156,7 +158,7 @@ class Pairing:
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
     """The place of an answer's message → those of the messages that it was held against."""
     readers: Mapping[str, Reader] = field(default_factory=dict, repr=False)
-    """What reads the variables of which lines are kept."""
+    """What reads the variables of which events are kept."""
     settled: Ticks | None = None
     """By latency: no input of this time or an earlier one may come any more."""
     late: str = ""
@@ -170,7 +172,7 @@ class Pairing:
         self._latency, self._jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
 
     def begin(self, readers: Mapping[str, Reader]) -> None:
-        """Lines will be kept, and tokens mean what they mean from now on."""
+        """Events will be kept, and tokens mean what they mean from now on."""
         self.readers = readers
         for asked in self.waiting:
             asked.tokens = None
@@ -178,7 +180,8 @@ class Pairing:
             said.token = None
 
     def saw(
-        self, name: str, time: Ticks, seconds: float, key: object, value: Value | bytes | None, place: int,
+        self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None,
+        place: int,
         token: int | None = None,
     ) -> None:  # fmt: skip
         """A message of an input, which stands at a place of the trace."""
@@ -294,18 +297,11 @@ class Pairing:
     def known(self, asked: Asked) -> dict[str, Value]:
         """What an answer's verdict depends on, but for the inputs."""
         pairs = zip(asked.own, asked.values, strict=True)
-        return {name: self._read(name, value) if isinstance(value, bytes) else value for name, value in pairs}
-
-    def _read(self, name: str, line: bytes) -> Value:
-        """A variable's value, from the line of the message that has it."""
-        return self.readers[name](parse_event(line.decode()), None)
-
-    def event_of(self, asked: Asked) -> Mapping[str, Any]:
-        return parse_event(asked.event.decode()) if isinstance(asked.event, bytes) else asked.event
+        return {n: self.readers[n](value, None) if isinstance(value, Mapping) else value for n, value in pairs}
 
     def value_of(self, name: str, said: Said) -> Value | None:
-        if isinstance(said.value, bytes):
-            said.value = self._read(name, said.value)
+        if isinstance(said.value, Mapping):
+            said.value = self.readers[name](said.value, None)
         return said.value
 
     def _passed(self, asked: Asked, now: Ticks) -> bool:
@@ -345,7 +341,7 @@ class Pairing:
         known = self.seen.get(name)
         alike = known.by_key.get(asked.key) if known is not None else None
         if not alike:
-            return f"no message of {name} bears the answer's {self.answers.by}"
+            return f"no message of {name} bears the answer's {self.answers.by}: pair them in another way (`answers`)"
         if len(alike) == 1:
             alike[0].used = True
             asked.since[name] = alike[0].seconds
@@ -361,12 +357,26 @@ class Pairing:
         if not path:
             return None
         try:
-            raw = at(event, path)
+            raw: Any = event
+            for step in path if path[0] not in ENVELOPE else ():
+                raw = raw[step]
+        except (KeyError, IndexError, TypeError):  # it may lie elsewhere
+            raw = event
+        try:
+            raw = at(event, path) if raw is event else raw
             if isinstance(raw, Mapping):
-                return ticks(seconds(raw)), "s"
+                return _stamp(raw), "s"
         except MappingError:
             return None
-        return raw.text if isinstance(raw, Decimal) else str(raw) if isinstance(raw, list) else raw
+        return raw.decode() if isinstance(raw, bytes) else str(raw) if isinstance(raw, list) else raw
+
+
+def _stamp(raw: Mapping[str, Any]) -> Ticks:
+    """As `ticks` of `seconds`, and faster for whole numbers."""
+    second, rest = raw.get("sec", raw.get("secs")), raw.get("nanosec", raw.get("nsecs"))
+    if second.__class__ is int and rest.__class__ is int and len(raw) == 2:
+        return int(second) * TICKS + int(rest) * (TICKS // 10**9)
+    return ticks(seconds(raw))
 
 
 def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:

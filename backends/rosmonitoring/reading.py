@@ -8,21 +8,10 @@ from fractions import Fraction
 from typing import Any
 
 from avow.formulas.values import Data, FunctionValue, Value
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    DataSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    RealSort,
-    Sort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.ros.bags import ENVELOPE, message_of
 from avow.ros.definitions import Array, Wire
 
-from .numbers import Decimal
 from .rules import Argument, Choice, FieldPath, Fields, Hold, Lookup
 from .wires import Convert, MappingError, NoReading, converter, meant, of_type, parts_of, show, table_of, taken
 
@@ -37,7 +26,7 @@ def reader(rule: Fields | Choice) -> Reader:
             return _choice(rule)
         case Fields():
             sort = rule.variable.sort
-            if isinstance(sort, FunctionSort):
+            if isinstance(sort, s.FunctionSort):
                 return _function(rule, sort)
             return _scalar(rule, sort)
 
@@ -72,7 +61,7 @@ def shown(path: FieldPath) -> str:
 _MISSING = object()
 
 
-def _converters(rule: Fields, sorts: tuple[Sort, ...]) -> tuple[Convert, ...]:
+def _converters(rule: Fields, sorts: tuple[s.Sort, ...]) -> tuple[Convert, ...]:
     """How what each of the rule's paths leads to becomes a value."""
     found: list[Convert] = []
     for place, sort in enumerate(sorts):
@@ -84,10 +73,10 @@ def _converters(rule: Fields, sorts: tuple[Sort, ...]) -> tuple[Convert, ...]:
     return tuple(found)
 
 
-def _scalar(rule: Fields, sort: Sort) -> Reader:
-    items = sort.items if isinstance(sort, TupleSort) and len(rule.paths) > 1 else (sort,)
+def _scalar(rule: Fields, sort: s.Sort) -> Reader:
+    items = sort.items if isinstance(sort, s.TupleSort) and len(rule.paths) > 1 else (sort,)
     made = _converters(rule, items)
-    if isinstance(sort, TupleSort) and len(rule.paths) > 1:
+    if isinstance(sort, s.TupleSort) and len(rule.paths) > 1:
         pairs = tuple(zip(rule.paths, made, strict=True))
         return _with_default(rule, lambda message, old: tuple([read(at(message, p)) for p, read in pairs]))
     path, read = rule.paths[0], made[0]
@@ -112,8 +101,8 @@ def _with_default(rule: Fields, read: Reader) -> Reader:
     return otherwise
 
 
-def _function(rule: Fields, sort: FunctionSort) -> Reader:
-    relation, seen = sort.result == BOOL, rule.hold is Hold.SEEN
+def _function(rule: Fields, sort: s.FunctionSort) -> Reader:
+    relation, seen = sort.result == s.BOOL, rule.hold is Hold.SEEN
     points = _points(rule, parts_of(sort))
     if not relation and rule.elsewhere is None:
         raise ValueError("the options demand `elsewhere` of a function with a result")
@@ -130,7 +119,7 @@ def _function(rule: Fields, sort: FunctionSort) -> Reader:
     return read
 
 
-def _points(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[tuple[Value, ...]]]:
+def _points(rule: Fields, sorts: tuple[s.Sort, ...]) -> Callable[[Message], list[tuple[Value, ...]]]:
     """The tuples that a message brings; a tuple with no reading among its parts is not brought."""
     each, pairs = rule.each, tuple(zip(rule.paths, _converters(rule, sorts), strict=True))
 
@@ -155,7 +144,7 @@ def _points(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[t
 
 def _choice(rule: Choice) -> Reader:
     sort = rule.variable.sort
-    assert isinstance(sort, DataSort)
+    assert isinstance(sort, s.DataSort)
     shapes = {
         name: tuple(
             _argument(where, part, rule)
@@ -175,26 +164,26 @@ def _choice(rule: Choice) -> Reader:
     return read
 
 
-def _argument(where: Argument, sort: Sort, rule: Choice) -> Callable[[Message], Value]:
+def _argument(where: Argument, sort: s.Sort, rule: Choice) -> Callable[[Message], Value]:
     if isinstance(where, Lookup):
         return functools.partial(_looked_up, where=where, sort=sort)
     read = converter(sort, rule.wires.get(where))
     return lambda message: read(at(message, where))
 
 
-def _looked_up(message: Message, where: Lookup, sort: Sort) -> Value:
+def _looked_up(message: Message, where: Lookup, sort: s.Sort) -> Value:
     key = at(message, where.key)
-    cell = where.rows.get(str(key.text if isinstance(key, Decimal) else key))
+    cell = where.rows.get(str(key.decode() if isinstance(key, bytes) else key))
     if cell is None:
         raise MappingError(f"{show(key)} is in no row of {where.table}")
     return from_text(cell, sort, where.held)
 
 
-def from_text(cell: str, sort: Sort, held: Wire | None = None) -> Value:
+def from_text(cell: str, sort: s.Sort, held: Wire | None = None) -> Value:
     """A table's cell as a value; `held`: the type in which a node holds it. Raises MappingError."""
-    if isinstance(sort, RealSort | IntegerSort | NaturalSort):
-        value = converter(sort)(Decimal(cell.strip()))
+    if isinstance(sort, s.RealSort | s.IntegerSort | s.NaturalSort):
+        value = converter(sort)(cell.strip().encode())
         return of_type(value, held) if isinstance(value, Fraction) else value
-    if isinstance(sort, BoolSort):
+    if isinstance(sort, s.BoolSort):
         return converter(sort)({"TRUE": True, "FALSE": False}.get(cell.strip().upper(), cell))
     return converter(sort)(cell)

@@ -7,13 +7,13 @@ from the plan; `reading` turns messages into values by them; `rml` turns them in
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from enum import StrEnum
 
 from avow.base.records import dataclass
 from avow.formulas.values import Value
-from avow.language.terms import Variable
+from avow.language.terms import Role, Variable
 from avow.ros.definitions import Definitions, Wire
 
 FieldPath = tuple[str | int, ...]
@@ -160,3 +160,27 @@ def otherwise(one: Rule, other: Rule) -> bool:
             return True
         case _:  # one of them is of no message
             return False
+
+
+def paths_of(rule: Fields | Choice) -> tuple[FieldPath, ...]:
+    """The places in a message on which a rule's value depends."""
+    if isinstance(rule, Fields):
+        return rule.paths if rule.each is None else (rule.each,)
+    places = (place for arguments in rule.arguments.values() for place in arguments)
+    return tuple(dict.fromkeys((rule.tag, *(p.key if isinstance(p, Lookup) else p for p in places))))
+
+
+def told_only(rules: Mapping[str, Rule], mapped: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """The outputs that the plan's mapping reads from nothing but fields which give inputs, with these inputs: what a
+    node is told is no answer of it."""
+    fields = {
+        name: {(rule.topic.lstrip("/"), path) for path in paths_of(rule)}
+        for name, rule in rules.items()
+        if isinstance(rule, Fields | Choice)
+    }
+    inputs = [name for name in fields if name.startswith(f"{Role.INPUT}.")]
+    for name in sorted(fields.keys() - {*inputs}):
+        sources = [one for one in inputs if fields[one] & fields[name]]
+        told = {place for one in sources for place in fields[one]}
+        if sources and fields[name] <= told and not {name, *sources}.isdisjoint(mapped):
+            yield name, ", ".join(sources)

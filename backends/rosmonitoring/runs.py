@@ -21,25 +21,26 @@ from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.subterms import ports_of
 from avow.language.terms import Role
+from avow.ros.bags import digest_trace
 from avow.system.graph import dataflow
 
-from .coverage import Tally, coverage, old
+from .coverage import Tally
 from .engine import Monitor
-from .lanes import Marks, Signals, signals, timeline
+from .lanes import signals, timeline
 from .memory import unmonitored
 from .observing import method_of
-from .options import Setup, origin, same_topic, setup, usable
+from .options import Setup, origin, setup, usable
 from .overhead import overheads
 from .pairing import Answers
 from .rml.translate import translate
 from .session import Session
 from .told import readable
-from .traces import Recorded, digest_trace, read_trace
-from .tuning import VIOLATIONS_KEPT
+from .traces import Recorded, read_trace
+from .verdicts import Run, Shown, outcome
 from .watched import Fault, Violation
 
 
-def discharge(job: Job, traces: Sequence[str], limits: Limits) -> Report:
+def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
     """As `Backend.discharge`, by these recordings."""
     found, faults = setup(job.system, job.node, job.method.options)
     if faults:
@@ -49,9 +50,13 @@ def discharge(job: Job, traces: Sequence[str], limits: Limits) -> Report:
         outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
         return Report(outcomes, "avow monitor", __version__)
     deadline = time.monotonic() + limits.seconds
-    runs: list[_Run] = []
-    for name in traces:
+    runs: list[Run] = []
+    for name, digest in traces.items():
         run = _judge(job, name, [Monitor(found, [o.name for o in job.obligations])], deadline)
+        if digest and not run.digest:
+            run.missing = f"the recording {name} (SHA-256 {digest}) is not here"
+        elif digest and run.digest != digest:
+            run.trouble = f"{name} is not the recording that the plan names: its digest is {run.digest}"
         if any(v.fault is Fault.PROVIDER for v in run.first.values()):
             followed = _judge(job, name, _with_upstream(job, found), deadline)
             run = run if followed.unknown or followed.trouble else followed
@@ -59,13 +64,14 @@ def discharge(job: Job, traces: Sequence[str], limits: Limits) -> Report:
         runs.append(run)
     logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
     cost, _ = overheads(job)
-    outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o), _excuse(job, runs)) for o in job.obligations)
-    for obligation, outcome in zip(job.obligations, outcomes, strict=True):
-        outcome.details["rml"] = refused.get(obligation.name, "translated")
+    excuse = _excuse(job, runs)
+    outcomes = tuple(outcome(o.id, Shown(o.name, runs, _spoken(job, o), excuse)) for o in job.obligations)
+    for obligation, each in zip(job.obligations, outcomes, strict=True):
+        each.details["rml"] = refused.get(obligation.name, "translated")
         if cost:
-            outcome.details["overhead"] = cost
+            each.details["overhead"] = cost
         if drawn := _timelines(job, found, runs, obligation):
-            outcome.details["timeline"] = drawn
+            each.details["timeline"] = drawn
     return Report(outcomes, "avow monitor", __version__, (), logs)
 
 
@@ -82,41 +88,6 @@ def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: 
     return Outcome(obligation.id, Verdict.NOT_RUN, summary, details={"rml": reason or "translated"})
 
 
-class _Run:
-    """What one trace showed."""
-
-    def __init__(self, name: str, monitor: Monitor) -> None:
-        self.name = name
-        self.monitor = monitor
-        self.digest = ""
-        self.missing = ""
-        """Which package reads it, where there is none."""
-        self.trouble = ""
-        self.unknown = ""
-        self.violations: list[Violation] = []
-        self.first: dict[str, Violation] = {}
-        self.marks = Marks()
-        self.heard: Signals | None = None
-
-    def note(self, violations: Iterable[Violation]) -> None:
-        for violation in violations:
-            if violation.node != self.monitor.setup.node.name:
-                continue
-            self.marks.note(violation)
-            self.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
-            if len(self.violations) < VIOLATIONS_KEPT:
-                self.violations.append(violation)
-
-    def log(self) -> str:
-        lines = [f"trace {self.name}: {self.monitor.events} events, {self.monitor.relevant} of this node's topics"]
-        lines.append(f"sha256 {self.digest}")
-        lines += [line for line in (self.trouble, self.unknown) if line]
-        lines += [v.text() for v in self.violations]
-        for name, tally in self.monitor.tallies.items():
-            lines.append(f"{name}: {coverage(tally)}")
-        return "\n".join(lines) + "\n"
-
-
 def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
     """The node's own monitor, and those of the nodes from which its data comes: as far as they can be watched."""
     system, names = job.system, dataflow(job.system).upstream(job.node.name)
@@ -130,10 +101,10 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
     return monitors
 
 
-def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> _Run:
+def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> Run:
     """What a trace shows of the first monitor's node."""
     monitor, whole = monitors[0], Session(job.system, tuple(monitors))
-    run = _Run(name, monitor)
+    run = Run(name, monitor)
     path = inside(job.root, name)
     if path is None:
         run.trouble = f"{name} is not in the system's folder"
@@ -148,8 +119,6 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
     except Rejected as error:
-        lacking = [d for d in error.diagnostics if d.code == "MON202"]
-        run.missing = "; ".join(f"{name}: {d.message}; install it with: {d.hint}" for d in lacking)
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
         run.trouble = "; ".join(f"{where}: {message.replace(str(path), name)}" for where, message in told)
@@ -158,14 +127,14 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
     return run
 
 
-def _draw(job: Job, run: _Run) -> None:
+def _draw(job: Job, run: Run) -> None:
     """Read once more what the picture of a run shows."""
     monitor, path = run.monitor, inside(job.root, run.name)
     if monitor.events and path is not None and not run.trouble:
         run.heard = signals([monitor.setup], path, origin(job.system), monitor.events, run.marks, monitor.listens)
 
 
-def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation) -> list[dict[str, Any]]:
+def _timelines(job: Job, found: Setup, runs: list[Run], obligation: Obligation) -> list[dict[str, Any]]:
     """A picture's content for each trace, those with a finding first."""
     clauses = [(found, job.clause(obligation))]
     drawn = [
@@ -177,7 +146,7 @@ def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation)
     return [to_json(one) for one in drawn[:TIMELINES]]
 
 
-def _excuse(job: Job, runs: list[_Run]) -> str:
+def _excuse(job: Job, runs: list[Run]) -> str:
     """The first assumption that was broken, by whom, and where that began."""
     wrong = (Fault.ASSUMPTION, Fault.PROVIDER)
     found = ((run.name, v) for run in runs for v in run.first.values() if v.fault in wrong)
@@ -195,126 +164,8 @@ def _excuse(job: Job, runs: list[_Run]) -> str:
     return f"the assumption {broken.clause} was broken {told}, first at event {broken.index} of {trace} {why}"
 
 
-def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str], excuse: str) -> Outcome:
-    """`names`: what the guarantee speaks of; `excuse`: what was broken before it."""
-    tallies = [run.monitor.tallies[name] for run in runs]
-    judged = sum(t.judged for t in tallies)
-    events = sum(run.monitor.events for run in runs)
-    published = sum(t.published for t in tallies)
-    bound: dict[str, object] = {
-        "events": events,
-        "judged": judged,
-        "published": published,
-        "traces": {run.name: run.digest for run in runs},
-    }
-    ages: dict[str, float] = {}
-    for tally in tallies:
-        for of, age in tally.ages.items():
-            ages[of] = max(age, ages.get(of, 0.0))
-    if ages:
-        bound["oldest"] = {of: round(age, 6) for of, age in ages.items()}
-    passages = [(topic, p) for run in runs for topic, p in run.monitor.passages(names)]
-    lost, disordered = sum(p.lost for _, p in passages), sum(p.disordered for _, p in passages)
-    uncounted = sorted({f"the messages of {topic} {p.uncounted}" for topic, p in passages if p.uncounted})
-    open_ends = sum(t.open for t in tallies)
-    bound |= {"open": open_ends} if open_ends else {}
-    bound |= {"lost": lost} if not uncounted else {}
-    bound |= {"out_of_order": disordered} if disordered else {}
-    unpaired = any(t.unpaired for t in tallies)
-    backwards = next((f"{run.name}: {run.monitor.backwards}" for run in runs if run.monitor.backwards), "")
-    for run in runs:
-        broken = run.first.get(f"{Fault.GUARANTEE.name}/{name}")
-        if broken is not None:
-            when = f" (t = {broken.time})" if broken.time else ""
-            told = f"event {broken.index}{when} of {run.name}: {broken.explanation}"
-            shown = Counterexample((*broken.bindings, *broken.values), told)
-            summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
-            if unpaired or backwards:
-                text = f"{backwards or _UNPAIRED}: {summary}"
-                return Outcome(obligation, Verdict.UNKNOWN, text, shown, bound=bound)
-            return Outcome(obligation, Verdict.REFUTED, summary, shown, bound=bound)
-
-    def answer(verdict: Verdict, summary: str) -> Outcome:
-        return Outcome(obligation, verdict, summary, bound=bound)
-
-    missing = next((run.missing for run in runs if run.missing), "")
-    trouble = next((run.trouble for run in runs if run.trouble and not run.missing), "")
-    if missing and not trouble:
-        return answer(Verdict.NOT_RUN, missing)
-    if trouble:
-        return answer(Verdict.ERROR, trouble)
-    if backwards:
-        return answer(Verdict.UNKNOWN, f"no evidence: {backwards}")
-    unreadable = next((v for run in runs for v in run.violations if v.fault is Fault.MAPPING), None)
-    if unreadable is not None:
-        return answer(Verdict.UNKNOWN, f"a message could not be read: {unreadable.text()}")
-    late = next((run.unknown for run in runs if run.unknown), "")
-    undecided = sum(t.undecided for t in tallies)
-    reason = next((t.reason for t in tallies if t.reason), "")
-    if late or undecided or (reason and not judged):
-        text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
-        return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
-    silent = next(
-        (v for run in runs for v in run.first.values() if v.fault in (Fault.SILENT, Fault.RATE) and v.clause in names),
-        None,
-    )
-    if silent is not None:
-        return answer(Verdict.UNKNOWN, f"event {silent.index}: {silent.explanation}")
-    setup = runs[0].monitor.setup
-    if setup.losses is not None and (uncounted or lost > setup.losses):
-        return answer(Verdict.UNKNOWN, "; ".join(uncounted) or f"{lost} messages were lost, and {setup.losses} may be")
-    aged = next((of for of, age in ages.items() if setup.max_age is not None and age > setup.max_age), None)
-    if aged is not None:
-        return answer(Verdict.UNKNOWN, f"{aged} was {ages[aged]:.6g} s old when an answer came: too old (`max_age`)")
-    if not judged:
-        open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
-        text = f"the traces never gave all the values that it speaks of{_topics(runs)}"
-        return answer(Verdict.UNKNOWN, f"never decided: {open_}" if open_ else text)
-    decided = sum(t.decided for t in tallies)
-    lacking = "; ".join(dict.fromkeys(coverage(t) for t in tallies))
-    asked = sum(t.asked for t in tallies)
-    if decided < runs[0].monitor.setup.decided * asked:
-        open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
-        text = f"unmonitored: {decided} of {asked} publications were decided ({lacking})"
-        return answer(Verdict.UNKNOWN, f"{text}: {open_}" if open_ else text)
-    if unpaired:
-        return answer(Verdict.UNKNOWN, f"{_UNPAIRED}: held at all {judged} judgements over {events} events")
-    excused = sum(t.excused for t in tallies)
-    if excused == judged:
-        return answer(Verdict.UNKNOWN, f"every judgement fell while an assumption was broken: {excuse}")
-    summary = f"held at all {judged} judgements over {events} events"
-    if excused:
-        summary = f"held at {judged - excused} of {judged} judgements; at the others {excuse}"
-    if ages:
-        summary += f"; {old(ages)}"
-    if lost or disordered:
-        summary += f"; {lost} messages lost, {disordered} out of order"
-    if decided < published:
-        summary += f" ({lacking})"
-    if open_ends:
-        summary += f"; what it demands was open at the end of {open_ends} of {len(runs)} traces"
-    vacuous = not any(t.triggered for t in tallies)
-    if vacuous:
-        summary += "; but its antecedent was never met"
-    return Outcome(obligation, Verdict.MONITORED, summary, bound=bound, vacuous=vacuous)
-
-
-def _topics(runs: list[_Run]) -> str:
-    """What the traces lack, and what they have."""
-    monitors = [run.monitor for run in runs]
-    silent = sorted({t for monitor in monitors for t in monitor.setup.topics if same_topic(t) not in monitor.heard})
-    heard = sorted({topic for run in runs for topic in run.monitor.heard})
-    if not silent:
-        return ""
-    return f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
-
-
 def _spoken(job: Job, obligation: Obligation) -> frozenset[str]:
-
     return frozenset(v.qualified for v in free_variables(job.clause(obligation).formula))
-
-
-_UNPAIRED = "no evidence, since the plan does not say which input an answer answered (`answers`)"
 
 
 ARRIVAL = Answers("arrival", "callbacks run one at a time, and what they publish is known by them")

@@ -8,7 +8,21 @@ SCHEMA = schema(
     {
         "traces": {
             "type": "array",
-            "items": {"type": "string"},
+            "items": {
+                "oneOf": [
+                    {"type": "string"},
+                    {
+                        "type": "object",
+                        "additionalProperties": False,
+                        "required": ["path", "sha256"],
+                        "properties": {
+                            "path": {"type": "string"},
+                            "sha256": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
+                        },
+                        "description": "a recording that need not be here, and its digest",
+                    },
+                ]
+            },
             "description": "recorded runs, one by one: JSON lines (.jsonl), ROS 1 bags (.bag), ROS 2 bags (folders)",
         },
         "fresh": {

@@ -15,8 +15,8 @@ from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
 from .blame import Blame
-from .compiled.monitors import Compiled
-from .coverage import Tally
+from .columns import Columns
+from .coverage import Tally, remedies
 from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
 from .observing import NAME, method_of
@@ -96,15 +96,15 @@ class Session:
 
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """As `run`: lines, and what was found there; often nothing, so that whoever waits can look at the clock."""
-        compiled = Compiled(self.monitors, self.told, self.heard)
+        columns = Columns(self.monitors, self.told, self.heard)
         if not is_bag(path):
-            return self._whole(compiled.run(path))
-        events = compiled.events(messages(path, origin(self.system), self.listens))
+            return self._whole(columns.run(path))
+        events = columns.events(messages(path, origin(self.system), self.listens))
         return self._whole((0, found) for _, found in events)
 
     def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
-        """As `run`, of lines of standard input as they come, as `Compiled.lines`. Raises Rejected, OSError."""
-        lines = Compiled(self.monitors, self.told, self.heard).lines(read, "<stdin>")
+        """As `run`, of lines of standard input as they come, as `Columns.lines`. Raises Rejected, OSError."""
+        lines = Columns(self.monitors, self.told, self.heard).lines(read, "<stdin>")
         return ((line, violation) for line, found in self._whole(lines) for violation in found)
 
     def _whole(self, judged: Iterable[tuple[int, list[Violation]]]) -> Iterator[tuple[int, list[Violation]]]:
@@ -129,15 +129,16 @@ class Session:
         yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
         told_withheld(self.monitors, self.behind_filters)
 
-    def unmonitored(self) -> list[str]:
-        """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
-        return [
-            f"{monitor.setup.node.name}.{name}"
+    def unmonitored(self) -> dict[str, str]:
+        """The clauses, of the nodes that are to be monitored, of whose publications too few were decided; what the plan
+        may say of each, or why that is so."""
+        return {
+            f"{monitor.setup.node.name}.{name}": remedies(tally) or tally.reason
             for monitor, name, kind, tally in self.clauses()
             if monitor.setup.node.name in self.asked
             and not tally.hidden
             and (not tally.decided or monitor.backwards or tally.decided < monitor.setup.decided * _asked(kind, tally))
-        ]
+        }
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -180,6 +181,7 @@ class Session:
                     "judged": tally.judged,
                     "broken": tally.broken,
                     "excused": tally.excused,
+                    "overdue": tally.overdue,
                     "undecided": tally.undecided,
                     "published": tally.published,
                     "decided": tally.decided,
@@ -210,7 +212,7 @@ class Session:
             "system": self.system.name,
             "events": self.events,
             "clean": self.clean,
-            "unmonitored": self.unmonitored(),
+            "unmonitored": [*self.unmonitored()],
             "faults": counts,
             "nodes": nodes,
             "listened": list(self.topics),

@@ -10,6 +10,7 @@ from typing import assert_never
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import reached
+from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import show
 from avow.language.contract import Clause
@@ -20,7 +21,6 @@ from avow.ros.bags import Carried, Origin, is_bag
 from avow.ros.calls import is_service_part
 from avow.ros.definitions import FLOATS, Definitions, Message, Scalar, canonical
 
-from .compiled.plans import number_of
 from .options import Setup, same_topic
 from .reading import shown
 from .rules import Choice, Constant, Fields, Previous, Rule
@@ -149,6 +149,15 @@ def _unholdable(setup: Setup, clause: Clause, variable: Variable, number: Fracti
             f"is another number, so the answer is always no"
         )
         yield Diagnostic("MON106", message, clause.span, Severity.WARNING, hint="ask for a range")
+
+
+def number_of(term: Term) -> Fraction | None:
+    """The value of a term without variables."""
+    try:
+        value = evaluate(term, {})
+    except NotEvaluable:
+        return None
+    return Fraction(value) if isinstance(value, int | Fraction) and not isinstance(value, bool) else None
 
 
 def _bare(term: Term) -> Term:

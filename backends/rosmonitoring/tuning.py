@@ -8,8 +8,8 @@ TOPICS_KEPT = 1_000
 VIOLATIONS_KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
 
-VIOLATIONS_SHOWN = 50
-"""Violations shown without --all."""
+VIOLATIONS_SHOWN = 10
+"""Violations of one clause, or of one variable, that are shown without --all: a flood of one hides no other."""
 
 NUMBER_LENGTH = 400
 """Digits, and the size of an exponent: longer numbers are no measurements, and cost more than an event may."""
@@ -49,33 +49,31 @@ DECIDED_SHARE = 1.0
 """Of what was published, the share that has to be decided before a run is evidence, where the plan says no other: what
 is undecided may have broken the guarantee."""
 
+DIFFERENCES = 10
+"""Publications of a topic that a replay shows where they differ from the recording; the rest are counted."""
+
+LEAST_SHARE = 0.5
+"""The least `decided:` that a message proposes: who takes less has a recording of something else."""
+
 OPEN_QUESTIONS = 1_000
 """Answers of which a part is missing that are asked of Z3, in one run: some seconds. Others are undecided."""
 
-SHAPE_VALUES = 400
-"""Marks and values of a line whose shape is kept: a pattern of more costs more than it saves."""
-
-SHAPES_KEPT = 64
-"""Shapes of lines in one trace; lines of others are parsed."""
-
 REMEMBERED = 65_536
-"""Verdicts and readings that are remembered at a time, of each topic: some megabytes."""
+"""Values of a variable, and verdicts of a clause, that are remembered at a time: some megabytes."""
 
-CHUNK = 1 << 20
+CHUNK = 1 << 17
 """Bytes of a trace that are read at a time."""
 
-BATCH = 256
-"""Messages of a bag that are judged at a time, as lines of text."""
-
-TEXT_BYTES = 2_048
-"""Bytes of a message of a bag above which writing it as text costs more than judging it by the engine."""
+BATCH = 4_096
+"""Messages of a bag that are judged at a time: enough for arrays to pay, and some megabytes."""
 
 RATE_MESSAGES = 10
 """Messages over which a rate is taken: one that comes a little late says nothing of the rate, and of ten it shows in a
 second at 10 Hz."""
 
-TIMES_APART = 1e-6
-"""Seconds, more than a difference of two times in binary may be off; what is nearer to a bound the engine judges."""
+TIMES_ALIKE = 10
+"""Messages of one topic, one after another, with one time: two may come within a clock's resolution; where so many do,
+the clock stood still, and times are no evidence for limits in seconds."""
 
 FRAME_BYTES = 64_000_000
 """Bytes of one message of a running graph; a longer length is taken for a fault of the other side."""

@@ -17,7 +17,7 @@ from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
 
 from .coverage import Tally
-from .numbers import Decimal, NotANumber, exact
+from .numbers import NotANumber, exact
 
 if TYPE_CHECKING:
     from .memory import Memory
@@ -111,7 +111,7 @@ class Watched:
     paired: tuple[str, ...] = ()
     """The observed inputs that an answer has to be paired with."""
     alike: dict[tuple[int, ...], bool] = field(default_factory=dict)
-    """Where it held, by tokens of values (`compiled.plans.Token`), and whether its antecedent was met there."""
+    """Where it held, by tokens of values (codes of `columns`), and whether its antecedent was met there."""
     steps: Memory | None = None
     """What it remembers, where it speaks of other steps."""
 
@@ -170,7 +170,7 @@ def trigger_of(formula: Term) -> Term | None:
 def time_text(raw: Any) -> str:
     if isinstance(raw, Fraction):
         return show(raw)
-    if isinstance(raw, int | float | Decimal) and not isinstance(raw, bool):
+    if isinstance(raw, int | float | bytes) and not isinstance(raw, bool):
         try:
             return show(exact(raw))
         except NotANumber:

@@ -16,25 +16,10 @@ from typing import Any, TypeVar, assert_never
 
 from avow.backend_kit.programs.samples import as_single, next_single
 from avow.formulas.values import Binary, Data, Element, FunctionValue, SequenceValue, Value
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.ros.definitions import FLOATS, HEADER, INTEGERS, Array, Definitions, Nested, Scalar, Wire
 
-from .numbers import Decimal, Exact, NotANumber, exact, whole
+from .numbers import Exact, NotANumber, exact, whole
 from .rules import NOTHING_KNOWN, Gap, Take
 
 Convert = Callable[[Any], Value]
@@ -49,24 +34,24 @@ class NoReading(MappingError):  # noqa: N818 - it names what was found
     """The field holds what the plan says is no reading."""
 
 
-def fits(sort: Sort, wire: Wire, known: Definitions) -> bool:
+def fits(sort: s.Sort, wire: Wire, known: Definitions) -> bool:
     """Whether a field of the type may carry a value of the sort (an enumeration's words or numbers are asked apart)."""
     match sort, wire:
-        case RealSort(), Scalar(name=name):
+        case s.RealSort(), Scalar(name=name):
             return name in FLOATS or name in INTEGERS or name in ("time", "duration")
-        case ((IntegerSort() | NaturalSort()), Scalar(name=name)):
+        case ((s.IntegerSort() | s.NaturalSort()), Scalar(name=name)):
             return name in INTEGERS
-        case BoolSort(), Scalar(name=name):
+        case s.BoolSort(), Scalar(name=name):
             return name == "bool"
-        case StringSort(), Scalar(name=name):
+        case s.StringSort(), Scalar(name=name):
             return name in ("string", "wstring")
-        case EnumSort(), Scalar(name=name):
+        case s.EnumSort(), Scalar(name=name):
             return name in ("string", "wstring") or name in INTEGERS
-        case SequenceSort(item=item), Array(item=inner):
+        case s.SequenceSort(item=item), Array(item=inner):
             return fits(item, inner, known)
-        case TupleSort(items=items), Array(item=inner, length=length):
+        case s.TupleSort(items=items), Array(item=inner, length=length):
             return length == len(items) and all(fits(item, inner, known) for item in items)
-        case TupleSort(items=items, labels=labels), Nested():
+        case s.TupleSort(items=items, labels=labels), Nested():
             named = dict(record(wire, known))
             parts = [named.get(label) for label in labels or named]
             return len(parts) == len(items) and all(
@@ -83,37 +68,37 @@ def record(wire: Nested, known: Definitions) -> tuple[tuple[str, Wire], ...]:
 
 
 def converter(
-    sort: Sort, wire: Wire | None = None, names: Mapping[str, str] = MappingProxyType({}),
+    sort: s.Sort, wire: Wire | None = None, names: Mapping[str, str] = MappingProxyType({}),
     known: Definitions = NOTHING_KNOWN, gaps: frozenset[Gap] = frozenset(),
 ) -> Convert:  # fmt: skip
     """From what a field holds to a value of a sort; made once for each rule. Where its type is not known, or does not
     fit, digits mean what they say."""
     wire = None if wire is None or not fits(sort, wire, known) else wire
     match sort:
-        case RealSort():
+        case s.RealSort():
             return _real(wire, gaps)
-        case IntegerSort() | NaturalSort():
-            kind, natural = wire.name if isinstance(wire, Scalar) else None, isinstance(sort, NaturalSort)
+        case s.IntegerSort() | s.NaturalSort():
+            kind, natural = wire.name if isinstance(wire, Scalar) else None, isinstance(sort, s.NaturalSort)
             return functools.partial(_whole, name=kind, natural=natural)
-        case BoolSort():
+        case s.BoolSort():
             return lambda raw: _given(raw, bool, "a truth value")
-        case StringSort():
+        case s.StringSort():
             return lambda raw: names.get(word := _given(raw, str, "a string"), word)
-        case EnumSort():
+        case s.EnumSort():
             return lambda raw: element(raw, sort, names)
-        case SequenceSort(item=item):
+        case s.SequenceSort(item=item):
             inner, length = (wire.item, wire.length) if isinstance(wire, Array) else (None, None)
             part = converter(item, inner, names, known)
             return lambda raw: SequenceValue(tuple(map(part, _items(raw, length))))
-        case TupleSort():
+        case s.TupleSort():
             return _tuple(sort, wire, names, known, gaps)
-        case DataSort():
+        case s.DataSort():
             return functools.partial(_data, sort=sort, names=names)
-        case FunctionSort():
+        case s.FunctionSort():
             return functools.partial(_relation_literal, sort=sort, names=names)
-        case OpaqueSort(name=name):
+        case s.OpaqueSort(name=name):
             return _unreadable(f"{name} is an unspecified sort: no message can be read as one of its values")
-        case SetSort():
+        case s.SetSort():
             return _unreadable("no message can be read as a value of this sort")
         case _:
             assert_never(sort)
@@ -132,7 +117,7 @@ def _real(wire: Wire | None, gaps: frozenset[Gap]) -> Convert:
 
 
 def _tuple(
-    sort: TupleSort, wire: Wire | None, names: Mapping[str, str], known: Definitions, gaps: frozenset[Gap]
+    sort: s.TupleSort, wire: Wire | None, names: Mapping[str, str], known: Definitions, gaps: frozenset[Gap]
 ) -> Convert:
     """Of a message the fields, by name where the tuple has names, whatever else it holds; else the items."""
     if isinstance(wire, Nested):
@@ -156,7 +141,7 @@ def _tuple(
     return by_place
 
 
-def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
+def _data(raw: Any, sort: s.DataSort, names: Mapping[str, str]) -> Data:
     """``{"move": [1, 2]}``, or a word for a constructor without arguments."""
     if isinstance(raw, str):
         raw = {raw: []}
@@ -172,9 +157,9 @@ def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
     raise MappingError(f"{show(raw)} is no value of {sort.name}")
 
 
-def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) -> FunctionValue:
+def _relation_literal(raw: Any, sort: s.FunctionSort, names: Mapping[str, str]) -> FunctionValue:
     """``[[1, 2], [3, 4]]``: the tuples at which a relation holds."""
-    if sort.result != BOOL or not isinstance(raw, list):
+    if sort.result != s.BOOL or not isinstance(raw, list):
         raise MappingError("only a relation can be written out, as the list of its tuples")
     parts = [converter(part, None, names) for part in sort.parameters]
     table: dict[tuple[Value, ...], Value] = {}
@@ -191,11 +176,11 @@ def _unreadable(why: str) -> Convert:
     return refuse
 
 
-def taken(take: Take, sort: Sort, wire: Array, known: Definitions, gaps: frozenset[Gap]) -> Convert:
+def taken(take: Take, sort: s.Sort, wire: Array, known: Definitions, gaps: frozenset[Gap]) -> Convert:
     """The least, the greatest, or the number of an array's items; items without a reading do not count."""
     if take is Take.COUNT and not gaps:
         length = wire.length
-        as_real = isinstance(sort, RealSort)
+        as_real = isinstance(sort, s.RealSort)
         return lambda raw: whole(len(_items(raw, length))) if as_real else len(_items(raw, length))
     part = converter(sort if take is not Take.COUNT else _REAL, wire.item, {}, known, gaps)
 
@@ -207,7 +192,7 @@ def taken(take: Take, sort: Sort, wire: Array, known: Definitions, gaps: frozens
             except NoReading:
                 continue
         if take is Take.COUNT:
-            return whole(len(found)) if isinstance(sort, RealSort) else len(found)
+            return whole(len(found)) if isinstance(sort, s.RealSort) else len(found)
         if not found:
             raise NoReading("none of the items is a reading")
         best: Value = min(found) if take is Take.MIN else max(found)
@@ -216,7 +201,7 @@ def taken(take: Take, sort: Sort, wire: Array, known: Definitions, gaps: frozens
     return read
 
 
-_REAL = RealSort()
+_REAL = s.RealSort()
 
 
 def of_type(value: Fraction, wire: Wire | None) -> Fraction:
@@ -232,8 +217,8 @@ def of_type(value: Fraction, wire: Wire | None) -> Fraction:
 
 def _float(raw: Any, *, wide: bool, gaps: frozenset[Gap]) -> Fraction:
     kind = raw.__class__
-    if kind is Decimal:
-        return _of_text(raw.text, wide)
+    if kind is bytes:
+        return _of_text(raw.decode(), wide)
     if kind is int:
         return _of_text(str(raw), wide)
     if isinstance(raw, float):
@@ -242,13 +227,17 @@ def _float(raw: Any, *, wide: bool, gaps: frozenset[Gap]) -> Fraction:
         gap = Gap.NAN if math.isnan(raw) else Gap.INF
         if gap in gaps:
             raise NoReading(f"{raw} is no reading")
+        word = gap.value
+        raise MappingError(
+            f"{raw} is not a number; if it means no reading, map it: `{{…, {word}: none, elsewhere: …}}`"
+        )
     raise MappingError(f"{show(raw)} is not a number")
 
 
 @functools.lru_cache(maxsize=65536)
 def _of_text(text: str, wide: bool) -> Fraction:
     try:
-        value = Fraction(exact(Decimal(text)))
+        value = Fraction(exact(text.encode()))
         return of_type(value, Scalar("float64" if wide else "float32"))
     except (NotANumber, OverflowError):
         raise MappingError(f"{text[:60]} is not a number of this type") from None
@@ -325,16 +314,16 @@ def _given(raw: Any, kind: type[T], what: str) -> T:
     raise MappingError(f"{show(raw)} is not {what}")
 
 
-def parts_of(sort: Sort) -> tuple[Sort, ...]:
+def parts_of(sort: s.Sort) -> tuple[s.Sort, ...]:
     """What fields are wanted for: a function's parameters (and result), or the value itself."""
-    if isinstance(sort, FunctionSort):
-        return sort.parameters if sort.result == BOOL else (*sort.parameters, sort.result)
+    if isinstance(sort, s.FunctionSort):
+        return sort.parameters if sort.result == s.BOOL else (*sort.parameters, sort.result)
     return (sort,)
 
 
-def table_of(points: Iterable[tuple[Value, ...]], sort: FunctionSort) -> dict[tuple[Value, ...], Value]:
+def table_of(points: Iterable[tuple[Value, ...]], sort: s.FunctionSort) -> dict[tuple[Value, ...], Value]:
     """The table of a relation that holds at these tuples; of a function with a result, which each has as its last."""
-    return dict.fromkeys(points, True) if sort.result == BOOL else {point[:-1]: point[-1] for point in points}
+    return dict.fromkeys(points, True) if sort.result == s.BOOL else {point[:-1]: point[-1] for point in points}
 
 
 def meant(raw: Any, names: Mapping[str, str]) -> str | None:
@@ -343,7 +332,7 @@ def meant(raw: Any, names: Mapping[str, str]) -> str | None:
     return None if word is None else names.get(word, word)
 
 
-def element(raw: Any, sort: EnumSort, names: Mapping[str, str]) -> Value:
+def element(raw: Any, sort: s.EnumSort, names: Mapping[str, str]) -> Value:
     """The element that a word or a number stands for. Raises MappingError."""
     word = meant(raw, names)
     if word is not None and word in sort.members:
@@ -366,7 +355,7 @@ def _member(raw: Any, name: str) -> Any:
 
 def show(raw: Any) -> str:
     try:
-        text = repr(raw)
+        text = raw.decode() if isinstance(raw, bytes) else repr(raw)
     except RecursionError:
         return "something nested deeply"
     return text if len(text) <= 60 else text[:57] + "..."

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Outcome
-from avow.pipeline.work import method_backend, method_job
+from avow.pipeline.methods import method_backend, method_job
 from avow.system.load import load_system
 
 

@@ -119,6 +119,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def every(root: Path) -> list[tuple[str, str]]:
     files = [f for place in ("artifacts", "reports") for f in sorted((root / place).rglob("*")) if f.is_file()]
     found = [(str(f.relative_to(root)), edit) for f in files for edit in EDITS if f.name != ".lock"]
+    found = [(name, edit) for name, edit in found if not (name.endswith("report.json") and edit == "a folder")]
     return random.Random(0).sample(found, len(found))
 
 

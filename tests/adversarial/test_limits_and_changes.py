@@ -11,7 +11,7 @@ import pytest
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
-from avow.pipeline import asking
+from avow.pipeline import dispatch
 from avow.pipeline.run_info import new_run
 from avow.pipeline.work import SANITY
 from avow.pipeline.workload import Survey, survey
@@ -62,7 +62,7 @@ def test_a_contract_edited_between_question_and_answer(thermostat: Path, tmp_pat
     contract = thermostat / "system.rcl"
     contract.write_text(contract.read_text().replace("Low = 18", "Low = 17"))
     asked = replace(works[0], obligations=works[0].obligations[:1])
-    report = asking.settle(Workspace(tmp_path), asked, asked.obligations, tmp_path / "artifacts", new_run())
+    report = dispatch.settle(Workspace(tmp_path), asked, asked.obligations, tmp_path / "artifacts", new_run())
     (outcome,) = report.outcomes
     assert outcome.verdict is Verdict.ERROR
     assert outcome.details["retry"]

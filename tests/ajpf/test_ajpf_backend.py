@@ -22,7 +22,7 @@ def settle(job, tmp_path):
 
 def test_it_is_a_backend():
     assert isinstance(BACKEND, Backend)
-    assert {tool.name for tool in BACKEND.tools()} == {"AJPF", "spin"}
+    assert {tool.name for tool in BACKEND.tools()} == {"AJPF"}
 
 
 def test_another_agent_with_other_names(lift, tmp_path):
@@ -33,6 +33,15 @@ def test_another_agent_with_other_names(lift, tmp_path):
     assert outcomes["answers"].link is Link.MAPPED
     assert outcomes["answers"].bound["states"] > 0
     assert any("percepts are drawn" in h.text for h in outcomes["answers"].rests_on)
+
+
+def test_the_exported_program_is_the_plans_byte_for_byte(lift):
+    """Comments, layout and line ends, which no printer would keep."""
+    job = lift()
+    (path,) = (p for p in BACKEND.files(job) if p.suffix == ".gwen")
+    path.write_bytes(b"// a comment\r\n" + path.read_bytes() + b"\n\n")
+    (exported,) = (text for name, text in BACKEND.export(job).items() if name.endswith(".gwen"))
+    assert exported.encode() == path.read_bytes()
 
 
 def test_the_percept_semantics_change_the_verdict_and_are_named(lift, tmp_path):

@@ -118,7 +118,7 @@ RULED = """\
 GWENDOLEN
 :name: ag
 :Initial Beliefs:
-ready, old, near(1), fixed
+ready old near(1) fixed
 :Reasoning Rules:
 barred :- outside;
 barred :- wet, ~dry;
@@ -285,10 +285,10 @@ def test_a_property_of_the_plan_says_when_it_must_not_come(stays):
     assert "says rightly when" in said
     assert "was not shown" in said  # of an agent that has moved and not halted it asks nothing
     at_once = {**extra, "psl": "[] (B(cabin, open) -> ([] (~D(cabin, go(_)))))"}
-    (said,) = [h for h in stays("", properties={"p": at_once}).hypotheses if "'p'" in h]
+    (said,) = [h for h in stays("+x : { True };\n", properties={"p": at_once}).hypotheses if "'p'" in h]
     assert "it rules out, of every agent, that this comes while the guarantee's condition holds" in said
     beside = {**extra, "psl": "[] (B(cabin, shut) -> ([] (~D(cabin, go(_)))))"}  # another trigger altogether
-    (said,) = [h for h in stays("", properties={"p": beside}).hypotheses if "'p'" in h]
+    (said,) = [h for h in stays("+x : { True };\n", properties={"p": beside}).hypotheses if "'p'" in h]
     assert "was not shown" in said
     never_opens = {**extra, "psl": "[] (B(cabin, never) -> (<> D(cabin, halt(_))))"}
     assert stays(mover, properties={"while_open": never_opens}).vacuous

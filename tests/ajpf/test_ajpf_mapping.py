@@ -14,26 +14,9 @@ from avow.backends.ajpf.shape import TooComplex, shape
 from avow.evaluation.evaluate import evaluate
 from avow.formulas.renaming import bound_names
 from avow.formulas.values import Element, FunctionValue
+from avow.language import terms as t
 from avow.language.load import check_text, parse_formula
 from avow.language.sorts import BOOL, NATURAL, REAL, EnumSort, FunctionSort
-from avow.language.terms import (
-    And,
-    Apply,
-    Compare,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SetSort,
-    SetTerm,
-    Variable,
-)
 
 CONTRACT, PROBLEMS = check_text(
     """
@@ -72,45 +55,45 @@ def mapped(text, *rows, **options):
 
 
 LIGHT = EnumSort("Light", ("red", "amber", "green"))
-P = Variable(Role.INPUT, "p", FunctionSort((NATURAL,), BOOL))
-R = Variable(Role.INPUT, "r", FunctionSort((NATURAL, NATURAL), BOOL))
-B = Variable(Role.INPUT, "b", BOOL)
-E = Variable(Role.INPUT, "e", LIGHT)
+P = t.Variable(t.Role.INPUT, "p", FunctionSort((NATURAL,), BOOL))
+R = t.Variable(t.Role.INPUT, "r", FunctionSort((NATURAL, NATURAL), BOOL))
+B = t.Variable(t.Role.INPUT, "b", BOOL)
+E = t.Variable(t.Role.INPUT, "e", LIGHT)
 VALUES = {0: None, 1: None, 2: None}
 
 
 @st.composite
 def terms(draw, depth=4, scope=()):
-    number = st.sampled_from([*scope, Literal(0, NATURAL), Literal(1, NATURAL)])
+    number = st.sampled_from([*scope, t.Literal(0, NATURAL), t.Literal(1, NATURAL)])
     kind = draw(st.sampled_from("pprbeqc" if depth == 0 else "prbeqcnaoimQQQ"))
     below = terms(depth - 1, scope) if depth else None
     match kind:
         case "p":
-            return Apply(P, (draw(number),), BOOL)
+            return t.Apply(P, (draw(number),), BOOL)
         case "r":
-            return Apply(R, (draw(number), draw(number)), BOOL)
+            return t.Apply(R, (draw(number), draw(number)), BOOL)
         case "b":
-            return draw(st.sampled_from([B, Literal(True, BOOL), Compare("==", B, Literal(False, BOOL))]))
+            return draw(st.sampled_from([B, t.Literal(True, BOOL), t.Compare("==", B, t.Literal(False, BOOL))]))
         case "e":
-            members = tuple(EnumValue(m, LIGHT) for m in draw(st.lists(st.sampled_from(LIGHT.members), max_size=2)))
-            return In(E, SetTerm(members, SetSort(LIGHT)))
+            members = tuple(t.EnumValue(m, LIGHT) for m in draw(st.lists(st.sampled_from(LIGHT.members), max_size=2)))
+            return t.In(E, t.SetTerm(members, t.SetSort(LIGHT)))
         case "q":
-            return Compare(draw(st.sampled_from(["==", "!="])), E, EnumValue("red", LIGHT))
+            return t.Compare(draw(st.sampled_from(["==", "!="])), E, t.EnumValue("red", LIGHT))
         case "c":
-            return Compare(draw(st.sampled_from(["==", "!=", "<", "<=", ">", ">="])), draw(number), draw(number))
+            return t.Compare(draw(st.sampled_from(["==", "!=", "<", "<=", ">", ">="])), draw(number), draw(number))
         case "n":
-            return Not(draw(below))
+            return t.Not(draw(below))
         case "a":
-            return And((draw(below), draw(below)))
+            return t.And((draw(below), draw(below)))
         case "o":
-            return Or((draw(below), draw(below)))
+            return t.Or((draw(below), draw(below)))
         case "i":
-            return Implies(draw(below), draw(below))
+            return t.Implies(draw(below), draw(below))
         case "m":
-            return Iff(draw(below), draw(below))
-    names = [Variable(Role.BOUND, f"v{len(scope) + n}", NATURAL) for n in range(draw(st.integers(1, 2)))]
+            return t.Iff(draw(below), draw(below))
+    names = [t.Variable(t.Role.BOUND, f"v{len(scope) + n}", NATURAL) for n in range(draw(st.integers(1, 2)))]
     inner = draw(terms(depth - 1, (*scope, *names)))
-    return Quantified(draw(st.sampled_from([Quantifier.FORALL, Quantifier.EXISTS])), tuple(names), inner)
+    return t.Quantified(draw(st.sampled_from([t.Quantifier.FORALL, t.Quantifier.EXISTS])), tuple(names), inner)
 
 
 @pytest.mark.slow

@@ -192,7 +192,7 @@ def test_agents_that_have_nothing_to_do_with_each_other_take_turns_in_one_order(
 
 def test_where_draws_are_looked_at_there_is_no_reduction(tmp_path):
     fair = DRAWS + "fair: [{percept: p, because: it comes}]\n"
-    two = "GWENDOLEN\n" + agent("one", "") + agent("two", "")
+    two = "GWENDOLEN\n" + agent("one", "+p : { True };") + agent("two", "+p : { True };")
     for environment, text in ((fair, "<> B(one, a)"), (DRAWS, "<> P(p)")):
         agents = agents_of(tmp_path, two, environment)
         with pytest.raises(ValueError, match="draws"):

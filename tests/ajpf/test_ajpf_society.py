@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from small_societies import society
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, spin_tool
+from avow.backends.ajpf import BACKEND
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.command import command
 from avow.backends.ajpf.environment import read_environment
@@ -172,7 +172,6 @@ def test_a_run_is_told_agent_by_agent(tmp_path):
 
 def test_a_system_is_checked_as_a_nodes_method(lift, tmp_path, monkeypatch):
     """The lift's cabin, with a second agent that it tells what it does."""
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
     job = lift()
     path = job.root / job.options["program"]
     text = path.read_text() + agent("log", "+.received(:tell, B) : { True } <- +B;")

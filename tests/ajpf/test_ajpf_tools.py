@@ -1,4 +1,4 @@
-"""Outside engines: how AJPF's answers are read, and Spin's second opinion."""
+"""AJPF: how its answers are read, and its second opinion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from helpers import some
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, files, replay, spin, spin_tool
+from avow.backends.ajpf import BACKEND, ajpf_tool, files, replay
 from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.backends.ajpf.asking import ask, keep, recall
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
@@ -23,9 +23,11 @@ from avow.backends.ajpf.options import Setup
 from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
+from avow.backends.ajpf.syntax import Struct
 from avow.base import tools
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
+from avow.isolation.outside import Outside
 from avow.isolation.tracing import traces
 
 RESULTS = "====================================================== results\n"
@@ -169,73 +171,10 @@ def test_a_substitute_is_never_called_ajpf(lift, tmp_path, monkeypatch):
     assert "AJPF" not in said
 
 
-@pytest.mark.slow
-@pytest.mark.needs_spin
-def test_spin_agrees(lift, tmp_path):
-    extra = {
-        "until": "(~D(cabin, go(1))) U B(cabin, floor(1))",
-        "release": "B(cabin, open) R (~D(cabin, halt(0)))",
-        "false": "<> D(cabin, go(1))",
-    }
-    report = BACKEND.discharge(lift({"engine": "spin", "properties": extra}), tmp_path, Limits(seconds=120))
-    outcome = report.outcomes[0]
-    assert outcome.verdict is Verdict.CHECKED
-    assert "Spin" in report.tool
-    entries = [
-        *outcome.details["properties"],
-        *(p for e in outcome.details["further_properties"] for p in e["properties"]),
-    ]
-    assert len(entries) == 5
-    for entry in entries:
-        (opinion,) = entry["second_opinions"].values()
-        assert opinion == {"checked": "holds", "refuted": "violated"}[entry["verdict"]]
-    assert {e["verdict"] for e in entries} == {"checked", "refuted"}
-
-
-@pytest.mark.slow
-@pytest.mark.needs_spin
-def test_spin_knows_the_fairness_assumptions(lift, tmp_path):
-    environment = (
-        "draws: {at_quiescence: repeatedly}\npercepts: {panel: [call(1), nothing]}\n"
-        "start: {panel: [nothing]}\nfair: [{percept: call(1), because: somebody always calls}]\n"
-    )
-    extra = {"moves": {"psl": "<> D(cabin, go(1))", "guarantee": "answers"}}
-    job = lift({"engine": "spin", "properties": extra, "instances": {"f": [1]}}, {"cabin.yaml": environment})
-    report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
-    (outcome,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
-    assert outcome.verdict is Verdict.CHECKED, outcome.summary
-
-
-def test_spin_missing_is_no_second_opinion(lift, tmp_path, monkeypatch):
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
-    report = BACKEND.discharge(lift({"engine": "auto"}), tmp_path, Limits(seconds=60))
-    assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
-    assert "Spin" not in report.tool
-    report = BACKEND.discharge(lift({"engine": "spin"}), tmp_path, Limits(seconds=60))
-    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
-
-
-@pytest.mark.needs_spin
-@pytest.mark.skipif(not traces(), reason="strace is not here")
-def test_what_was_read_for_a_second_opinion_that_did_not_come_is_an_input(lift, tmp_path, monkeypatch):
-    """It may come once that is another."""
-    (tmp_path / "settings").write_text("1")
-
-    def opinions(checker, properties, folder, seconds, outside):
-        outside.run(["cat", str(tmp_path / "settings")], cwd=folder, seconds=60, megabytes=1_000)
-        raise spin.NoOpinion("it does not compile")
-
-    monkeypatch.setattr(spin, "opinions", opinions)
-    report = BACKEND.discharge(lift({"engine": "auto"}), tmp_path, Limits(seconds=60))
-    assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
-    assert str(tmp_path / "settings") in {o.path for o in report.observed}
-
-
 @pytest.mark.skipif(not traces(), reason="strace is not here")
 @pytest.mark.parametrize("engine", ["auto", "ajpf"])
 def test_what_was_read_for_an_environment_that_does_not_compile_is_an_input(lift, tmp_path, monkeypatch, engine):
     """Once that is another, it may: of a replay, and of AJPF's own answers."""
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
     _installed(tmp_path, monkeypatch, HOLDS)
     settings = tmp_path / "settings"
     settings.write_text("1")
@@ -250,8 +189,7 @@ def test_what_was_read_for_an_environment_that_does_not_compile_is_an_input(lift
 def test_what_a_replay_told_is_kept_and_what_it_read_is_an_input(lift, tmp_path, monkeypatch):
     """With a stand-in for AIL, which tells nothing: a run is kept where it agrees with ours, and only there."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
-    _installed(tmp_path, monkeypatch, "nothing")
+    _installed(tmp_path, monkeypatch, "\n".join(f"avow: run {at}.txt\nnothing" for at in range(20)))
     (tmp_path / "javac").write_text("#!/bin/sh\ntrue\n")
     (tmp_path / "javac").chmod(0o755)
 
@@ -259,7 +197,7 @@ def test_what_a_replay_told_is_kept_and_what_it_read_is_an_input(lift, tmp_path,
         report = BACKEND.discharge(lift({"engine": "auto", "semantics": "mcapl"}), tmp_path, Limits(seconds=60))
         assert str(tmp_path / "answer") in {o.path for o in report.observed}
         (found,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
-        return found, (tmp_path / "asked").read_text().count("agent.ail")
+        return found, (tmp_path / "asked").read_text().count(".txt")
 
     first, asked = answers()
     assert first.verdict is Verdict.ERROR
@@ -307,11 +245,11 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
 @pytest.mark.needs_ajpf
 def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
     job = lift({"engine": "auto", "semantics": "mcapl"})
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
     report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
     assert answers.verdict is Verdict.REFUTED
     assert "does the same run" in str(answers.details["properties"])
+    assert "runs as the checker does" in str(answers.bound["replay"])
     monkeypatch.setattr(replay, "_run", lambda *a, **k: pytest.fail("what AIL told was not kept"))
     (again,) = [o for o in BACKEND.discharge(job, tmp_path, Limits(seconds=120)).outcomes if o == answers]
     assert "does the same run" in str(again.details["properties"])
@@ -320,7 +258,6 @@ def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
 @pytest.mark.needs_ajpf
 def test_a_run_that_ail_does_not_do_is_no_refutation(lift, tmp_path, monkeypatch):
     """A seeded fault: our interpreter takes initial beliefs for granted that AIL does not have."""
-    monkeypatch.setattr(spin_tool, "version", lambda: None)
     monkeypatch.setattr(
         files, "program_text", lambda agents: program_text([replace(agent, beliefs=()) for agent in agents])
     )
@@ -349,3 +286,24 @@ def test_what_a_run_tells(tmp_path):
     assert script.text().startswith(f"draw {script.draws[0][0]}\n")
     assert "readAllLines" in environment_class(draws, scripted=True)
     assert "readAllLines" not in environment_class(draws)
+
+
+@pytest.mark.needs_ajpf
+@pytest.mark.parametrize("seed", [0, 1, 3])  # in 2 nothing happens
+def test_ail_does_sampled_runs_as_our_interpreter_does(tmp_path, seed):
+    """And not those of another program: a seeded fault that no property need meet."""
+    made = case(seed)
+    (tmp_path / "e.yaml").write_text(made.environment)
+    programs, draws = parse_system(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
+    setup = Setup(
+        programs, programs[0].name, draws, tmp_path, (), {}, (), Semantics.MCAPL, "auto", 5_000, environment_class=None
+    )
+    for faulty in (False, True):
+        ours = [replace(p, beliefs=(*p.beliefs, Struct("unheard_of"))) if faulty else p for p in programs]
+        graph = explore(system(ours, draws, Semantics.MCAPL), states=5_000)
+        runs = [(graph, lasso) for lasso in replay.sampled(graph, 5)]
+        installation = ajpf_tool.find()
+        folder = tmp_path / str(faulty)
+        folder.mkdir()
+        answers = replay.replay(installation, setup, runs, folder, Outside((installation.tool,)))
+        assert {a.said for a in answers} == ({Said.VIOLATED} if faulty else {Said.HOLDS}), [a.reason for a in answers]

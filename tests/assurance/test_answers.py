@@ -1,10 +1,12 @@
-"""The five answers: laws that no mixture of evidence and suppositions may break, and their words."""
+"""The five answers: laws that no mixture of evidence and assumptions may break, and their words."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,14 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
-from avow.assurance.answers import ABOUT, Headline, How, Sort, Supposition, Tone
+from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, START, TOOLS, Assumption, Level, Sort, Tone
 from avow.assurance.case import conclude_again
 from avow.assurance.changes import KINDS, baseline_of
+from avow.assurance.deficits import _WORDS
+from avow.assurance.deficits import words_of as deficit_words
 from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
-from avow.assurance.weakenings import _WORDS, _weakening
 from avow.base.plain import identifiers, words_of
-from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict, bound
+from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.system.plan import EnvironmentInput, Requirement, Statement, System
@@ -29,6 +32,7 @@ GUARANTEES = [guarantee(node, name) for node, names in NODES.items() for name in
 METHODS = {"hoare": Verdict.PROVED, "ajpf": Verdict.CHECKED, "hypothesis": Verdict.TESTED, "review": Verdict.REVIEWED}
 HYPOTHESES = ("the map is true", "the runs are drawn", "the table fits")
 OWNED, LATE, NOBODY = ("somebody", "2030-01-01"), ("somebody", "2020-01-01"), ("", "")
+ALWAYS = [Statement(place, "It is so", "", *OWNED) for place in (PLATFORM, TOOLS)]
 PLANS = [node_plan(node, "low", *METHODS) for node in NODES]
 PROSE = Requirement("R", "It is safe.", None, None, ("a", "b"))
 FORMAL = Requirement("R", "It is safe.", "a.x > 0", None, ("a", "b"))
@@ -54,7 +58,8 @@ def records(draw: st.DrawFn) -> list[Evidence]:
         for method in draw(st.lists(st.sampled_from(sorted(METHODS)), unique=True, max_size=4)):
             verdict = draw(st.sampled_from([METHODS[method], METHODS[method], Verdict.UNKNOWN, Verdict.REFUTED]))
             supposed = tuple(draw(st.lists(st.sampled_from(HYPOTHESES), unique=True, max_size=2)))
-            found.append(evidence(target, verdict, method, hypotheses=supposed))
+            of = draw(st.sampled_from([Object.MODEL, Object.SOURCE]))
+            found.append(evidence(target, verdict, method, hypotheses=supposed, of=of))
     return found
 
 
@@ -64,8 +69,8 @@ def statements(draw: st.DrawFn) -> list[Statement]:
     for method in METHODS:
         for word in ("map", "runs", "table"):
             who, until = draw(st.sampled_from([OWNED, OWNED, LATE, NOBODY]))
-            found.append(Statement(f"suppositions.{method}.{word}", f"The {word} of {method}", "", who, until))
-    return [*found, Statement("requirements.R.amounts", "It amounts to it", "", *OWNED)]
+            found.append(Statement(f"assumptions.{method}.{word}", f"The {word} of {method}", "", who, until))
+    return [*found, Statement("requirements.R.validation", "It amounts to it", "", *OWNED)]
 
 
 LAW = settings(max_examples=120, deadline=None)
@@ -90,7 +95,7 @@ def test_lost_evidence_never_improves_the_colour(
 @pytest.mark.slow
 @LAW
 @given(records(), statements(), st.booleans(), st.data())
-def test_a_new_supposition_never_improves_the_colour(
+def test_a_new_assumption_never_improves_the_colour(
     listed: list[Evidence], said: list[Statement], formal: bool, data: st.DataObject
 ) -> None:
     if not listed:
@@ -111,7 +116,7 @@ def test_what_is_argued_is_never_stronger_than_what_is_derived(listed: list[Evid
     argued, derived = build(listed, said, formal=False), build(listed, said, formal=True)
     assert argued.requirements[0].tone.rank <= derived.requirements[0].tone.rank
     assert argued.requirements[0].tone is not Tone.GREEN
-    assert {s.key for s in argued.suppositions} >= {s.key for s in derived.suppositions}
+    assert {s.key for s in argued.assumptions} >= {s.key for s in derived.assumptions}
     assert (
         argued.requirements[0].weakest_evidence == derived.requirements[0].weakest_evidence
         or derived.requirements[0].weakest_evidence is not None
@@ -128,55 +133,84 @@ def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_hol
     assert conclude_again(found) == found
     a = found.answers
     match a.headline:
-        case Headline.CONDITIONAL:
-            assert f" {len(found.suppositions)} supposition" in a.verdict
-            assert found.exit_code == 0
-        case Headline.HOLDS:
-            assert found.suppositions == ()
-        case Headline.NOT_SHOWN:
+        case Level.NOT_SHOWN | Level.REFUTED:
             assert a.tone is Tone.RED
-            assert found.exit_code != 0 or any(r.how is How.OPEN for r in found.requirements)
-        case Headline.EXAMINED:
+            assert found.exit_code != 0 or not all(r.level.holds for r in found.requirements)
+        case Level.EXAMINED:
             assert a.tone is (Tone.AMBER if a.warned.startswith(WARNED) else Tone.GREY)
-    assert sum(many for _, many in a.by_how) == len(found.requirements)
-    assert sum(line.count for line in a.supposed) == len(found.suppositions)
-    assert len({s.key for s in found.suppositions}) == len(found.suppositions)
+        case level:  # the least of what the requirements are
+            assert found.exit_code == 0
+            assert level.holds
+            assert level is max((r.level for r in found.requirements), key=list(Level).index)
+    assert sum(many for _, many in a.by_level) == len(found.requirements)
+    assert sum(line.count for line in a.supposed) == len(found.assumptions)
+    assert len({s.key for s in found.assumptions}) == len(found.assumptions)
 
 
-def test_past_its_last_day_a_supposition_opens_what_needs_it() -> None:
-    listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
+@pytest.mark.slow
+@LAW
+@given(records(), statements(), st.booleans())
+def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: list[Statement], formal: bool) -> None:
+    found = build(listed, said, formal=formal)
+    best = Level.SHOWN if formal else Level.ARGUED
+    for target in GUARANTEES:
+        own = [r for r in listed if r.obligation == target.id]
+        sure = [r for r in own if r.verdict in (Verdict.PROVED, Verdict.CHECKED)]
+        if any(r.verdict is Verdict.REFUTED for r in own):
+            least = Level.NOT_SHOWN
+        elif sure:
+            least = Level.SHOWN if any(r.of is Object.SOURCE for r in sure) else Level.MODELS
+        elif any(r.verdict is Verdict.TESTED for r in own):
+            least = Level.TESTS
+        else:
+            least = Level.ARGUED if any(r.verdict is Verdict.REVIEWED for r in own) else Level.NOT_SHOWN
+        best = max(best, least, key=list(Level).index)
+    order = list(Level).index
+    assert order(found.requirements[0].level) >= order(best)
+    assert order(found.answers.headline) >= order(best)
+
+
+def test_the_words_of_verdicts_are_those_of_the_docs() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reading-a-report.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| \*(.+?)\* \| (.+) \|$", page, re.MULTILINE))
+    assert rows == {level.capitalize(): meaning for level, meaning in MEANINGS.items()}
+
+
+def test_past_its_last_day_an_assumption_opens_what_needs_it() -> None:
+    listed = [evidence(g, hypotheses=("the map is true",), of=Object.SOURCE) for g in GUARANTEES]
 
     def on(until: str) -> Case:
-        said = Statement("suppositions.hoare.map", "The map is true", "", "somebody", until)
-        return build(listed, [said], formal=True)
+        said = Statement("assumptions.hoare.map", "The map is true", "", "somebody", until)
+        return build(listed, [said, *ALWAYS], formal=True)
 
     good = on(TODAY.isoformat())
-    assert (good.requirements[0].how, good.requirements[0].tone, good.answers.tone) == (
-        How.DERIVED,
+    assert (good.requirements[0].level, good.requirements[0].tone, good.answers.tone) == (
+        Level.SHOWN,
         Tone.GREEN,
         Tone.GREEN,
     )
-    assert good.answers.verdict == "Holds if 1 supposition holds"
+    assert good.answers.verdict == "Shown"
     late = on("2026-11-20")
-    assert late.requirements[0].how is How.OPEN
-    assert late.answers.verdict == "Not shown: 1 open"
+    assert late.requirements[0].level is Level.NOT_SHOWN
+    assert late.answers.verdict == "Not shown: 1 of 1 requirement"
     assert late.exit_code == 1
     (gate,) = [g for g in late.gates if g.id == "requirements"]
-    assert "a supposition has expired" in gate.reason
+    assert "an assumption has expired" in gate.reason
 
 
-NO_WORDS = "(no plain words yet: write says: … under suppositions.hoare.WORD, with a word of its text, in plan.yaml)"
+NO_WORDS = "(no plain words yet: write says: … under assumptions.hoare.WORD, with a word of its text, in plan.yaml)"
 
 
-def test_without_owner_or_date_a_supposition_weakens() -> None:
+def test_without_owner_or_date_an_assumption_weakens() -> None:
     listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
     found = build(listed, formal=True)
     assert found.answers.tone is Tone.AMBER
-    assert found.suppositions[0].words == NO_WORDS
-    assert {w.key: w.count for w in found.weakenings}["unowned"] == 1
+    assert NO_WORDS in [s.words for s in found.assumptions]
+    unowned = {w.key: w.claims for w in found.deficits}["unowned"]
+    assert set(unowned) == {s.key for s in found.assumptions if not s.owned}
 
 
-def test_a_supposition_stands_once_whoever_needs_it() -> None:
+def test_an_assumption_stands_once_whoever_needs_it() -> None:
     said = [
         Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01", "2026-11-20"),
         Statement("environment.in.b", "The map is right", "surveyed", "x", "2029-01-01", "2026-11-21"),
@@ -187,7 +221,7 @@ def test_a_supposition_stands_once_whoever_needs_it() -> None:
     proofs = [evidence(g, rests_on=needs) for g in GUARANTEES]
     made = subject(PROSE, said, environment=[EnvironmentInput(f"in.{p}", "TRUE", "surveyed") for p in "ab"])
     found = case(made, [*GUARANTEES, *claims], [*proofs, *reasons])
-    (world,) = [s for s in found.suppositions if s.sort is Sort.WORLD]
+    (world,) = [s for s in found.assumptions if s.sort is Sort.WORLD]
     assert (world.key, world.until, world.needed_by) == ("environment.in.a", "2029-01-01", ("R",))
     assert world.date == "2026-11-21"
     assert "2026-11-21" in found.answers.owners
@@ -205,7 +239,7 @@ def test_a_reason_for_an_assumption_is_none_for_its_input_being_constant() -> No
     def supposed(entry: EnvironmentInput, words: list[Statement]) -> list[tuple[str, str, str]]:
         made = case(subject(PROSE, words, environment=[entry]), [*GUARANTEES, claim], [*proofs, reason])
         made = replace(made, environment=tuple(replace(e, nodes=("a",)) for e in made.environment))
-        world = [s for s in conclude_again(made).suppositions if s.sort is Sort.WORLD]
+        world = [s for s in conclude_again(made).assumptions if s.sort is Sort.WORLD]
         return [(s.key, s.because, s.who) for s in world]
 
     both = EnvironmentInput("in.a", "TRUE", "surveyed", constant=True)
@@ -235,25 +269,28 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
         "10 cases, none failed (confidence not recorded: at most 30 % fail)",
     )
     lost = case(made, listed, given_[1:]).requirements[0]
-    assert lost.how is How.OPEN
+    assert lost.level is Level.NOT_SHOWN
     assert lost.failing == (GUARANTEES[0].id,)
     nothing = case(made, [*GUARANTEES], given_[:2])
-    assert [s.key for s in nothing.suppositions if s.sort is Sort.WORLD] == ["assumption.b.input"]
+    assert [s.key for s in nothing.assumptions if s.sort is Sort.WORLD] == ["assumption.b.input"]
 
 
 def test_a_key_is_about_a_whole_word() -> None:
     listed = [evidence(g, hypotheses=("the map is true", "the runs are drawn")) for g in GUARANTEES]
-    words = [Statement(f"suppositions.hoare.{w}", f"said by {w}", "", *OWNED) for w in ("is", "th", "the_map", "run")]
+    words = [Statement(f"assumptions.hoare.{w}", f"said by {w}", "", *OWNED) for w in ("is", "th", "the_map", "run")]
     found = build(listed, words, formal=True)
-    assert [s.words for s in found.suppositions] == ["said by the_map", NO_WORDS]
+    assert [s.words for s in found.assumptions if s.sort is Sort.MODELS and not s.general] == [
+        "said by the_map",
+        NO_WORDS,
+    ]
 
 
-def test_bounds_of_a_scenario_are_one_supposition() -> None:
+def test_bounds_of_a_scenario_are_one_assumption() -> None:
     bounds = ("scenario.domains.N: it is one of 0, 1", "scenario: a.x has one of the values that are tried")
     limits = (bound("scenario.domains.N", bounds[0]), bound("scenario.values.a.x", bounds[1]))
     listed = [evidence(g, Verdict.CHECKED, "ajpf", rests_on=limits) for g in GUARANTEES]
-    (one,) = build(listed, formal=True).suppositions
-    assert one.key == "suppositions.compose.scenario"
+    (one,) = [s for s in build(listed, formal=True).assumptions if s.text.startswith("scenario")]
+    assert one.key == "assumptions.compose.scenario"
     assert one.text.splitlines() == list(bounds)
 
 
@@ -309,35 +346,35 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
     assert [name for text in own for name in identifiers(text)] == []
 
 
-def test_which_suppositions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
-    def supposed(at: int, who: str, until: str) -> Supposition:
+def test_which_assumptions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
+    def supposed(at: int, who: str, until: str) -> Assumption:
         key = f"environment.n.{at}"
-        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, until, False, ("R",), ())
+        return Assumption(f"A{at}", key, Sort.WORLD, f"It is {at}", "", "", who, until, False, ("R",), ())
 
     said = [supposed(at, "A. Person" if at < 5 else "B", f"2027-01-0{at}") for at in range(1, 7)]
     most = replace(said[2], needed_by=("R", "Q"))
     (line,) = _lines([*said[:2], most, *said[3:]])
-    assert (line.number, line.about, line.more) == ("S3", "6 about the world", "also S1, S2, S4 to S6")
+    assert (line.number, line.about, line.more) == ("A3", "6 about the world", "also A1, A2, A4 to A6")
     assert _owners(said) == "A. Person (4), B (2); the first ends 2027-01-01"
     assert _owners(said[:1]) == "A. Person, until 2027-01-01"
     assert _owners([replace(said[0], who="")]) == ""
     made = [replace(one, date=f"2026-11-{20 + at}") for at, one in enumerate(said[:2])]
-    assert _owners(made[:1]) == "A. Person, supposed 2026-11-20, until 2027-01-01"
-    assert _owners(made) == "A. Person, supposed 2026-11-20 to 2026-11-21; the first ends 2027-01-01"
+    assert _owners(made[:1]) == "A. Person, assumed since 2026-11-20, until 2027-01-01"
+    assert _owners(made) == "A. Person, assumed since 2026-11-20 to 2026-11-21; the first ends 2027-01-01"
     assert made[0].term == "A. Person, 2026-11-20, until 2027-01-01"
     assert replace(made[0], expired=True, date="").term == "A. Person, expired 2027-01-01"
     assert replace(made[0], who="", until="").term == "no owner, 2026-11-20, no last day"
     assert set(ABOUT) == set(Sort)
 
 
-def test_weakenings_are_named_and_counted_on_the_first_screen() -> None:
+def test_deficits_are_named_and_counted_on_the_first_screen() -> None:
     found = rover_case()
     said = found.answers.weakened_by.split(", ")
-    assert [int(part.split(" ")[0]) for part in said] == [w.count for w in found.weakenings]
+    assert [int(part.split(" ")[0]) for part in said] == [w.count for w in found.deficits]
     for many in (1, 2):
-        said = [_weakening(key, ("x",) * many).words for key in _WORDS]
+        said = [deficit_words(key, many) for key in _WORDS]
         assert not any("{" in words for words in said)
-    assert _weakening("conditional", ("x",)).words == "review with conditions"
+    assert deficit_words("conditional", 1) == "review with conditions"
 
 
 @pytest.mark.parametrize(
@@ -402,3 +439,13 @@ def test_plain_words() -> None:
     )
     assert identifiers("It holds for 0.5 m, and/or less; REQ1.") == ("and/or",)
     assert date.fromisoformat("2030-01-01") > TODAY
+
+
+@pytest.mark.parametrize("summary", ["delayed edges start it: initial n.s", "no assumption in it hangs on the loop"])
+def test_first_values_that_the_plan_gives_are_assumed(summary: str) -> None:
+    start = obligation("system", Kind.COMPOSITION, "start.n")
+    begun = evidence(start, Verdict.PROVED, "compose", summary=summary)
+    needs = Requirement("R", "It starts.", None, None, ("n.g", "system/composition/start.n"))
+    subject = system({"n": ["g"]}, requirements=[needs])
+    found = case(subject, [guarantee("n", "g"), start], [evidence("n.g"), begun])
+    assert any(a.key == START for a in found.assumptions) == ("initial" in summary)

@@ -22,8 +22,9 @@ from assurance.sample import (
     rover_case,
     rover_parts,
     system,
+    validated,
 )
-from avow.assurance.answers import How
+from avow.assurance.answers import Level, Tone
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, SideCondition
@@ -35,7 +36,7 @@ from avow.cli.schemas import schemas
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.system.plan import Confirmation, Finding, Requirement, is_wild
+from avow.system.plan import Finding, Requirement, Validation, is_wild
 
 G = guarantee("n", "g")
 PLANS = [node_plan("n", "low", "hoare", "hypothesis")]
@@ -134,7 +135,7 @@ def requirement_case(*supports: str, formula: str | None = None, own: Verdict | 
 def test_prose_is_argued() -> None:
     for supports in (("n.g",), ("n",), ("n/guarantee/g",)):
         r = requirement_case(*supports).requirements[0]
-        assert r.status is Status.LINKED
+        assert r.status is Status.ARGUED
         assert r.weakest_status is Status.PROVED
         assert "Argued" in r.answer
 
@@ -183,10 +184,10 @@ def test_words_that_are_an_obligations_id_count_neither_for_nor_against() -> Non
     subject = system({"n": ["g", "h"]}, plans=PLANS)
     good = case(subject, [G, other], [evidence(G, hypotheses=("n/guarantee/h",)), evidence(other)])
     assert good.obligation(G.id).standing is Status.PROVED
-    assert "n/guarantee/h" in [h.text for h in good.hypotheses]  # not discharged by the claim of that name
+    assert "n/guarantee/h" in [a.text for a in good.assumptions]  # not discharged by the claim of that name
     bad = case(subject, [G, other], [evidence(G, hypotheses=(other.id,)), evidence(other, Verdict.REFUTED)])
     assert bad.obligation(G.id).standing is Status.PROVED
-    assert other.id in [h.text for h in bad.hypotheses]
+    assert other.id in [a.text for a in bad.assumptions]
     circle = case(subject, [G, other], [evidence(G, hypotheses=(other.id,)), evidence(other, hypotheses=(G.id,))])
     assert circle.obligation(G.id).standing is Status.PROVED
 
@@ -197,7 +198,7 @@ def test_a_derivation_rests_on_side_conditions_and_premises() -> None:
     d1 = Derivation("D1", "R1", "…", "…", ("n",), (SideCondition("A", side.id),))
     good = case(subject, [G, side], [evidence(G), evidence(side, method="compose")], derivations=[d1])
     assert good.derivations[0].status is Status.PROVED
-    assert good.requirements[0].status is Status.LINKED
+    assert good.requirements[0].status is Status.ARGUED
     bad = case(subject, [G, side], [evidence(G), evidence(side, Verdict.REFUTED, "compose")], derivations=[d1])
     assert bad.derivations[0].status is Status.UNSUPPORTED
     named = replace(d1, conditional=("system/composition/side", "a mere sentence"), side_conditions=())
@@ -213,20 +214,24 @@ def test_a_derivation_rests_on_side_conditions_and_premises() -> None:
 @pytest.mark.parametrize("changed", [{"text": "Another sentence."}, {"supported_by": ("n.g", "n")}])
 def test_what_is_linked_to_a_changed_sentence_is_suspect(changed: dict[str, Any]) -> None:
     asked = Requirement("R", "It does.", None, None, ("n.g",))
-    confirmed = replace(asked, confirmed=Confirmation("A. Person", "2026-01-01", asked.digest))
+    confirmed = validated(asked)
+    unread = replace(asked, validation=Validation("A. Person", "2026-01-01"))
 
     def stated(requirement: Requirement) -> Case:
         return case(system({"n": ["g"]}, requirements=[requirement], plans=PLANS), [G], [evidence(G)])
 
-    assert replace(confirmed, text="It  does.\n").digest == asked.digest  # white space says nothing
+    assert replace(confirmed, text="It  does.\n").validated  # white space says nothing
     good = stated(confirmed)
-    assert good.requirements[0].status is Status.LINKED
-    assert "unconfirmed" not in {w.key for w in good.weakenings}
-    assert "unconfirmed" in {w.key for w in stated(asked).weakenings}
+    assert good.requirements[0].status is Status.ARGUED
+    assert "unvalidated" not in {w.key for w in good.deficits}
+    lacking = stated(unread)
+    assert "unvalidated" in {w.key for w in lacking.deficits}
+    assert (lacking.answers.headline, lacking.answers.tone) == (Level.NOT_SHOWN, Tone.AMBER)
+    assert conclude_again(lacking) == lacking
     bad = stated(replace(confirmed, **changed))
-    assert bad.requirements[0].how is How.OPEN
+    assert bad.requirements[0].level is Level.NOT_SHOWN
     assert bad.requirements[0].status is Status.MISSING
-    assert "Suspect" in bad.requirements[0].answer
+    assert "Not validated" in bad.requirements[0].answer
     assert bad.exit_code == 1
     assert conclude_again(bad) == bad
     # that what stands under it is accepted excuses no changed sentence
@@ -399,7 +404,7 @@ def test_single_methods_and_hypotheses_are_listed() -> None:
     found = rover_case()
     assert "rover/agent/guarantee/next_waypoint" in found.single_method
     assert "rover/radiationSensor/guarantee/low" not in found.single_method
-    assert "percepts are edge-triggered" in [h.text for h in found.hypotheses]
+    assert "percepts are edge-triggered" in [a.text for a in found.assumptions]
 
 
 # -- as data --------------------------------------------------------------------------------------------------------

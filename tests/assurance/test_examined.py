@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.model import Case, Gate
 from avow.base.verdict import Object, Verdict
-from avow.evidence.obligation import Kind, Obligation, ProgramClaim
-from avow.evidence.record import OBSERVED, Evidence
+from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.record import Evidence
 
 G = guarantee("n", "g")
 FAULTLESS, LINKED = (obligation("n", Kind.PROGRAM, name) for name in (ProgramClaim.FAULTLESS, ProgramClaim.LINKED))
@@ -67,18 +65,3 @@ def test_what_is_claimed_of_programs_has_a_gate(records: list[Evidence], passed:
 def test_a_system_without_programs_has_no_such_gate() -> None:
     found = case(system({"n": ["g"]}), [G], [MODEL])
     assert not [g for g in found.gates if g.id == "program"]
-
-
-@pytest.mark.parametrize("claim", [G, FAULTLESS])
-def test_an_undeclared_input_is_named_in_what_to_do_next(claim: Obligation) -> None:
-    """Neither a narrower question, nor more seconds, nor another method would bring it."""
-    words = "undeclared input: what clang++ reads (sudo apt install strace)"
-    given_up = evidence(claim, Verdict.UNKNOWN, "hoare", summary=words)
-    undeclared = replace(given_up, details={OBSERVED: [["outside", "what clang++ reads", ""]]})
-
-    def step(record: Evidence) -> str:
-        view = next(o for o in made(record).obligations if o.obligation == claim)
-        return view.suggestion.text if view.suggestion is not None else ""
-
-    assert step(undeclared) == f"repair what keeps `hoare` from answering: {words}"
-    assert not step(given_up).startswith("repair")

@@ -51,13 +51,13 @@ def test_by_meaning() -> None:
             assert view.standing is status
 
 
-def test_a_supposition_wants_a_person() -> None:
+def test_an_assumption_wants_a_person() -> None:
     facts = facts_of_case(rover_case())
     at = proved(facts)
-    ends = Hypothesis(HypothesisKind.SUPPOSITION, "agent/supposition/termination", "1" * 64, "the loop ends")
+    ends = Hypothesis(HypothesisKind.ASSUMPTION, "agent/assumption/termination", "1" * 64, "the loop ends")
     facts = resting(facts, at, ends)
     assert conclude(facts).obligation(at).standing is Status.UNSUPPORTED
-    taken = Finding("agent/supposition/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01")
+    taken = Finding("agent/assumption/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat(), "2030-01-01")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, verdict="missing")
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
@@ -74,7 +74,7 @@ def test_what_rests_on_a_limit_is_checked_at_most() -> None:
     found = conclude(resting(facts, at, limit))
     assert found.obligation(at).standing is Status.CHECKED
     assert limit.text in found.obligation(at).hypotheses
-    assert limit.text in [h.text for h in found.hypotheses]
+    assert limit.text in [a.text for a in found.assumptions]
 
 
 @pytest.mark.parametrize(

@@ -149,3 +149,24 @@ def test_d1_is_written_as_the_paper_writes_it(tmp_path: Path) -> None:
     )
     assert written.premises == ("navigation", "radiationSensor", "agent")
     assert "system/composition/D1.persistence" in written.conditional
+
+
+@pytest.mark.slow
+def test_req1_as_the_paper_words_it_is_refuted(tmp_path: Path) -> None:
+    """Between orange and red the repaired contracts leave; the paper's sentence has the robot inspect."""
+    paper = """
+requirements:
+  REQ1:
+    text: The robot should inspect each waypoint as long as the radiation level at a waypoint is not high ("red").
+    formula: >-
+      forall(x, y in REAL, i in NATURAL |
+        (navigation.at(x, y) and agent.wayP(x, y, i) and radiationSensor.r < 250 and agent.in.phase == exploring) ->
+          (radiationSensor.inspected(i) or agent.command == inspect(i)))
+"""
+    plan = REPAIRED.partition("\nrequirements:")[0] + paper
+    found = outcomes(case_study(tmp_path, "remote_inspection", plan))["REQ1"]
+    assert found.verdict is Verdict.REFUTED, found.summary
+    assert found.counterexample is not None
+    run = found.counterexample.trace or (found.counterexample.values,)
+    readings = [float(value) for step in run for name, value in step if name.endswith((".r", "in.r"))]
+    assert any(120 <= reading < 250 for reading in readings), found.counterexample

@@ -12,9 +12,7 @@ ROOT = Path(__file__).parents[2]
 ROOMS = ("avow/sanity", "avow/solving", "avow/calculus", "avow/formulas", "avow/evaluation", "backends/hoare")
 
 TOLD = {
-    "avow/solving/limits.py",  # ends what hangs
-    "avow/solving/question_process.py",  # the nets under other processes
-    "avow/solving/apart.py",
+    "avow/solving/apart.py",  # the nets under other processes
     "avow/solving/checking.py",  # how long an answer took, for people
     "avow/solving/questions.py",
     "avow/sanity/analysis.py",

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from collections.abc import Iterator, Mapping
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
-from oracle.values import domain, holds
+from oracle.domains import domain
+from reference.meaning import holds
 
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.obligations import composition_obligations
-from avow.language.contract import Port
 from avow.language.sorts import SequenceSort, Sort
-from avow.system.plan import Endpoint
+from avow.system.temporal import parse_state
 
+from .enumeration import Enumeration, Values
 from .make import make, node, requirement_obligations, settle_all
-
-Values = dict[str, Any]
 
 CONTEXT = "context { Tint : {red, blue}; Paint : Tint --> Tint; Row : <Tint>; }\n"
 TYPES = {"t": "Tint", "f": "Paint", "s": "Row", "b": "BOOL"}
@@ -105,62 +102,12 @@ def everything(sort: Sort) -> list[Any]:
     return ROWS if isinstance(sort, SequenceSort) else domain(sort)
 
 
-class Enumeration:
-    """All runs, found by trying everything."""
+class Runs(Enumeration):
+    """What a claim, and an assumption, are in all runs."""
 
     def __init__(self, composition: Composition, claim: str) -> None:
-        self.frame = composition.frame
-        self.graph = self.frame.graph
-        contract = self.frame.system.contract
-        self.ports: dict[str, Port] = {f"{n.name}.{p.name}": p for n in contract.nodes for p in n.outputs}
-        self.inputs = [(n.name, p.name) for n in contract.nodes for p in n.inputs]
-        self.outside = sorted({e.port for e in self.graph.environment})
-        self.late = sorted({str(e.source) for e in self.graph.edges if e.delayed})
-        self.clauses = {
-            n.name: (
-                [partial(holds, a.formula) for a in n.assumptions],
-                [partial(holds, g.formula) for g in n.guarantees],
-            )
-            for n in contract.nodes
-        }
-        from avow.system.temporal import parse_state
-
-        self.claim = partial(holds, parse_state(claim, contract, None))
-
-    def local(self, name: str, values: Mapping[str, Any]) -> Values:
-        found = {f"out.{p}": values[f"{name}.{p}"] for n, _, p in (x.partition(".") for x in self.ports) if n == name}
-        for owner, port in self.inputs:
-            if owner == name:
-                edge = self.graph.by_target.get(Endpoint(name, port))
-                where = f"in.{port}" if edge is None else f"{edge.source}{'@before' if edge.delayed else ''}"
-                found[f"in.{port}"] = values[where]
-        return found
-
-    def starts(self) -> Iterator[Values]:
-        initial = {str(e.source): e.initial for e in self.graph.edges if e.delayed}
-        known: Values = {"red": "red", "blue": "blue", "TRUE": True, "FALSE": False, "<red>": ("red",)}
-        ranges: list[list[Any]] = [
-            everything(self.ports[n].sort) if (given := initial[n]) is None else [known[given]] for n in self.late
-        ]
-        for combination in product(*ranges):
-            yield dict(zip(self.late, combination, strict=True))
-
-    def steps(self, before: Values) -> Iterator[tuple[Values, frozenset[str]]]:
-        """Every complete step, and the nodes whose assumptions do not hold."""
-        names = [*self.ports, *(f"in.{port}" for port in self.outside)]
-        ranges = [everything(p.sort) for p in self.ports.values()] + [[False, True] for _ in self.outside]
-        for combination in product(*ranges):
-            values: Values = dict(zip(names, combination, strict=True))
-            values |= {f"{name}@before": value for name, value in before.items()}
-            broken = set()
-            for name, (assumed, promised) in self.clauses.items():
-                local = self.local(name, values)
-                if not all(holds(local) for holds in assumed):
-                    broken.add(name)
-                elif not all(holds(local) for holds in promised):
-                    break
-            else:
-                yield values, frozenset(broken)
+        super().__init__(composition, everything)
+        self.claim = partial(holds, parse_state(claim, self.frame.system.contract, None))
 
     def holds(self, values: Values) -> bool:
         given: Values = {}
@@ -172,50 +119,28 @@ class Enumeration:
 
     def always(self, *, trusting: bool) -> bool:
         """Whether the claim holds at every step of every run; `trusting`: of those at which every assumption does."""
-        waiting = list(self.starts())
-        seen: set[str] = set()
-        while waiting:
-            before = waiting.pop()
-            if (mark := str({name: str(value) for name, value in before.items()})) in seen:
-                continue
-            seen.add(mark)
-            for values, broken in self.steps(before):
-                if trusting and broken:
-                    continue
-                if not self.holds(values):
-                    return False
-                waiting.append({name: values[name] for name in self.late})
-        return True
+        return all(self.holds(values) for values, _ in self.reached(lambda broken: not (trusting and broken)))
 
     def may_break(self, node_name: str, clause: str) -> bool:
         """Whether, after steps at which every assumption holds, this one may be false though all behind it is kept."""
-        index = [a.name for a in self.frame.node(node_name).assumptions].index(clause)
         behind, stack = {node_name}, [node_name]
         while stack:
             for edge in self.graph.feeding(stack.pop()):
                 if not edge.delayed and edge.source.node not in behind:
                     behind.add(edge.source.node)
                     stack.append(edge.source.node)
-        waiting, seen = list(self.starts()), set()
         names = [n for n in self.ports if n.partition(".")[0] in behind - {node_name}]
-        while waiting:
-            before = waiting.pop()
-            if (mark := str({name: str(value) for name, value in before.items()})) in seen:
-                continue
-            seen.add(mark)
-            ranges = [everything(self.ports[n].sort) for n in names] + [[False, True] for _ in self.outside]
-            for combination in product(*ranges):
-                values: Values = {n: everything(p.sort)[0] for n, p in self.ports.items()}
-                values |= dict(zip([*names, *(f"in.{port}" for port in self.outside)], combination, strict=True))
-                values |= {f"{name}@before": value for name, value in before.items()}
+        memories = [{n: values[n] for n in self.late} for values, _ in self.reached(lambda broken: not broken)]
+        for before in {str(memory): memory for memory in (*self.starts(), *memories)}.values():
+            for some in self.valuations(names, before):
+                values = {n: self.everything(p.sort)[0] for n, p in self.ports.items()} | some
                 kept = all(
                     holds(self.local(name, values))
                     for name in behind - {node_name}
-                    for holds in (*self.clauses[name][0], *self.clauses[name][1])
+                    for holds in (*self.clauses[name][0].values(), *self.clauses[name][1])
                 )
-                if kept and not self.clauses[node_name][0][index](self.local(node_name, values)):
+                if kept and not self.clauses[node_name][0][f"{node_name}.{clause}"](self.local(node_name, values)):
                     return True
-            waiting += [{n: v[n] for n in self.late} for v, broken in self.steps(before) if not broken]
         return False
 
 
@@ -232,7 +157,7 @@ def compare(tmp_path: Path, seed: int, told: Counter[str]) -> None:
     found: dict[str, Outcome] = {
         o.name: outcome for o, outcome in zip(obligations, settle_all(composition, obligations, Limits()), strict=True)
     }
-    truth = Enumeration(composition, claim)
+    truth = Runs(composition, claim)
     about = f"seed {seed}:\n{text}\n{plan}"
     if any(name.startswith("start.") and outcome.verdict is Verdict.REFUTED for name, outcome in found.items()):
         return

@@ -76,9 +76,7 @@ def test_what_cannot_be_eliminated_gets_the_assumption_itself(tmp_path: Path) ->
     assert "out.at(2)" in str(offer["clause"])
 
 
-MANY = (
-    "context { Col : {red, orange, green}; Go : {go(Col), rest}; Fun : INTEGER --> INTEGER; Rel : INTEGER --> BOOL; }\n"
-)
+MANY = "context { Col : {red, orange, green}; Go : {go(Col), rest}; Fun : INTEGER --> INTEGER; }\n"
 SWITCH = node(
     "a",
     "c : Go",
@@ -105,14 +103,6 @@ SWITCH = node(
             "assume ( in.c in {go(green), rest} )",
             True,
             id="values with parts, behind a function",
-        ),
-        pytest.param(
-            node("a", "k : INTEGER, f : Rel", "x : BOOL", "G: out.x <=> in.f(in.k + 1)")
-            + node("b", "x : BOOL", "", "A s: in.x"),
-            "in.k",
-            "assume ( in.f(in.k + 1) )",
-            False,
-            id="by what an equation says",
         ),
         pytest.param(
             node("a", "e : INTEGER", "x : Col", "G: in.e > 3 or out.x in {red, green}")

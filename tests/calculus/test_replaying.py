@@ -86,7 +86,7 @@ def test_of_a_search_cut_short_also_its_length(tmp_path: Path) -> None:
     assert any(h.name == "scenario.steps" for h in outcome.rests_on)
 
 
-def test_a_range_that_leaves_nothing_out_is_no_supposition(tmp_path: Path) -> None:
+def test_a_range_that_leaves_nothing_out_is_no_assumption(tmp_path: Path) -> None:
     text = "context { Light : {red, green}; }\n" + node("lamp", "l : Light, b : BOOL", "x : BOOL", "G: out.x")
     for domain, told in (("in.l: [red, green]", False), ("in.l: [red]", True), ("BOOL: [TRUE]", True)):
         plan = f'scenario: {{domains: {{{domain}}}}}\nrequirements: {{R: {{text: t, temporal: "always lamp.x"}}}}\n'

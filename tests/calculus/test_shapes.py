@@ -141,23 +141,6 @@ def test_two_disjoint_loops_are_judged_apart(tmp_path: Path) -> None:
 # -- wide and large ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly
-def test_a_fan_out_and_in_of_twenty(tmp_path: Path) -> None:
-    wide = node("s", "", "x : INTEGER", "G: out.x >= 0")
-    wide += "".join(
-        node(f"c{k}", "x : INTEGER", f"y{k} : INTEGER", f"A: in.x >= {-k}", f"G: out.y{k} >= in.x + {k}")
-        for k in range(20)
-    )
-    ports = ", ".join(f"y{k} : INTEGER" for k in range(20))
-    sums = " + ".join(f"in.y{k}" for k in range(20))
-    good, bad = (wide + node("e", ports, "", f"A: {sums} >= {bound}") for bound in (190, 191))
-    system = make(tmp_path / "good", good)
-    goal = compose(system).whole
-    assert [part.rule for part in goal.root.walk() if part.rule is not Rule.PREMISE] == [Rule.R2, Rule.R3]
-    assert outcomes(system)["whole.e.A1"].verdict is Verdict.PROVED
-    assert outcomes(make(tmp_path / "bad", bad))["whole.e.A1"].verdict is Verdict.REFUTED
-
-
 def test_outputs_that_feed_nothing_are_named(tmp_path: Path) -> None:
     system = make(tmp_path, node("a", "", "x : INTEGER, u : INTEGER") + node("b", "x : INTEGER", "y : INTEGER"))
     graph = dataflow(system)

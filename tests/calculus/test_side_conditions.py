@@ -14,18 +14,6 @@ from avow.calculus.derivation import LoopForm, Rule
 from .make import make, node, outcomes, settled
 
 
-def test_a_provider_a_hair_too_weak(tmp_path: Path) -> None:
-    consumer = node("b", "x : REAL", "", "A small: in.x < 1")
-    good = make(tmp_path / "good", node("a", "", "x : REAL", "G: out.x < 1") + consumer)
-    assert settled(good)[1].verdict is Verdict.PROVED
-    weak = make(tmp_path / "weak", node("a", "", "x : REAL", "G: out.x <= 1") + consumer)
-    _, answers = settled(weak)
-    (answer,) = answers.settled.values()
-    assert answer.verdict is Verdict.REFUTED
-    assert answer.cases[0].counterexample is not None
-    assert dict(answer.cases[0].counterexample.values) == {"a.x": "1"}, "only the hair itself is wrong"
-
-
 def test_a_providers_assumption_may_be_used_and_stays_assumed(tmp_path: Path) -> None:
     system = make(
         tmp_path,

@@ -26,7 +26,7 @@ from avow.system.graph_svg import sheet, texts
 from .make import make, node, outcomes
 from .test_commands import invoke
 from .test_hierarchy import CONTEXT, GRADER, READER, SINK, SOURCE
-from .test_random_groups import Grouped
+from .test_random_systems import broken
 
 FLAT = CONTEXT + READER + GRADER + SOURCE + SINK
 NESTED = (
@@ -158,7 +158,7 @@ def test_support_from_a_node_that_rests_on_the_assumption_does_not_count(tmp_pat
     )
     for number, groups in enumerate(("{s: {nodes: [a, b]}}", "{s: {nodes: [a]}, t: {nodes: [b, c]}}", "{}")):
         composition = whole(tmp_path / str(number), text, groups)
-        assert Grouped(composition).broken() is not None
+        assert broken(composition) is not None
         assert verdict(composition) is Verdict.REFUTED
 
 

@@ -25,6 +25,7 @@ from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.conformance import Conformance, Seeded
 from avow.isolation.tracing import traces
+from avow.pipeline import methods as methods_module
 from avow.pipeline import work as work_module
 from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
@@ -107,7 +108,7 @@ def another_library(_: Path, patch: pytest.MonkeyPatch) -> None:
 
 def another_tool(_: Path, patch: pytest.MonkeyPatch) -> None:
     for name in ("program_digest", "package_digest"):
-        patch.setattr(work_module, name, lambda *a: "another")
+        patch.setattr(methods_module, name, lambda *a: "another")
 
 
 def another_claim(folder: Path, _: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from avow.calculus.scenario import world
 from avow.calculus.variables import frame
 from avow.formulas.finite import interpretation
 from avow.formulas.values import FunctionValue
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 RCL = """
@@ -42,7 +42,7 @@ def points(value: Any) -> set[int]:
 
 def in_tests(job: Job) -> set[int]:
     (data,) = (text for name, text in HYPOTHESIS.export(job).items() if name.endswith(".json"))
-    return {int(row[0]) for row in json.loads(data)["scenario"]["f"]}
+    return {int(row[0]) for row in json.loads(data)["f"]}
 
 
 def in_monitors(job: Job) -> set[int]:

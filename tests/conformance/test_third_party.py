@@ -36,7 +36,7 @@ def place(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_the_examples_pass(place: Path) -> None:
     """The one in the folder, and the one on the page."""
-    page = (EXAMPLES.parent / "adding-a-backend.md").read_text()
+    page = (EXAMPLES.parent / "developers" / "adding-a-backend.md").read_text()
     (found,) = re.findall(r"^```python conformance\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     (place / "test_page.py").write_text(found)
     done = run(place)

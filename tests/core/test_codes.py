@@ -12,23 +12,26 @@ import pytest
 from helpers import nodes, parsed
 
 from avow.backend_kit.registry import backend, names
-from avow.base.codes import CODES, Code, declare, register
+from avow.base.codes import CODES, FRAME, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
 from avow.base.codes_ros import ROS_CODES
-from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_rows
+from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_entry
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "diagnostics.md"
 FORM = re.compile(r"[A-Z]{2,}[0-9]{3}")
 RANK = {"Severity.NOTE": 0, "Severity.WARNING": 1, "Severity.ERROR": 2}
-INTRO = """\
+INTRO = f"""\
 # Diagnostics
 
-Every diagnostic has a code. It keeps its meaning from version to version: search for it here, let
-`avow check --explain` say it, or take it from the JSON and SARIF output. An error stops what it is about (exit code
-2); a warning does not. The severity given is the greatest that the code can have.
+Every diagnostic has a code that keeps its meaning from version to version. `avow check --explain` prints what this page
+says of it. An error stops what it is about (exit code 2); a warning does not. The severity given is the greatest that
+the code can have.
 
-[language.md](language.md#every-code) has an example of each code of the language.
+An example of the language that is only a clause stands at the place of the `…` here:
+
+```text
+{FRAME.format(clause="…")}```
 """
 
 
@@ -101,7 +104,7 @@ def test_codes_are_found_where_they_stand() -> None:
 
 
 def test_every_code_used_is_declared(where: dict[str, set[str]]) -> None:
-    assert sorted(set(where) - set(declared())) == [], "declare it (docs/architecture.md, a message)"
+    assert sorted(set(where) - set(declared())) == [], "declare it (docs/developers/architecture.md, a message)"
 
 
 def test_every_code_declared_is_used(where: dict[str, set[str]]) -> None:
@@ -150,10 +153,9 @@ def test_the_page_is_in_step() -> None:
         "Backends, policies, requirements, ledgers, commands": WORKSPACE_CODES,
         **{f"The backend {name}": codes for name, codes in backends().items()},
     }
-    head = "| code | severity | meaning | what to do |\n|---|---|---|---|\n"
     page = INTRO
     for title, codes in sections.items():
-        page += f"\n## {title}\n\n{head}" + "\n".join(page_rows(codes.values())) + "\n"
+        page += f"\n## {title}\n\n" + "\n\n".join(map(page_entry, codes.values())) + "\n"
     if os.environ.get("AVOW_REFRESH"):
         PAGE.write_text(page, "utf-8")
     assert PAGE.read_text("utf-8") == page, "AVOW_REFRESH=1 .venv/bin/pytest tests/core/test_codes.py"

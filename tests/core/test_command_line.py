@@ -34,8 +34,10 @@ NO_QUESTIONS = {
         "graph",
         "init",
         "monitor",
+        "obligations",
         "recheck",
         "report",
+        "validate",
     ),
     *("requirements", "review sign", "review stamp", "sign", "translate"),
 }

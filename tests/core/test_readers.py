@@ -34,7 +34,6 @@ from avow.pipeline.shortcut import _Settled
 from avow.pipeline.workload import Listing
 
 KINDS: list[Any] = [
-    exchange.Question,
     exchange.Answer,
     runner.Question,
     runner.Campaigned,

@@ -24,10 +24,12 @@ STAYS = {
     "engine_code.reading_digest": "of the code that runs in this process",
     "engine_code.trusted_parts": "of the code that runs in this process",
     "blobs._classes": "of the code that runs in this process",
-    "cluster._guarded": "an audit hook cannot be taken away again: a process has one",
     "cluster_worker.own_code": "of the code that runs in this process",
     "tasks.sys.dont_write_bytecode": "what the interpreter does, whoever asks",
-    "fork_server.sys.argv": "a fork takes its own arguments; it is a process of one work",
+    "processes.sys.argv": "a fork has its own; it is a process of one job",
+    "processes.sys.stdin": "a fork has its own; it is a process of one job",
+    "processes.sys.stdout": "a fork has its own; it is a process of one job",
+    "processes.sys.stderr": "a fork has its own; it is a process of one job",
 }
 """What outlives a run in `avow.pipeline`, and why it may. A function that keeps answers is pure, and its answers are of
 its arguments; one without arguments is listed."""
@@ -40,38 +42,27 @@ KEPT = "what was computed of the same arguments: faster, and never another answe
 PATCHED = "another's module, in the process of a subject or for the time of a search"
 ELSEWHERE = {
     "avow/assurance/policy._data": ONCE,
+    "avow/assurance/standards._data": ONCE,
     "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
     "avow/base/files._known": ONCE,
     "avow/base/process.here": PROCESS,
     "avow/base/tools.libraries": ONCE,
-    "avow/calculus/kept_answers._kept": "where a work's answers are kept, for the time of that work",
+    "avow/calculus/entailment._kept": "where a work's answers are kept, for the time of that work",
     "avow/calculus/scenario._KEYS": KEPT,
     "avow/isolation/level.seals": ONCE,
-    "avow/isolation/senses._posixsubprocess.fork_exec": PATCHED,
-    "avow/isolation/senses.datetime.datetime": PATCHED,
-    "avow/isolation/senses.posix.environ": PATCHED,
-    "avow/isolation/senses._datetime.datetime": PATCHED,
-    "avow/isolation/senses._random.Random": PATCHED,
-    "avow/isolation/machine_code._locale.setlocale": PATCHED,
-    "avow/isolation/machine_code.sqlite3.Connection": PATCHED,
-    "avow/isolation/machine_code.sqlite3.connect": PATCHED,
-    "avow/isolation/machine_code.time.tzset": PATCHED,
     "avow/isolation/tracing.traces": ONCE,
-    "avow/isolation/sights.most": PROCESS,
     "avow/language/load._lately": KEPT,
     "avow/language/load._under": KEPT,
     "avow/report/page.environment": ONCE,
-    "avow/solving/limits._kennel": PROCESS,
     "avow/solving/limits._spent": PROCESS,
-    "avow/solving/smtlib._cvc5": ONCE,
-    "avow/solving/translation._known": "the formulas of one node that are translated, for the time of its claims",
     "avow/solving/z3_module.z3": ONCE,
+    "avow/solving/z3_sorts._kept": "a Z3 context for questions of evaluation, each of which has one answer",
+    "avow/solving/z3_sorts._session": "the Z3 context of a node's questions, for the time of its claims",
+    "avow/system/hazards._schema": ONCE,
     "avow/system/schema.plan_schema": ONCE,
     "avow/system/schema._validator": ONCE,
-    "backends/ajpf/spin_tool.version": ONCE,
-    "backends/hypothesis/shrink.providers.is_local_module_file": PATCHED,
 }
 """What outlives a call in the other rooms, and why it may."""
 FUNCTIONS = {"attrgetter", "itemgetter"}
@@ -92,7 +83,7 @@ def test_the_map_shows_the_floors() -> None:
     held = {room.removeprefix("avow."): len(layers) - at for at, rooms in enumerate(layers) for room in rooms}
     floor, shown = 0, dict[str, int]()
     for number, room in re.findall(
-        r"^\| (?:(\d+) )?\| `([\w/*]+)` \|", (ROOT / "docs" / "architecture.md").read_text(), re.M
+        r"^\| (?:(\d+) )?\| `([\w/*]+)` \|", (ROOT / "docs" / "developers" / "architecture.md").read_text(), re.M
     ):
         floor = int(number or floor)
         shown[room.removesuffix("/*")] = floor
@@ -262,15 +253,14 @@ GIVEN = {
 OWN = {
     "avow/cli/init.py",
     "avow/pipeline/engine_code.py",
-    "avow/pipeline/executors.py",
+    "avow/pipeline/processes.py",
     "avow/pipeline/worker.py",
     "avow/backend_kit/programs/cpython.py",
     "avow/conformance/suite.py",
-    "backends/ajpf/spin.py",
     "backends/fuzz/runner.py",
     "backends/fuzz/tables.py",
-    "backends/hypothesis/convention.py",
-    "backends/hypothesis/bench.py",
+    "backends/hypothesis/export.py",
+    "backends/hypothesis/running.py",
 }
 """These read what Avow brought, or wrote a moment ago in a folder that nobody else knows."""
 

@@ -53,7 +53,7 @@ def test_rml_with_the_plans_mapping(place: Path, capsys: pytest.CaptureFixture[s
     assert code == 1
     assert "warning[MON105]: n.said" in said
     assert "s/system.rcl:6:3" in said
-    assert "G1<" in text
+    assert "Positive<" in text
     assert text.startswith("//")
     read(text)
     code, text, said = run("translate --to rml s", capsys)
@@ -71,7 +71,7 @@ def test_rml_with_the_plans_mapping(place: Path, capsys: pytest.CaptureFixture[s
 def test_a_wrong_mapping_stays_an_error(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (place / "s" / "plan.yaml").write_text(PLAN + "  m: {methods: [{rosmonitoring: {mapping: {in.b: data}}}]}\n")
     code, text, said = run("translate --to rml s", capsys)
-    assert "G1<" in text
+    assert "Positive<" in text
     assert code == 1
     assert "error[MON101]" in said
 

@@ -16,7 +16,7 @@ from test_dafny_tricks import CONTRACT, GOOD
 
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND, modern
-from avow.backends.dafny.runner import has_commands
+from avow.backends.dafny.dafny_tool import has_commands
 from avow.base.tools import find_tool
 from avow.base.verdict import Outcome, Verdict
 

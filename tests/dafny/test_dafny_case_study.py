@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import pytest
 from helpers import some
 
+from avow.backend_kit.given import job_for as job_for_plan
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.dafny import BACKEND
+from avow.backends.dafny.__main__ import main
 from avow.base.verdict import Link, Outcome, Verdict
 
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
@@ -67,6 +70,30 @@ def test_the_papers_listing_is_not_accepted(make_job: MakeJob) -> None:
         assert "module AgentImpl refines AgentSpec" in outcome.summary
 
 
+@pytest.mark.needs_dafny
+@pytest.mark.slow
+def test_dafny_opens_a_skeleton_where_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its include resolves once the workspace's files are exported."""
+    source, place = CONTRACTS / "remote_inspection", tmp_path / "contracts" / "lamp"
+    (place / "models" / "more").mkdir(parents=True)
+    (tmp_path / "dodo.py").write_text("")
+    (place / "system.rcl").write_text((source / "system.rcl").read_text())
+    (place / "plan.yaml").write_text(
+        "system: lamp\ncontract: system.rcl\nnodes:\n  radiationSensor:\n    methods:\n"
+        "      - dafny: {id: by-hand, implementation: models/more/sensor.dfy}\n"
+    )
+    assert main([str(place), "radiationSensor"]) == 0
+    job = job_for_plan(place, "radiationSensor", "dafny", None, wrong="DFY101", hint="")
+    folder = tmp_path / "artifacts/lamp/radiationSensor/by-hand"
+    folder.mkdir(parents=True)
+    for name, text in BACKEND.export(job).items():
+        (folder / name).write_text(text)
+    written = place / "models/more/sensor.dfy"
+    assert str(written) in capsys.readouterr().out
+    done = subprocess.run(["dafny", "/compile:0", "/noVerify", written], capture_output=True, text=True, check=False)
+    assert (done.returncode, "Error" in done.stdout) == (0, False), done.stdout
+
+
 _MUTANTS: tuple[tuple[str, str, str, set[str]], ...] = (
     ("next := Types.Phase.exploring;", "next := Types.Phase.leaving;", "agent", {"end_of_mission"}),
     ("r >= 120.0", "r > 120.0", "radiationSensor", {"medium"}),
@@ -93,8 +120,8 @@ def test_nothing_is_run_where_dafny_is_missing(make_job: MakeJob, monkeypatch: A
     from avow.backends.dafny import backend
     from avow.base.tools import Tool
 
-    monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "apt-get install dafny"))
+    monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "sudo apt install dafny"))
     job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")
     for outcome in settle(job).values():
         assert outcome.verdict is Verdict.NOT_RUN
-        assert "apt-get install dafny" in outcome.summary
+        assert "sudo apt install dafny" in outcome.summary

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import pytest
 from drawn.memory import formula, response, run_of
-from oracle.values import Step, broken, value
+from reference.meaning import Step, broken, value
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.dafny.modules import Generated, generate
@@ -28,7 +28,7 @@ def holds(said: Said, run: Sequence[Step], k: int) -> bool | None:
     trigger, wanted = said
     if wanted is None:
         return bool(value(trigger, run, k))
-    first = broken(trigger, wanted, run)
+    first = broken(Implies(trigger, wanted), run)
     return None if first is not None and first < k else first != k
 
 

@@ -234,6 +234,28 @@ def test_no_decoy_hides_what_env_adds(make_job: MakeJob, tmp_path: Path, name: s
 
 @pytest.mark.slow
 @pytest.mark.needs_dafny
+@pytest.mark.parametrize(
+    ("asked", "about_nothing"),
+    some(
+        [
+            ("in_r < 10.0", {"high"}), ("in_r < 12.0", set()), ("10.0 <= in_r", {"low"}),
+            ("exists k: int :: k < 4 && in_r == k as real", {"high"}),
+        ],
+        0, slow=2,
+    ),
+)  # fmt: skip
+def test_a_guarantee_that_env_leaves_nothing_to_say_is_vacuous(
+    make_job: MakeJob, tmp_path: Path, asked: str, about_nothing: set[str]
+) -> None:
+    env = ENV.replace("true", asked)
+    given = "in_r := 11.0" if "10.0 <=" in asked else "assert 3 < 4 && 3.0 == 3 as real; in_r := 3.0"
+    told = settle(make_job, tmp_path, GOOD.replace(ENV, env).replace("in_r := 0.0", given))
+    assert {o.verdict for o in told.values()} == {Verdict.PROVED}, told
+    assert {name for name, o in told.items() if o.vacuous} == about_nothing
+
+
+@pytest.mark.slow
+@pytest.mark.needs_dafny
 @pytest.mark.parametrize("text", some(["in_r < 10.0", "true"], 1))
 def test_a_wrong_scanner_proves_nothing(
     make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str

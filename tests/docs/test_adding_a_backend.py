@@ -23,14 +23,14 @@ from avow.base import process
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.conformance.seeded import settle
-from avow.pipeline.check import of_plan
 from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.export import generated
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
+from avow.pipeline.plan_check import of_plan
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
 
-PAGE = Path(__file__).parent.parent.parent / "docs" / "adding-a-backend.md"
+PAGE = Path(__file__).parent.parent.parent / "docs" / "developers" / "adding-a-backend.md"
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+from helpers import avow, warehouse_bag
 
 from avow.language import textmate
 from avow.language.lexer import KEYWORDS
@@ -119,6 +120,56 @@ def test_the_hooks_take_the_files_that_they_are_given(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout + done.stderr
     (place / "contracts/thermostat/system.rcl").write_text("node {")
     assert run(f"avow check {files}", place).returncode == 2
+
+
+def commands() -> list[tuple[str, int]]:
+    """What the templates and hooks run on a workspace, in order, and the code of each for a draft: it is well formed,
+    and what is still to be written fails a gate."""
+    (gitlab,) = yaml.safe_load((KIT / "gitlab.yaml").read_text()).values()
+    scripts = [step["run"] for step in steps() if "run" in step and step.get("name") != "comment"]
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    files = {"avow-check": "contracts/*/system.rcl contracts/*/plan.yaml", "avow-fmt": "contracts/*/system.rcl"}
+    every = [*scripts, *gitlab["script"], *(f"{hook['entry']} {files[hook['id']]}" for hook in hooks)]
+    return [(script, int(script == "avow verify")) for script in every]
+
+
+@pytest.mark.slow
+def test_templates_and_hooks_run_on_a_draft_in_a_clean_environment(tmp_path: Path) -> None:
+    """On a clone of a drafted workspace, without its bag, with Avow's wheel and a PATH of Python and git alone."""
+    warehouse_bag(tmp_path / "run")
+    assert avow("init", "warehouse", "--from-bag", str(tmp_path / "run"), cwd=tmp_path).returncode == 0
+    git = "git -c user.name=n -c user.email=e -c init.defaultBranch=main"
+    publish = f"{git} init -q && git add -A && {git} commit -qm draft && git clone -q . ../clone"
+    assert run(publish, tmp_path / "warehouse").returncode == 0
+    assert not (tmp_path / "clone/contracts/warehouse/traces/run").exists()
+    build = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)]
+    subprocess.run(build, check=True, capture_output=True, timeout=300)
+    (wheel,) = tmp_path.glob("*.whl")
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "env")], check=True, timeout=120)
+    (tmp_path / "bin").mkdir()
+    for tool in ("bash", "basename", "cp", "dirname", "git", "mkdir"):
+        found = shutil.which(tool)
+        assert found is not None
+        (tmp_path / "bin" / tool).symlink_to(found)
+    env = {"PATH": f"{tmp_path / 'env/bin'}:{tmp_path / 'bin'}", "HOME": str(tmp_path), "AVOW": str(wheel)}
+    env |= {name: value for name, value in os.environ.items() if name.startswith("PIP_")}
+    told = ""
+    for script, code in commands():
+        done = subprocess.run(
+            ["bash", "-eo", "pipefail", "-c", script],
+            cwd=tmp_path / "clone",
+            env=env,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        assert done.returncode == code, f"{script}\n{done.stdout}\n{done.stderr}"
+        told += done.stdout + done.stderr
+    assert "next: replace `to_write` by what the node promises" in told
+    assert "Traceback" not in told
+    assert (tmp_path / "clone/findings/warehouse.sarif").is_file()
+    assert run("git status --porcelain contracts", tmp_path / "clone").stdout == ""
 
 
 def test_the_editors_package_names_files_that_are_there() -> None:

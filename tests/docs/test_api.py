@@ -13,7 +13,7 @@ import pytest
 import avow.api
 from avow.cli import command
 
-PAGE = Path(__file__).parents[2] / "docs" / "api.md"
+PAGE = Path(__file__).parents[2] / "docs" / "developers" / "api.md"
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from python_backend.source_nodes import DEBOUNCER, LIMITER, NODES
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Object, Outcome, Verdict
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 
 FOLDER = Path(__file__).parents[2] / "docs" / "examples" / "crosshair"
 

@@ -50,7 +50,7 @@ _PORTS: Mapping[Type, str] = {
     Type("fun", parts=(BOOL, NATURAL)): "forall(q in BOOL | {v}(q) <= 2)",
     Type("fun", parts=(COLOUR, BOOL, BOOL)): "",
 }
-"""What a port may be, and what keeps one of an infinite type within values of `oracle.values.domain`, not all."""
+"""What a port may be, and what keeps one of an infinite type within values of `oracle.domains.domain`, not all."""
 
 
 def small_contract(seed: int) -> str:

@@ -6,8 +6,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 
-from oracle.seconds import Word
-from oracle.values import Step
+from reference.meaning import Step, Word
 
 from avow.formulas.formula import free_variables, substitute
 from avow.language.load import parse_formula

@@ -12,8 +12,9 @@ pytest.importorskip("pygls")
 from editor.test_client import CONTRACT, PLAN
 
 from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, coloured, folds
-from avow.lsp.completion import offers, plan_offers, signature
+from avow.lsp.completion import offers, signature
 from avow.lsp.features import Document, analyse, definition, hover, name_at, references, symbols
+from avow.lsp.plan_keys import about_key, plan_offers
 from avow.lsp.plan_names import PlanText, plan_occurrences
 from avow.lsp.protocol import Lines, semantic_tokens, signature_help
 from avow.lsp.renaming import renamed_with
@@ -75,7 +76,7 @@ def check(document: Document, places: range) -> None:
     assert all(one.end <= other.start for one, other in pairwise(colours))
     assert all(c.kind in TOKEN_TYPES and set(c.modifiers) <= set(MODIFIERS) for c in colours)
     assert all(number >= 0 for number in semantic_tokens(colours, lines).data)
-    assert all(0 <= fold.start < fold.end <= len(document.text) for fold in folds(part))
+    assert all(0 <= start < end <= len(document.text) for start, end in folds(part))
     symbols(document)
     for one in document.names:
         assert not one.written or document.text[one.start : one.end] == one.meaning.name
@@ -123,6 +124,7 @@ def test_any_plan() -> None:
             assert text[one.start : one.end] == one.meaning.name
         for offset in range(k % 5, len(text), 5):
             plan_offers(text, contract, offset)
+            about_key(text, offset)
 
 
 def test_line_ends_of_windows() -> None:

@@ -9,6 +9,7 @@ pytest.importorskip("pygls")
 from avow.lsp.appearance import coloured
 from avow.lsp.completion import offers, signature
 from avow.lsp.features import analyse, definition, hover, references, symbols
+from avow.lsp.plan_keys import about_key, plan_offers
 
 TEXT = """\
 context { define far(r : REAL) = r > 9; }
@@ -91,3 +92,65 @@ def test_an_enumeration_declared_as_a_constant_is_one_thing() -> None:
     places = [at for at in range(len(text)) if text.startswith("Mode", at)]
     assert all([o.start for o in definition(document, at)] == places[:1] for at in places)
     assert [o.start for o in references(document, places[1])] == places
+
+
+TYPED = """\
+context { Mode : {idle, drive}; Level : {low, high}; Limit = 2; }
+node n {
+  inputs( mode : Mode, last : Mode, at : [x : REAL, level : Level], on : BOOL, r : REAL )
+  outputs( said : Mode )
+  topics( )
+  guarantee g ( HERE )
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("in.mode == ", {"idle", "drive", "in.mode", "in.last", "out.said"}),
+        ("in.mode != ", {"idle", "drive", "in.mode", "in.last", "out.said"}),
+        ("in.mode == i", {"idle", "drive", "in.mode", "in.last", "out.said"}),
+        ("in.at.level == ", {"low", "high"}),
+        ("in.on == ", {"TRUE", "FALSE", "in.on"}),
+    ],
+)
+def test_after_a_comparison_what_may_be_equal_is_offered(typed: str, offered: set[str]) -> None:
+    contract = analyse(TYPED.replace("HERE", "TRUE"), "n.rcl").project.contract
+    document = analyse(TYPED.replace("HERE", typed), "n.rcl")
+    at = document.text.index(typed) + len(typed)
+    assert {o.label for o in offers(document.taken_apart, contract, at)} == offered
+    numbers = document.text.replace(typed, "in.r == ")
+    every = offers(analyse(numbers, "n.rcl").taken_apart, contract, numbers.index("in.r == ") + 8)
+    assert {"in.r", "Limit", "min"} <= {o.label for o in every}
+
+
+PLAN = """\
+system: x
+nodes:
+  n:
+    criticality: high
+    methods:
+      - hypothesis:
+          cases: 100
+      - rosmonitoring: {decided: 0.9}
+      - hoare
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("hypothesis", "Its options: "),
+        ("cases", "`cases`: "),
+        ("rosmonitoring", "`mapping`"),
+        ("hoare", "`program`"),
+    ],
+)
+def test_a_plans_methods_and_options_are_explained(key: str, told: str) -> None:
+    said = about_key(PLAN, PLAN.index(key) + 1)
+    assert said is not None
+    assert told in said
+    assert about_key(PLAN, PLAN.index("100")) is None
+    labels = [o.label for o in plan_offers(PLAN + "      - ", analyse("", "n.rcl").project.contract, len(PLAN) + 8)]
+    assert key in labels or key == "cases"

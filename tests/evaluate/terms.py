@@ -5,55 +5,36 @@ from __future__ import annotations
 from fractions import Fraction
 
 from avow.formulas.values import FunctionValue
-from avow.language.sorts import (
-    BOOL,
-    NATURAL,
-    REAL,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    Sort,
-)
-from avow.language.terms import (
-    Apply,
-    Arithmetic,
-    Compare,
-    Literal,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
+from avow.language import sorts as s
+from avow.language import terms as t
 
-COMMAND = DataSort("Command", (Constructor("move", (REAL, REAL)), Constructor("inspect", (NATURAL,))))
+COMMAND = s.DataSort("Command", (s.Constructor("move", (s.REAL, s.REAL)), s.Constructor("inspect", (s.NATURAL,))))
 
 
-COLOUR = EnumSort("Colour", ("red", "orange", "green"))
+COLOUR = s.EnumSort("Colour", ("red", "orange", "green"))
 
 
-PLACE = FunctionSort((REAL, REAL), BOOL)
+PLACE = s.FunctionSort((s.REAL, s.REAL), s.BOOL)
 
 
-MAP = FunctionSort((REAL, REAL, NATURAL), BOOL)
+MAP = s.FunctionSort((s.REAL, s.REAL, s.NATURAL), s.BOOL)
 
 
-NUMBERS = FunctionSort((NATURAL,), BOOL)
+NUMBERS = s.FunctionSort((s.NATURAL,), s.BOOL)
 
 
-HEIGHT = FunctionSort((REAL,), REAL)
+HEIGHT = s.FunctionSort((s.REAL,), s.REAL)
 
 
-def bound(name: str, sort: Sort = REAL) -> Variable:
-    return Variable(Role.BOUND, name, sort)
+def bound(name: str, sort: s.Sort = s.REAL) -> t.Variable:
+    return t.Variable(t.Role.BOUND, name, sort)
 
 
-def given(name: str, sort: Sort) -> Variable:
-    return Variable(Role.INPUT, name, sort)
+def given(name: str, sort: s.Sort) -> t.Variable:
+    return t.Variable(t.Role.INPUT, name, sort)
 
 
-X, Y, A, B, N, M = bound("x"), bound("y"), bound("a"), bound("b"), bound("n", NATURAL), bound("m", NATURAL)
+X, Y, A, B, N, M = bound("x"), bound("y"), bound("a"), bound("b"), bound("n", s.NATURAL), bound("m", s.NATURAL)
 
 
 P, Q = given("p", PLACE), given("q", PLACE)
@@ -65,38 +46,38 @@ H, K = given("h", HEIGHT), given("k", NUMBERS)
 C = given("c", COMMAND)
 
 
-def real(value: int | str) -> Literal:
-    return Literal(Fraction(value), REAL)
+def real(value: int | str) -> t.Literal:
+    return t.Literal(Fraction(value), s.REAL)
 
 
-def nat(value: int) -> Literal:
-    return Literal(value, NATURAL)
+def nat(value: int) -> t.Literal:
+    return t.Literal(value, s.NATURAL)
 
 
-def forall(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.FORALL, variables, body)
+def forall(variables: tuple[t.Variable, ...], body: t.Term) -> t.Quantified:
+    return t.Quantified(t.Quantifier.FORALL, variables, body)
 
 
-def exists(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.EXISTS, variables, body)
+def exists(variables: tuple[t.Variable, ...], body: t.Term) -> t.Quantified:
+    return t.Quantified(t.Quantifier.EXISTS, variables, body)
 
 
-def unique(variables: tuple[Variable, ...], body: Term) -> Quantified:
-    return Quantified(Quantifier.UNIQUE, variables, body)
+def unique(variables: tuple[t.Variable, ...], body: t.Term) -> t.Quantified:
+    return t.Quantified(t.Quantifier.UNIQUE, variables, body)
 
 
-def holds(function: Variable, *arguments: Term) -> Apply:
-    assert isinstance(function.sort, FunctionSort)
-    return Apply(function, arguments, function.sort.result)
+def holds(function: t.Variable, *arguments: t.Term) -> t.Apply:
+    assert isinstance(function.sort, s.FunctionSort)
+    return t.Apply(function, arguments, function.sort.result)
 
 
 def points(*tuples: tuple[int, ...], default: bool = False) -> FunctionValue:
-    return FunctionValue({tuple(map(Fraction, t)): not default for t in tuples}, default)
+    return FunctionValue({tuple(map(Fraction, point)): not default for point in tuples}, default)
 
 
-def eq(left: Term, right: Term) -> Compare:
-    return Compare("==", left, right)
+def eq(left: t.Term, right: t.Term) -> t.Compare:
+    return t.Compare("==", left, right)
 
 
-def plus(left: Term, right: Term) -> Arithmetic:
-    return Arithmetic("+", left, right, left.sort)
+def plus(left: t.Term, right: t.Term) -> t.Arithmetic:
+    return t.Arithmetic("+", left, right, left.sort)

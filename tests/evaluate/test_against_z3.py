@@ -10,28 +10,8 @@ from helpers import some
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Data, FunctionValue, Value
-from avow.language.sorts import (
-    NATURAL,
-    REAL,
-    SetSort,
-)
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    SetTerm,
-    Term,
-    Variable,
-)
+from avow.language import sorts as s
+from avow.language import terms as t
 
 from .terms import (
     COLOUR,
@@ -50,21 +30,21 @@ from .terms import (
 )
 
 
-def _random_formula(rng: random.Random, depth: int, scope: tuple[Variable, ...]) -> Term:
-    numbers = [v for v in scope if v.sort == REAL]
-    naturals = [v for v in scope if v.sort == NATURAL]
+def _random_formula(rng: random.Random, depth: int, scope: tuple[t.Variable, ...]) -> t.Term:
+    numbers = [v for v in scope if v.sort == s.REAL]
+    naturals = [v for v in scope if v.sort == s.NATURAL]
 
-    def number() -> Term:
+    def number() -> t.Term:
         choice = rng.random()
         if numbers and choice < 0.7:
             return rng.choice(numbers)
         if choice < 0.8:
             return holds(H, rng.choice(numbers) if numbers else real(rng.randrange(3)))
         if numbers and choice < 0.87:
-            return Arithmetic(rng.choice("+-"), rng.choice(numbers), real(rng.randrange(1, 3)), REAL)
+            return t.Arithmetic(rng.choice("+-"), rng.choice(numbers), real(rng.randrange(1, 3)), s.REAL)
         return real(rng.randrange(3))
 
-    def natural() -> Term:
+    def natural() -> t.Term:
         if naturals and rng.random() < 0.7:
             return rng.choice(naturals)
         if naturals and rng.random() < 0.4:
@@ -73,44 +53,44 @@ def _random_formula(rng: random.Random, depth: int, scope: tuple[Variable, ...])
 
     if depth == 0:
         commands = [C, *(v for v in scope if v.sort == COMMAND)]
-        colours: list[Term] = [EnumValue("red", COLOUR), *(v for v in scope if v.sort == COLOUR)]
+        colours: list[t.Term] = [t.EnumValue("red", COLOUR), *(v for v in scope if v.sort == COLOUR)]
         match rng.randrange(10):
             case 7:
                 return eq(rng.choice(commands), rng.choice(commands))
             case 8:
-                return eq(rng.choice(colours), EnumValue(rng.choice(COLOUR.members), COLOUR))
+                return eq(rng.choice(colours), t.EnumValue(rng.choice(COLOUR.members), COLOUR))
             case 9:
-                return In(number(), SetTerm((real(0), real(2)), SetSort(REAL)))
+                return t.In(number(), t.SetTerm((real(0), real(2)), s.SetSort(s.REAL)))
             case 0 | 1:
                 return holds(rng.choice((P, Q)), number(), number())
             case 2:
                 return holds(K, natural())
             case 3:
-                return Compare(rng.choice(("==", "!=")), number(), number())
+                return t.Compare(rng.choice(("==", "!=")), number(), number())
             case 4:
-                return Compare(rng.choice(("<", "<=", ">", ">=")), number(), number())
+                return t.Compare(rng.choice(("<", "<=", ">", ">=")), number(), number())
             case 5:
-                return eq(rng.choice(commands), Construct("move", (number(), number()), COMMAND))
+                return eq(rng.choice(commands), t.Construct("move", (number(), number()), COMMAND))
             case _:
-                return eq(rng.choice(commands), Construct("inspect", (natural(),), COMMAND))
+                return eq(rng.choice(commands), t.Construct("inspect", (natural(),), COMMAND))
     match rng.randrange(8):
         case 0 | 1:
-            return And(tuple(_random_formula(rng, depth - 1, scope) for _ in range(rng.randrange(2, 4))))
+            return t.And(tuple(_random_formula(rng, depth - 1, scope) for _ in range(rng.randrange(2, 4))))
         case 2:
-            return Or(tuple(_random_formula(rng, depth - 1, scope) for _ in range(2)))
+            return t.Or(tuple(_random_formula(rng, depth - 1, scope) for _ in range(2)))
         case 3:
-            return Implies(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
+            return t.Implies(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
         case 4:
-            return Iff(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
+            return t.Iff(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
         case 5:
-            return Not(_random_formula(rng, depth - 1, scope))
+            return t.Not(_random_formula(rng, depth - 1, scope))
         case _:
             fresh = tuple(
-                bound(f"v{len(scope) + k}", rng.choice((REAL, REAL, REAL, NATURAL, NATURAL, COMMAND, COLOUR)))
+                bound(f"v{len(scope) + k}", rng.choice((s.REAL, s.REAL, s.REAL, s.NATURAL, s.NATURAL, COMMAND, COLOUR)))
                 for k in range(rng.randrange(1, 3))
             )
             body = _random_formula(rng, depth - 1, scope + fresh)
-            return Quantified(rng.choice(list(Quantifier)), fresh, body)
+            return t.Quantified(rng.choice(list(t.Quantifier)), fresh, body)
 
 
 def _random_values(rng: random.Random) -> dict[str, Value]:

@@ -56,7 +56,7 @@ def test_a_direct_failure_is_told_even_if_something_below_fails_too() -> None:
 
 def test_prose_is_linked_never_proved() -> None:
     found = judge([Claim("req", rests_on=("g",), prose=True), Claim("g", Status.PROVED, link=Link.GENERATED)])
-    assert found["req"].status is Status.LINKED
+    assert found["req"].status is Status.ARGUED
     assert found["req"].link is Link.GUIDED
     weak = judge([Claim("req", rests_on=("g",), prose=True), Claim("g", Status.REFUTED)])
     assert weak["req"].status is Status.UNSUPPORTED

@@ -73,8 +73,6 @@ def test_sentences_become_clauses_that_mean_the_same_again(tmp_path: Path, sente
         ("pump satisfy off", 6),
         ("the pump shall within satisfy off", 23),
         ("the pump shall satisfy at the next occurrence of p, q", 24),
-        ("x " * 3_000, 1),
-        ("pump shall satisfy " + "(" * 500, 1),
         ("pump shall satisfy " + "!" * 3_500 + "p", 1),
         ("", 1),
     ],

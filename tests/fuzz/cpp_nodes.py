@@ -13,7 +13,7 @@ from python_backend.source_nodes import DEBOUNCER_RCL, LIMITER_RCL, MEDIAN_RCL, 
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backends.fuzz import BACKEND
 from avow.base.verdict import Outcome, Verdict
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 NODES = """\
@@ -77,7 +77,7 @@ _ADAPTER = """\
 #include "nodes.hpp"
 struct AvowNode {{
   {name} node;
-  explicit AvowNode(const avow::Parameters& given) {{ {made} }}
+  {made}
   void step(const avow::Inputs& in, avow::Outputs& out) {{ {step} }}
   void memory(avow::Outputs& out) const {{ {memory} }}
 }};
@@ -130,7 +130,8 @@ class Cpp:
 
 
 def adapter(name: str, made: str, step: str, memory: str = "(void)out;") -> str:
-    return _ADAPTER.format(name=name, made=made or "(void)given;", step=step, memory=memory)
+    constructor = f"explicit AvowNode(const avow::Parameters& given) {{ {made} }}" if made else ""
+    return _ADAPTER.format(name=name, made=constructor, step=step, memory=memory)
 
 
 LIMITER = Cpp(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import tempfile
@@ -12,31 +13,37 @@ import pytest
 
 from avow.backends.fuzz import BACKEND, building
 from avow.backends.fuzz.runner import Question, Show, _ended
-from avow.base.tools import Tool
+from avow.base.tools import Tool, find_tool
 from avow.base.verdict import Verdict
 from avow.isolation import judge
 from fuzz.cpp_nodes import LIMITER, SCAN, WATCHDOG
 
 
 def test_without_clang_it_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(building, "clang", lambda: Tool("clang++", None, None, "sudo apt install clang"))
+    monkeypatch.setattr(building, "tools", lambda: (Tool("clang++", None, None, "sudo apt install clang"),))
     report = LIMITER.report(tmp_path)
     assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
     assert len(report.outcomes) == 5, "four guarantees, and that it runs without fault"
     assert all("sudo apt install clang" in o.summary for o in report.outcomes)
 
 
-def test_with_half_of_clang_it_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Installed without its run-time libraries, it compiles and does not link: no fault of the subject's."""
+def test_clang_without_libfuzzer_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The run-time libraries are a package of their own: without them clang compiles and does not link."""
     fake = tmp_path / "clang++"
-    missing = "/usr/bin/ld: cannot find /usr/lib/clang/lib/linux/libclang_rt.fuzzer-x86_64.a: No such file or directory"
-    compiles = 'for word; do [ "$before" = -o ] && : > "$word"; [ "$word" = -c ] && c=1; before=$word; done'
-    fake.write_text(f"#!/bin/sh\n{compiles}\n[ $c ] || {{ echo '{missing}' >&2; exit 1; }}\n")
+    fake.write_text(f"#!/bin/sh\n[ $1 = --version ] && echo 'clang version 14.0.6' || echo {tmp_path}\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(building, "clang", lambda: Tool("clang++", "1", str(fake), ""))
-    report = LIMITER.report(tmp_path)
-    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
-    assert all("run-time libraries" in o.summary for o in report.outcomes)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    find_tool.cache_clear()
+    try:
+        outcomes = LIMITER.report(tmp_path / "robot").outcomes
+        (tmp_path / "lib" / "linux").mkdir(parents=True)
+        (tmp_path / "lib" / "linux" / "libclang_rt.fuzzer-x86_64.a").touch()
+        whole = BACKEND.tools()[0]
+    finally:
+        find_tool.cache_clear()
+    assert {o.verdict for o in outcomes} == {Verdict.NOT_RUN}
+    assert {o.summary for o in outcomes} == {"clang++ is here without libFuzzer: sudo apt install libclang-rt-14-dev"}
+    assert (whole.version, whole.path) == ("14.0.6", str(fake))
 
 
 def test_no_text_becomes_code(tmp_path: Path) -> None:
@@ -68,9 +75,9 @@ def test_every_file_that_is_included_is_named(tmp_path: Path) -> None:
     assert {path.name for path in BACKEND.files(job)} == {"adapter.hpp", "nodes.hpp", "params.yaml"}
 
 
-def test_what_is_longer_than_a_pipe_holds_comes_through(tmp_path: Path) -> None:
+def test_a_long_answer_comes_through(tmp_path: Path) -> None:
     channel = judge.Channel()
-    question = Question(Show("", ()), str(tmp_path), 60, ())
+    question = Question(Show("", ()), str(tmp_path), 60)
     script = f"import os\nleft = b'x' * 1_000_000\nwhile left: left = left[os.write({channel.theirs}, left):]"
     with tempfile.TemporaryFile() as given:
         code, left, said, _ = _ended([sys.executable, "-c", script], tmp_path, question, channel, {}, given.fileno())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 from helpers import some
 
 from avow.backends.fuzz.clang_tool import clang
-from avow.backends.fuzz.unseen import CATCHING, UNDECLARED, Line, own, unseen
+from avow.backends.fuzz.unseen import CATCHING, UNDECLARED, Line, own, undefined, unseen
 from avow.base.verdict import Verdict
 from avow.isolation.tracing import traces
 from fuzz.cpp_nodes import LIMITER
@@ -31,7 +33,7 @@ def lines(*texts: str) -> list[Line]:
     ],
 )
 def test_what_comes_in_unseen_is_undeclared(text: str) -> None:
-    assert unseen(lines(text), lines(text), "").undeclared.startswith("src/node.hpp:1")
+    assert unseen(lines(text), lines(text), []).undeclared.startswith("src/node.hpp:1")
 
 
 @pytest.mark.parametrize(
@@ -46,27 +48,38 @@ def test_what_comes_in_unseen_is_undeclared(text: str) -> None:
     ],
 )
 def test_what_changes_the_sanitizers_is_told(text: str) -> None:
-    found = unseen(lines("int g();", text), lines("int g();", text), "")
+    found = unseen(lines("int g();", text), lines("int g();", text), [])
     assert found.faults.startswith("src/node.hpp:2")
     assert not found.undeclared
 
 
 def test_another_program_with_sanitizers_is_told() -> None:
-    assert unseen(lines("int a;", "int b;"), lines("int a;", "int c;"), "").faults.startswith("src/node.hpp:2: built")
-    assert unseen(lines("int a;", "int b;"), lines("int a;"), "").faults.startswith("src/node.hpp:2: built")
+    assert unseen(lines("int a;", "int b;"), lines("int a;", "int c;"), []).faults.startswith("src/node.hpp:2: built")
+    assert unseen(lines("int a;", "int b;"), lines("int a;"), []).faults.startswith("src/node.hpp:2: built")
 
 
 @pytest.mark.parametrize("name", [*UNDECLARED, *CATCHING])
 def test_what_objects_ask_for_is_told(name: str) -> None:
-    found = unseen([], [], f"/usr/bin/ld: /tmp/a b/replay-0.o: reference to {name}\n")
+    found = unseen([], [], [name])
     assert bool(found.undeclared) is (name in UNDECLARED)
     assert bool(found.faults) is (name in CATCHING)
 
 
 def test_a_plain_source_has_nothing_unseen() -> None:
     text = lines('asm volatile("" ::: "memory");', 'say("asm(1) no_sanitize __asan_x");', "double asmx(double time);")
-    other = "/usr/bin/ld: /lib/libc.so.6: definition of time\n"
-    assert unseen(text, text, other) == unseen([], [], "")
+    assert unseen(text, text, ["timer", "my_time"]) == unseen([], [], [])
+
+
+def test_names_are_read_from_objects_and_from_nothing_else(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no ELF"):
+        list(undefined(b"!<arch>\n"))
+    if (compiler := shutil.which("gcc")) is None:
+        pytest.skip("gcc is not here")
+    (tmp_path / "a.c").write_text("extern int time(void*); int own(void) { return 1; } int f(void) { return time(0); }")
+    subprocess.run([compiler, "-ffunction-sections", "-c", "a.c"], cwd=tmp_path, check=True)
+    names = set(undefined((tmp_path / "a.o").read_bytes()))
+    assert "time" in names
+    assert not names & {"own", "f", "a.c"}
 
 
 def test_lines_of_the_system_and_generated_ones_are_left_out(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from drawn.memory import A, B, N, clause, formula
 from helpers import some
-from oracle.values import breaks, keeps
+from reference.meaning import breaks, keeps
 
 from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Job, Limits

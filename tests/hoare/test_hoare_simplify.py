@@ -17,24 +17,8 @@ from avow.backends.hoare.simplify import simplify
 from avow.base.verdict import Outcome, Verdict
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.values import Element, FunctionValue, Value
+from avow.language import terms as t
 from avow.language.sorts import INTEGER, REAL, EnumSort
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    And,
-    Arithmetic,
-    Compare,
-    Iff,
-    Implies,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 from avow.solving.questions import entails
 from hoare.systems import make_job
 
@@ -58,51 +42,57 @@ VALUATIONS = valuations()
 
 
 @st.composite
-def with_constants(draw: st.DrawFn) -> Term:
+def with_constants(draw: st.DrawFn) -> t.Term:
     """Formulas some of whose parts are constants, also below quantifiers of sorts of one value."""
-    inner = draw(st.one_of(finite_formulas(depth=2), st.sampled_from((TRUE, FALSE))))
-    other = draw(st.one_of(finite_formulas(depth=1), st.sampled_from((TRUE, FALSE))))
+    inner = draw(st.one_of(finite_formulas(depth=2), st.sampled_from((t.TRUE, t.FALSE))))
+    other = draw(st.one_of(finite_formulas(depth=1), st.sampled_from((t.TRUE, t.FALSE))))
     sort = draw(st.sampled_from((COLOUR, ONE)))
-    quantified = Quantified(draw(st.sampled_from(tuple(Quantifier))), (Variable(Role.BOUND, "z", sort),), inner)
-    kind = draw(st.sampled_from((And, Or, Implies, Iff)))
-    joined = kind((quantified, other)) if kind in (And, Or) else kind(quantified, other)
-    return Not(joined) if draw(st.booleans()) else joined
+    quantified = t.Quantified(draw(st.sampled_from(tuple(t.Quantifier))), (t.Variable(t.Role.BOUND, "z", sort),), inner)
+    kind = draw(st.sampled_from((t.And, t.Or, t.Implies, t.Iff)))
+    joined = kind((quantified, other)) if kind in (t.And, t.Or) else kind(quantified, other)
+    return t.Not(joined) if draw(st.booleans()) else joined
 
 
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.one_of(finite_formulas(), with_constants()))
-def test_simplified_formulas_mean_the_same(formula: Term) -> None:
+def test_simplified_formulas_mean_the_same(formula: t.Term) -> None:
     long, short = compile_term(formula), compile_term(simplify(formula))
     for values in VALUATIONS:
         assert long(values) is short(values), values
 
 
-A, B, X, Y = (Variable(Role.INPUT, n, s) for n, s in (("a", INTEGER), ("b", INTEGER), ("x", REAL), ("y", REAL)))
+A, B, X, Y = (t.Variable(t.Role.INPUT, n, s) for n, s in (("a", INTEGER), ("b", INTEGER), ("x", REAL), ("y", REAL)))
 
 
 @st.composite
-def numeric(draw: st.DrawFn, depth: int = 3) -> Term:
+def numeric(draw: st.DrawFn, depth: int = 3) -> t.Term:
     if depth and draw(st.booleans()):
-        kind = draw(st.sampled_from((And, Or, Implies, Iff, Not)))
+        kind = draw(st.sampled_from((t.And, t.Or, t.Implies, t.Iff, t.Not)))
         left, right = draw(numeric(depth=depth - 1)), draw(numeric(depth=depth - 1))
-        return Not(left) if kind is Not else kind((left, right)) if kind in (And, Or) else kind(left, right)  # type: ignore[operator]
+        return t.Not(left) if kind is t.Not else kind((left, right)) if kind in (t.And, t.Or) else kind(left, right)  # type: ignore[operator]
     if draw(st.integers(0, 9)) == 0:
-        return draw(st.sampled_from((TRUE, FALSE)))
+        return draw(st.sampled_from((t.TRUE, t.FALSE)))
     if draw(st.booleans()):
-        parts: list[Term] = [A, B, *(Literal(k, INTEGER) for k in (-1, 0, 2))]
+        parts: list[t.Term] = [A, B, *(t.Literal(k, INTEGER) for k in (-1, 0, 2))]
     else:
-        parts = [X, Y, *(Literal(k, REAL) for k in (0, 1)), Arithmetic("/", X, Y, REAL), Arithmetic("/", Y, X, REAL)]
+        parts = [
+            X,
+            Y,
+            *(t.Literal(k, REAL) for k in (0, 1)),
+            t.Arithmetic("/", X, Y, REAL),
+            t.Arithmetic("/", Y, X, REAL),
+        ]
     operator = draw(st.sampled_from(("==", "!=", "<", "<=", ">", ">=")))
-    return Compare(operator, draw(st.sampled_from(parts)), draw(st.sampled_from(parts)))
+    return t.Compare(operator, draw(st.sampled_from(parts)), draw(st.sampled_from(parts)))
 
 
 @pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(numeric())
-def test_also_with_numbers_and_divisions_by_anything(formula: Term) -> None:
+def test_also_with_numbers_and_divisions_by_anything(formula: t.Term) -> None:
     """Asked of the solver, for which a quotient by zero is some number."""
-    assert entails([], Iff(formula, simplify(formula)), effort=4000).verdict is not Verdict.REFUTED
+    assert entails([], t.Iff(formula, simplify(formula)), effort=4000).verdict is not Verdict.REFUTED
 
 
 CONTRACT = """
@@ -149,7 +139,9 @@ def test_constructors_are_injective_and_differ(text: str, short: str) -> None:
     assert simplify(simple) == wanted
 
 
-@pytest.mark.parametrize("wrong", [lambda _: TRUE, lambda _: FALSE, lambda term: getattr(term, "items", (term,))[0]])
+@pytest.mark.parametrize(
+    "wrong", [lambda _: t.TRUE, lambda _: t.FALSE, lambda term: getattr(term, "items", (term,))[0]]
+)
 def test_a_wrong_simplifier_is_an_error_and_no_proof(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: object
 ) -> None:

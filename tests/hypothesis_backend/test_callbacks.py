@@ -16,7 +16,7 @@ from avow.backends.hypothesis import tuning
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.evidence.record import CASE
 from avow.pipeline.evidence_keys import surroundings
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 TOOL = import_module("avow.backends.hypothesis").BACKEND
@@ -105,10 +105,6 @@ TRICKS = {
     "chance": ("# HERE", "import random; random.random()"),
     "its own end": ("# HERE", "import os; os._exit(0)"),
     "a thread": ("# HERE", "import threading; threading.Timer(60, print).start()"),
-    "its callers": ("# HERE", "import sys; self.level = self.level if sys._getframe().f_back else 'red'"),
-    "its callers by a library": ("# HERE", "import traceback; traceback.extract_stack()"),
-    "all objects": ("# HERE", "import gc; gc.get_objects()"),
-    "another's code": ("# HERE", "rospy.Publisher.publish.__code__"),
     "silence": ("self.said.publish(self.level)", "pass"),
     "always green": ('"red" if', '"green" if'),
 }

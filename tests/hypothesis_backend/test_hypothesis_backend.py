@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import json
-import os
-import subprocess
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -134,32 +128,16 @@ HOSTILE = {
     "no syntax": "def step(:",
     "breaks equality": "class S(str):\n    def __eq__(self, o): return True\n    __hash__ = str.__hash__\n"
     "def step(**inputs): return {'colour': S('purple'), 'done': set()}",
-    "patches the judge": "import sys, json, builtins\n"
-    "def step(**inputs):\n"
-    "    import avow.backends.hypothesis.judging as j\n"
-    "    j.Judged.holds = lambda *a: True\n"
-    "    builtins.bool = lambda *a: True\n"
-    "    json.dumps = lambda *a, **k: '[]'\n"
-    "    return {'colour': 'purple', 'done': set()}",
-    "answers by itself": "import os, sys\n"
-    "def step(**inputs):\n"
-    "    os.write(int(sys.argv[4]), b'[{\"value\": {}}]\\n' * 100)\n"
-    "    return {'colour': 'green', 'done': set()}",
-    "writes a result": "import json, glob, os\n"
-    "for name in glob.glob('*.json') + ['result.json', 'result.part']:\n"
-    "    open(name, 'w').write(json.dumps({'nonce': '', 'valid': 9, 'rejected': 0, 'undecided': 0, 'wanted': 9,\n"
-    "        'stopped': '', 'crash': None, 'guarantees': {}}))\n"
-    "def step(**inputs):\n    os._exit(3)",
 }
 
 
-QUICK = ("answers by itself", "leaves hard", "lies about types", "patches the judge")
+QUICK = ("lies about types", "leaves hard", "returns junk")
 """Some kinds; every subject costs a process or two."""
 
 
 @pytest.mark.parametrize(
     "name",
-    [*some(QUICK, 1, slow=3), *(pytest.param(n, marks=pytest.mark.nightly) for n in sorted({*HOSTILE} - {*QUICK}))],
+    [*some(QUICK, 1, slow=2), *(pytest.param(n, marks=pytest.mark.nightly) for n in sorted({*HOSTILE} - {*QUICK}))],
 )
 def test_nothing_that_a_subject_does_is_green(tmp_path: Path, name: str) -> None:
     found = settle(job(tmp_path, HOSTILE[name], cases=60), seconds=20)
@@ -384,42 +362,10 @@ def test_optional_arguments_and_keywords(tmp_path: Path) -> None:
     assert BACKEND.check(job(tmp_path / "b", "from x import step")) == ()
 
 
-# -- artifacts ---------------------------------------------------------------------------------------------------------
+# -- names and texts ---------------------------------------------------------------------------------------------------
 
 
-def test_export_is_pure_and_golden(tmp_path: Path) -> None:
-    wanted = job(tmp_path / "sensors")
-    made = BACKEND.export(wanted)
-    assert made == BACKEND.export(wanted)
-    assert sorted(made) == ["contract.json", "test_sensor.py"]
-    for name, text in made.items():
-        golden = GOLDEN / name.replace("test_sensor.py", "test_sensor.py.txt")
-        if os.environ.get("AVOW_REFRESH"):
-            golden.write_text(text)
-        assert text == golden.read_text(), f"{golden} differs: refresh it if the change is meant"
-
-
-@pytest.mark.nightly
-def test_the_export_runs_under_pytest(tmp_path: Path) -> None:
-    """The file stands by itself: each guarantee is a test, and a fault fails its test only."""
-    wanted = job(tmp_path / "contracts" / "sensors", STEP.replace("r < 120", "r < 130"), cases=60)
-    folder = tmp_path / "artifacts" / "sensors" / "sensor" / "hypothesis"
-    folder.mkdir(parents=True)
-    for name, text in BACKEND.export(wanted).items():
-        (folder / name).write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(folder), str(folder)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        check=False,
-    )
-    assert "1 failed, 3 passed" in done.stdout, done.stdout + done.stderr
-    assert "medium is broken: in.r = " in done.stdout
-
-
-HOSTILE_NAME = """
+STRANGE = """
 context {{ S : {{a, b}}; }}
 node n {{
   inputs( x' : STRING, class : S ) outputs( import : S ) topics( a/B c matches(in.class) )
@@ -433,25 +379,13 @@ NAMES = ("os", "os'", "exec", "exec'", "import_os", "_")
 TEXTS = ("'''", "{}{0}%s", "*/ -->", "); import os #", "ünïcode \U0001f916", "$(x) `y`")
 
 
-def named(texts: Sequence[str]) -> str:
-    """A contract with each of the texts in a condition of its own."""
-    return HOSTILE_NAME.format(
-        guarantees="".join(GUARANTEE.format(name=name, text=text) for name, text in zip(NAMES, texts, strict=True))
-    )
-
-
 @pytest.mark.slow
-def test_the_contracts_text_never_becomes_code(tmp_path: Path) -> None:
+def test_names_that_python_has_for_itself_and_strange_texts(tmp_path: Path) -> None:
+    guarantees = "".join(GUARANTEE.format(name=name, text=text) for name, text in zip(NAMES, TEXTS, strict=True))
     subject = "def step(**inputs):\n    return inputs['class']"
-    wanted = job(tmp_path, subject, named(TEXTS), "n", cases=120)
-    made = BACKEND.export(wanted)
-    plain = BACKEND.export(job(tmp_path / "plain", subject, named(["x"] * len(TEXTS)), "n", cases=120))
-    assert ast.dump(ast.parse(made["test_n.py"])) == ast.dump(ast.parse(plain["test_n.py"]))
-    assert not any(text in made["test_n.py"] for text in TEXTS)
-    found = settle(wanted)
+    found = settle(job(tmp_path, subject, STRANGE.format(guarantees=guarantees), "n", cases=120))
     assert len(found) == len(TEXTS)
     assert {o.verdict for o in found.values()} == {Verdict.TESTED}, found
-    assert json.loads(made["contract.json"])["node"] == "n"
 
 
 @pytest.mark.parametrize("depth", [100, 250, 3000])
@@ -462,30 +396,6 @@ def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
     except Rejected:
         return  # the language has its own limit
     assert found.verdict in {Verdict.TESTED, Verdict.UNKNOWN, Verdict.ERROR}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("old", "code"), some([("", 0), ("r < 250", 1)], 1))
-def test_what_was_exported_runs_as_its_command_is_printed(tmp_path: Path, old: str, code: int) -> None:
-    wanted = job(tmp_path, STEP.replace(old, "r <= 250") if old else STEP)
-    folder = tmp_path / "exported"
-    folder.mkdir()
-    for name, text in BACKEND.export(wanted).items():
-        (folder / name).write_text(text, encoding="utf-8")
-    command = run(wanted).command
-    assert command[1:] == ("-P", "test_sensor.py")
-    done = subprocess.run(
-        [sys.executable, *command[1:]],
-        cwd=folder,
-        env={**os.environ, "AVOW_SYSTEM_ROOT": str(wanted.root)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == code, done.stderr
-    assert done.stderr == ""
-    assert ("high is broken" in done.stdout) == bool(code)
-    assert "low: no case breaks it" in done.stdout
 
 
 def test_a_threshold_that_no_float_is_is_called_so() -> None:

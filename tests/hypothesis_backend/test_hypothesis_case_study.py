@@ -16,7 +16,7 @@ from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.conformance.seeded import settle as conformance_settle
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 SYSTEM = "contracts/remote_inspection"

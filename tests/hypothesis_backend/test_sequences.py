@@ -12,7 +12,7 @@ from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.conformance.seeded import settle
 from avow.evidence.record import RETRY
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 HEAD = "class Node:\n    def __init__(self, params):\n        self.n = 0\n        self.limit = params['limit']\n"

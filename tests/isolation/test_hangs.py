@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 
 from avow.base import process
 from avow.isolation.level import SANDBOX
-from avow.isolation.subject import SubjectFailed, SubjectProcess
 
 ASKED = """
 import sys
@@ -40,16 +38,3 @@ def test_what_hangs_left_nothing_behind_by_being_ended(tmp_path: Path, deed: str
     fault, silent = done.stdout.strip().split("|")
     assert told in fault, done
     assert silent == "True"
-
-
-@pytest.mark.slow
-def test_who_hangs_at_its_end_has_answered_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(SANDBOX, "off")
-    (tmp_path / "s.py").write_text(
-        "import threading, time\n"
-        "def step():\n    threading.Thread(target=time.sleep, args=(60,)).start()\n    return 1\n"
-    )
-    subject = SubjectProcess(tmp_path / "s.py", "step", 0.5)
-    with contextlib.suppress(SubjectFailed):  # of a slow machine
-        assert subject.ask({})
-    assert "does not answer" in subject.close()

@@ -28,19 +28,19 @@ def acting(solver: Apart, shell: str) -> None:
     process = subprocess.Popen(
         ["sh", "-c", shell], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
     )
-    solver._process._owner, solver._process._process = os.getpid(), process
+    solver._owner, solver._process = os.getpid(), process
 
 
 def test_it_answers_again_after_it_was_killed(solver: Apart) -> None:
     assert solver(NEVER, BUDGET) is Said.UNSAT
-    process = solver._process._process
+    process = solver._process
     assert process is not None
     process.kill()
     process.wait()
     assert solver(EVER, BUDGET) is Said.SAT
 
 
-@pytest.mark.parametrize("shell", ["kill -SEGV $$", "echo unsat", "echo '[\"unsat\"]'", 'echo \'["unsat", "0"]\''])
+@pytest.mark.parametrize("shell", ["kill -SEGV $$", "echo unsat", "echo '[\"unsat\"]'"])
 def test_a_crash_or_the_answer_to_another_question_is_unknown(solver: Apart, shell: str) -> None:
     acting(solver, f"read line; {shell}")
     assert solver(NEVER, BUDGET) is Said.UNKNOWN
@@ -48,8 +48,8 @@ def test_a_crash_or_the_answer_to_another_question_is_unknown(solver: Apart, she
 
 def test_a_fork_does_not_read_the_answers_of_the_process_that_it_is_a_fork_of(solver: Apart) -> None:
     acting(solver, "while read line; do echo unsat; done")
-    theirs = solver._process._process
-    solver._process._owner = -1
+    theirs = solver._process
+    solver._owner = -1
     assert solver(EVER, BUDGET) is Said.SAT
     assert theirs is not None
     assert theirs.poll() is None
@@ -60,7 +60,7 @@ def test_a_fork_does_not_read_the_answers_of_the_process_that_it_is_a_fork_of(so
 def test_one_that_hangs_is_ended(solver: Apart, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("avow.solving.apart.NET_MS", 100)
     acting(solver, "read line; sleep 60")
-    hanging = solver._process._process
+    hanging = solver._process
     assert solver(NEVER, BUDGET) is Said.LATE
     assert hanging is not None
     assert hanging.poll() is not None

@@ -39,6 +39,13 @@ def test_recheck(tmp_path: Path) -> None:
     report = tmp_path / "report.json"
     report.write_text(json.dumps({"kernel": {"certificates": {"requirement R": to_json(certificate)}}}))
     assert invoke(command, str(tmp_path / "system"), str(report)) == (code, told)
+    sample = {"name": "", "trials": 34, "failures": 0, "bound": "0.086", "confidence": "0.95"}
+    for bound, wanted in (("0.086", 0), ("0.085", 1)):
+        rate = {"bound": bound, "confidence": "0.95", "leaves": [{"claim": "a", "strata": [sample]}], "unrated": []}
+        whole = {"kernel": {"certificates": {"requirement R": to_json(certificate)}}, "requirements": [{"id": "R"}]}
+        whole["requirements"][0]["rate"] = rate
+        report.write_text(json.dumps(whole))
+        assert invoke(command, str(tmp_path / "system"), str(report))[0] == wanted
     make(tmp_path / "system", LOOP.replace("out.z == in.y + 1", "out.z == in.y + 2"), PLAN)
     code, told = invoke(command, str(tmp_path / "system"), str(kept))
     assert code == 1

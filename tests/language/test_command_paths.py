@@ -10,7 +10,6 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
 
 import avow.cli
 from avow.cli import COMMANDS, main
@@ -18,56 +17,20 @@ from avow.cli import COMMANDS, main
 GOOD = "node n { inputs( a : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> a > 0 ) }\n"
 
 
-def fifo(folder: Path) -> None:
-    os.mkfifo(folder / "odd.rcl")
-
-
-def broken(folder: Path) -> None:
-    (folder / "odd.rcl").symlink_to("nowhere")
-
-
-def loop(folder: Path) -> None:
-    (folder / "odd.rcl").symlink_to("odd.rcl")
-
-
-def folder_called_rcl(folder: Path) -> None:
-    (folder / "odd.rcl").mkdir()
-
-
-def large(folder: Path) -> None:
-    (folder / "odd.rcl").write_text(GOOD + "//" + "x" * 10_000_000)
-
-
-def long_line(folder: Path) -> None:
-    (folder / "odd.rcl").write_text(GOOD + "x" * 3_900_000)
-
-
-def binary(folder: Path) -> None:
-    (folder / "odd.rcl").write_bytes(b"node \xff\xfe")
-
-
-def nul(folder: Path) -> None:
-    (folder / "odd.rcl").write_text("node\0")
-
-
-def below_a_file(folder: Path) -> None:
-    (folder / "odd.rcl").symlink_to(folder / "good.rcl" / "x")
-
-
-def nothing(folder: Path) -> None:
-    pass
-
-
-ODD: tuple[Callable[[Path], None], ...] = (
-    *(fifo, broken, loop, folder_called_rcl, large, long_line, binary, nul, below_a_file, nothing),
-)
+ODD: dict[str, Callable[[Path], object]] = {
+    "a pipe": lambda folder: os.mkfifo(folder / "odd.rcl"),
+    "a broken link": lambda folder: (folder / "odd.rcl").symlink_to("nowhere"),
+    "a folder": lambda folder: (folder / "odd.rcl").mkdir(),
+    "large": lambda folder: (folder / "odd.rcl").write_text(GOOD + "//" + "x" * 10_000_000),
+    "binary": lambda folder: (folder / "odd.rcl").write_bytes(b"node \xff\xfe"),
+    "NUL": lambda folder: (folder / "odd.rcl").write_text("node\0"),
+    "nothing": lambda folder: None,
+}
 FORMS = {
     "check": ("check", "@"),
     "json": ("check", "--json", "@"),
-    "sarif": ("check", "--sarif", "@"),
     "fmt": ("fmt", "@"),
     "translate": ("translate", "--to", "text", "@"),
-    "rml": ("translate", "--to", "rml", "@"),
     "sanity": ("sanity", "@"),
     "compose": ("compose", "@"),
     "refines": ("refines", "@", "good.rcl"),
@@ -91,8 +54,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("odd", ODD)
-def test_odd_files(odd: Callable[[Path], None], form: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    odd(place)
+def test_odd_files(odd: str, form: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ODD[odd](place)
     code, said = run([a.replace("@", "odd.rcl") for a in FORMS[form]], capsys)
     assert code == 2, said
     assert said.strip()
@@ -100,7 +63,7 @@ def test_odd_files(odd: Callable[[Path], None], form: str, place: Path, capsys: 
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("path", ["", "/dev/null", "/dev/zero", "x" * 300 + ".rcl", "good.rcl/y.rcl", "a\nb %20é.rcl"])
+@pytest.mark.parametrize("path", ["", "/dev/null", "/dev/zero", "x" * 300 + ".rcl", "good.rcl/y.rcl"])
 def test_odd_paths(path: str, form: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, said = run([a.replace("@", path) if a == "@" else a for a in FORMS[form]], capsys)
     assert code == 2, said
@@ -134,44 +97,6 @@ def test_folders_without_contracts(place: Path, capsys: pytest.CaptureFixture[st
         code, said = run([a.replace("@", "empty") for a in FORMS[form]], capsys)
         assert code == 2, (form, said)
         assert "no" in said
-
-
-@pytest.mark.slow
-def test_a_file_name_that_is_no_text(place: Path) -> None:
-    """Python has lone surrogates for its bytes, which no JSON reader and no terminal takes."""
-    import json
-
-    name = os.fsdecode(b"\xffa.rcl")
-    try:
-        (place / name).write_text("node n {")
-    except OSError:
-        pytest.skip("this file system wants UTF-8 names")
-    for form in ("check", "json", "sarif", "fmt", "translate"):
-        arguments = [a.replace("@", name) for a in FORMS[form]]
-        done = subprocess.run(
-            [sys.executable, "-m", "avow", *arguments], capture_output=True, timeout=60, check=False, cwd=place
-        )
-        assert done.returncode == 2
-        assert b"Traceback" not in done.stderr
-        done.stdout.decode("utf-8")
-        if form in ("json", "sarif"):
-            assert "\\ud" not in json.dumps(json.loads(done.stdout))
-        if form == "sarif":
-            assert b'"uri": "%FFa.rcl"' in done.stdout
-
-
-def test_fmt_writes_through_a_link_and_refuses_bad_input(place: Path) -> None:
-    from avow.cli.fmt import command
-
-    (place / "link.rcl").symlink_to("good.rcl")
-    (place / "good.rcl").write_text("node n{inputs()outputs(b:BOOL)topics()G(b)}")
-    assert CliRunner().invoke(command, ["link.rcl"], standalone_mode=False).return_value == 0
-    assert (place / "link.rcl").is_symlink()
-    assert "guarantee( b )" in (place / "good.rcl").read_text()
-    for data in (b"\xff", b"", b"x" * 5_000_000, b"node n {\0"):
-        done = CliRunner().invoke(command, ["-"], input=data, standalone_mode=False)
-        assert done.exception is None
-        assert done.return_value == 2
 
 
 def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,6 @@ from avow.language.format import WIDTH, format_text
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_text
 from avow.language.source import Reports, Source
-from avow.language.syntax import Syntax
 
 BEFORE = """\
 // head
@@ -120,8 +119,8 @@ def test_a_text_with_syntax_errors_is_refused() -> None:
     assert "guarantee( q )" in format_text(badly_typed, "f")
 
 
-def _with(before: str, after: str) -> Callable[[Syntax], str]:
-    return lambda tree: flat(tree).replace(before, after)
+def _with(before: str, after: str) -> Callable[[Sequence[Token]], str]:
+    return lambda found: flat(found).replace(before, after)
 
 
 @pytest.mark.parametrize(
@@ -137,11 +136,11 @@ def _with(before: str, after: str) -> Callable[[Syntax], str]:
         _with("x", "y"),
         _with("in.f", "out.f"),
         _with("1.5", "1.50"),
-        lambda tree: "",
+        lambda found: "",
     ],
 )
 def test_a_layout_that_says_something_else_is_never_written(
-    printer: Callable[[Syntax], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    printer: Callable[[Sequence[Token]], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "f.rcl"
     file.write_text(BEFORE)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.base.persons import distance
+from avow.base.suggestions import distance
 from avow.language.lints import similar
 from avow.language.load import check_paths, check_text
 
@@ -49,7 +49,7 @@ def test_a_tidy_node_has_none() -> None:
         ("assume( b -> r > 1 -> k > 2 )", []),
         ("assume( b and b -> b )", ["RCL401"]),  # a tautology one way, `b` the other
         ("assume( b and TRUE -> b )", ["RCL401"]),
-        ("assume( not b or b -> TRUE )", ["RCL408"]),  # true either way
+        ("assume( not b or b -> TRUE )", ["RCL401", "RCL408"]),
         ("assume( forall(x in REAL | b and x > 1 -> k > 2) )", ["RCL401"]),
         ("assume( exists(x, y in REAL | x > r) )", ["RCL407"]),
         ("assume( s in {red, orange, green} )", ["RCL408"]),
@@ -60,9 +60,7 @@ def test_a_tidy_node_has_none() -> None:
         ("assume( out.t != red )", ["RCL416"]),
         ("assume( b -> out.t == s )", ["RCL416"]),
         ("assume( r >= 0 )", []),
-        ("assume( s == red or s == orange or s == green )", ["RCL408"]),
         ("assume( s == red or s == orange )", []),
-        ("assume( b == TRUE or b == FALSE )", ["RCL408"]),
         ("assume( TRUE )", []),
     ],
 )
@@ -141,8 +139,3 @@ def test_errors_cannot_be_switched_off() -> None:
     contract, found = check_text(text, "f", off=frozenset({"RCL201"}))
     assert contract is None
     assert {d.code for d in found} == {"RCL201", "RCL410"}
-
-
-def test_many_letters_are_sampled() -> None:
-    long = " and ".join(f"r > {i}" for i in range(40))
-    assert codes(NODE.format(f"assume( {long} -> b )")) == ["RCL401"]

@@ -8,42 +8,11 @@ import pytest
 from drawn.contracts import CONTRACT
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.contract import Contract, Node
 from avow.language.load import check_paths, check_text, load_contract, parse_formula, parse_term
 from avow.language.printer import show_term
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    REAL,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SetTerm,
-    Term,
-    Variable,
-    Widen,
-)
 
 
 def load(text: str) -> Contract:
@@ -64,7 +33,7 @@ def node(contract: Contract) -> Node:
 
 @pytest.fixture(scope="module")
 def read(contract: Contract, node: Node):  # type: ignore[no-untyped-def]
-    def parse(text: str) -> Term:
+    def parse(text: str) -> t.Term:
         return parse_formula(text, node, contract)
 
     return parse
@@ -76,69 +45,69 @@ def test_the_case_study_loads(root: Path, system: str) -> None:
     assert [n.name for n in contract.nodes if n.name == "agent"] == ["agent"]
     assert len(contract.nodes) == 4
     commands = dict(contract.types)["CommandSet"]
-    assert isinstance(commands, DataSort)
+    assert isinstance(commands, s.DataSort)
     assert [c.name for c in commands.constructors] == ["move", "inspect"]
-    assert dict(contract.types)["SensorsType"] == OpaqueSort("SensorsType")
+    assert dict(contract.types)["SensorsType"] == s.OpaqueSort("SensorsType")
 
 
 def test_precedence_of_the_published_sensor(root: Path) -> None:
     """`->` binds looser than `and`: the guarantee is a chain of implications, not a conjunction of them."""
     contract = load_contract([root / "contracts" / "remote_inspection_published" / "system.rcl"])
     formula = contract.node("radiationSensor").guarantees[0].formula
-    assert isinstance(formula, Quantified)
-    assert isinstance(formula.body, Implies)
+    assert isinstance(formula, t.Quantified)
+    assert isinstance(formula.body, t.Implies)
     inner = formula.body.right
-    assert isinstance(inner, Implies)
-    assert isinstance(inner.left, And)
-    assert isinstance(inner.right, Implies)
-    assert isinstance(inner.right.right, Implies)
+    assert isinstance(inner, t.Implies)
+    assert isinstance(inner.left, t.And)
+    assert isinstance(inner.right, t.Implies)
+    assert isinstance(inner.right.right, t.Implies)
 
 
 def test_precedence(read) -> None:  # type: ignore[no-untyped-def]
     loosest_first = [
-        ("b <=> b -> b or b and not b", Iff),
-        ("b -> b or b and not b", Implies),
-        ("b or b and not b", Or),
-        ("b and not b", And),
-        ("not b == b", Not),
+        ("b <=> b -> b or b and not b", t.Iff),
+        ("b -> b or b and not b", t.Implies),
+        ("b or b and not b", t.Or),
+        ("b and not b", t.And),
+        ("not b == b", t.Not),
     ]
     for text, kind in loosest_first:
         assert isinstance(read(text), kind), text
     chain = read("b -> b2 -> b")
-    assert isinstance(chain, Implies)
-    assert isinstance(chain.right, Implies)
+    assert isinstance(chain, t.Implies)
+    assert isinstance(chain.right, t.Implies)
     left = read("b <=> b2 <=> b")
-    assert isinstance(left, Iff)
-    assert isinstance(left.left, Iff)
+    assert isinstance(left, t.Iff)
+    assert isinstance(left.left, t.Iff)
     assert read("r - r - r > 0") == read("(r - r) - r > 0") != read("r - (r - r) > 0")
     assert read("r - r * r > 0") == read("r - (r * r) > 0")
 
 
 def test_widening_is_explicit(read) -> None:  # type: ignore[no-untyped-def]
     less = read("in.r < in.i")
-    assert isinstance(less, Compare)
-    assert less.right == Widen(Variable(Role.INPUT, "i", INTEGER), REAL)
-    assert read("in.r < 120").right == Literal(120, REAL)
-    assert read("in.i < in.k").right == Variable(Role.INPUT, "k", NATURAL)
-    assert read("in.k - 1 == in.i").left.sort == INTEGER
-    assert read("in.k + 1 == in.i").left.sort == NATURAL
+    assert isinstance(less, t.Compare)
+    assert less.right == t.Widen(t.Variable(t.Role.INPUT, "i", s.INTEGER), s.REAL)
+    assert read("in.r < 120").right == t.Literal(120, s.REAL)
+    assert read("in.i < in.k").right == t.Variable(t.Role.INPUT, "k", s.NATURAL)
+    assert read("in.k - 1 == in.i").left.sort == s.INTEGER
+    assert read("in.k + 1 == in.i").left.sort == s.NATURAL
     division = read("in.k / 2 == in.r").left
-    assert isinstance(division, Arithmetic)
-    assert division.sort == REAL
-    assert division.left == Widen(Variable(Role.INPUT, "k", NATURAL), REAL)
+    assert isinstance(division, t.Arithmetic)
+    assert division.sort == s.REAL
+    assert division.left == t.Widen(t.Variable(t.Role.INPUT, "k", s.NATURAL), s.REAL)
 
 
 def test_chains(read) -> None:  # type: ignore[no-untyped-def]
     chain = read("0 <= r < 120")
-    assert isinstance(chain, And)
+    assert isinstance(chain, t.And)
     assert chain == read("0 <= r and r < 120")
     assert chain != read("0 <= r and r <= 120")
 
 
 def test_names_and_roles(read, node: Node) -> None:  # type: ignore[no-untyped-def]
-    assert read("b") == Variable(Role.INPUT, "b", BOOL)
-    assert read("b2") == Variable(Role.OUTPUT, "b2", BOOL)
-    assert read("in.o == out.o") == Compare("==", node.input("o").variable, node.output("o").variable)
+    assert read("b") == t.Variable(t.Role.INPUT, "b", s.BOOL)
+    assert read("b2") == t.Variable(t.Role.OUTPUT, "b2", s.BOOL)
+    assert read("in.o == out.o") == t.Compare("==", node.input("o").variable, node.output("o").variable)
     with pytest.raises(Rejected, match=r"both an input and an output.*RCL202"):
         read("o == in.o")
 
@@ -151,43 +120,43 @@ def test_constants_are_expanded(read) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_membership(read) -> None:  # type: ignore[no-untyped-def]
-    assert read("st !in {red}") == Not(read("st in {red}")) == read("not st in {red}")
+    assert read("st !in {red}") == t.Not(read("st in {red}")) == read("not st in {red}")
     inside = read("in.i in {1, 2.5}")
-    assert isinstance(inside, In)
-    assert isinstance(inside.item, Widen)
-    assert isinstance(inside.collection, SetTerm)
-    assert inside.collection.items == (Literal(1, REAL), read("r == 2.5").right)
-    assert read("in.k in {}") == In(Variable(Role.INPUT, "k", NATURAL), read("in.k in {}").collection)
+    assert isinstance(inside, t.In)
+    assert isinstance(inside.item, t.Widen)
+    assert isinstance(inside.collection, t.SetTerm)
+    assert inside.collection.items == (t.Literal(1, s.REAL), read("r == 2.5").right)
+    assert read("in.k in {}") == t.In(t.Variable(t.Role.INPUT, "k", s.NATURAL), read("in.k in {}").collection)
 
 
 def test_domains_become_guards(read) -> None:  # type: ignore[no-untyped-def]
     assert read("forall(v in {1, 2} | v < r)") == read("forall(v in NATURAL | v in {1, 2} -> v < r)")
     assert read("exists(v in Q | st == v)") == read("exists(v in RadStat | v in {red, green} and st == v)")
     unique = read("exists_unique(v in ns, u in REAL | v < u)")
-    assert isinstance(unique, Quantified)
-    assert unique.quantifier is Quantifier.UNIQUE
+    assert isinstance(unique, t.Quantified)
+    assert unique.quantifier is t.Quantifier.UNIQUE
     assert [v.name for v in unique.variables] == ["v", "u"]
-    assert isinstance(unique.body, And)
+    assert isinstance(unique.body, t.And)
     assert read("forall(v in W | w == v)").body == read("exists(v in W | w == v)").body
     later = read("forall(i' in NATURAL, j in <0 upto i'> | j <= i')")
-    assert isinstance(later.body, Implies)
+    assert isinstance(later.body, t.Implies)
     assert read("forall(v in REAL ; v < r)") == read("forall(v in REAL | v < r)")
 
 
 def test_sequences_and_tuples(read) -> None:  # type: ignore[no-untyped-def]
-    assert isinstance(read("sq(0) < r").left, Index)
-    assert read("length(sq) == 0").left.sort == NATURAL
+    assert isinstance(read("sq(0) < r").left, t.Index)
+    assert read("length(sq) == 0").left.sort == s.NATURAL
     assert read("r < sq(0)") == read("r<sq(0)")
-    assert read("<1, 2> == sq").left.sort == SequenceSort(REAL)
-    assert read("sq == <>").right.sort == SequenceSort(REAL)
-    assert read("k in <1 upto 5>").collection.sort == SequenceSort(NATURAL)
-    assert read("p == (1, 2)").right.sort == TupleSort((REAL, NATURAL))
+    assert read("<1, 2> == sq").left.sort == s.SequenceSort(s.REAL)
+    assert read("sq == <>").right.sort == s.SequenceSort(s.REAL)
+    assert read("k in <1 upto 5>").collection.sort == s.SequenceSort(s.NATURAL)
+    assert read("p == (1, 2)").right.sort == s.TupleSort((s.REAL, s.NATURAL))
     assert read("<r, 1> == sq") == read("< r , 1 > == sq")
 
 
 def test_items_come_to_one_sort(read) -> None:  # type: ignore[no-untyped-def]
     mixed = read("(r, 1) in {(1, 1), (1.5, 1), (1, 2.5)}")
-    assert {i.sort for i in mixed.collection.items} == {TupleSort((REAL, REAL))}
+    assert {i.sort for i in mixed.collection.items} == {s.TupleSort((s.REAL, s.REAL))}
     with pytest.raises(Rejected, match="RCL302"):
         read("in.k in {" + ", ".join(map(str, range(3000))) + ', "a"}')
 
@@ -200,18 +169,18 @@ def test_every_form_of_type() -> None:
         "topics(geometry_msgs/msg/Pose at matches(in.at), uint8 c matches(c)) G( x != stop ) }"
     )
     types = dict(contract.types)
-    kind = EnumSort("Kind", ("a", "b"))
-    assert types["Fn"] == FunctionSort((REAL, NATURAL), TupleSort((REAL, REAL)))
-    assert types["Se"] == SequenceSort(TupleSort((REAL, REAL)))
+    kind = s.EnumSort("Kind", ("a", "b"))
+    assert types["Fn"] == s.FunctionSort((s.REAL, s.NATURAL), s.TupleSort((s.REAL, s.REAL)))
+    assert types["Se"] == s.SequenceSort(s.TupleSort((s.REAL, s.REAL)))
     assert types["Alias"] == kind
-    assert types["Prod"] == TupleSort((REAL, REAL))
+    assert types["Prod"] == s.TupleSort((s.REAL, s.REAL))
     node = contract.node("x")
     assert node.input("at").type_name == "REAL x REAL --> BOOL"
-    assert node.input("c").sort == EnumSort("c", ("p", "q"))
+    assert node.input("c").sort == s.EnumSort("c", ("p", "q"))
     assert node.topics[0].ros_type == "geometry_msgs/msg/Pose"
     assert node.guarantees[0].name == "G1"
-    assert isinstance(node.guarantees[0].formula, Compare)
-    assert isinstance(node.guarantees[0].formula.right, Construct)
+    assert isinstance(node.guarantees[0].formula, t.Compare)
+    assert isinstance(node.guarantees[0].formula.right, t.Construct)
 
 
 def test_a_set_written_twice_is_one_type() -> None:
@@ -219,13 +188,15 @@ def test_a_set_written_twice_is_one_type() -> None:
         "context { Cmd : {go, stop}; } node a { inputs() outputs(c : {go, stop}) topics() G(c == go) }"
         "node b { inputs(c : Cmd) outputs(b : BOOL) topics() G(b) }"
     )
-    assert contract.node("a").output("c").sort == contract.node("b").input("c").sort == EnumSort("Cmd", ("go", "stop"))
+    assert (
+        contract.node("a").output("c").sort == contract.node("b").input("c").sort == s.EnumSort("Cmd", ("go", "stop"))
+    )
 
 
 def test_names_for_inline_sets_are_free() -> None:
     contract = load("context { c : {z}; } node a { inputs() outputs(c : {go, stop}) topics() G(out.c == go) }")
     sort = contract.node("a").output("c").sort
-    assert isinstance(sort, EnumSort)
+    assert isinstance(sort, s.EnumSort)
     assert sort.name == "c2"
 
 
@@ -293,19 +264,19 @@ def test_byte_order_mark_and_line_ends(tmp_path: Path) -> None:
 
 
 def test_formulas_over_the_whole_system(contract: Contract) -> None:
-    term = parse_formula("n.b -> n.st2 == red and x < 2", None, contract, extra={"x": REAL})
-    assert isinstance(term, Implies)
-    assert term.left == Variable(Role.INPUT, "n.b", BOOL)
-    assert isinstance(term.right, And)
-    assert term.right.items[1].left == Variable(Role.BOUND, "x", REAL)  # type: ignore[union-attr]
+    term = parse_formula("n.b -> n.st2 == red and x < 2", None, contract, extra={"x": s.REAL})
+    assert isinstance(term, t.Implies)
+    assert term.left == t.Variable(t.Role.INPUT, "n.b", s.BOOL)
+    assert isinstance(term.right, t.And)
+    assert term.right.items[1].left == t.Variable(t.Role.BOUND, "x", s.REAL)  # type: ignore[union-attr]
     assert parse_formula("n.in.o == n.out.o", None, contract)
-    assert parse_formula(show_term(term, "rcl"), None, contract, extra={"x": REAL}) == term
+    assert parse_formula(show_term(term, "rcl"), None, contract, extra={"x": s.REAL}) == term
 
 
 def test_roles_narrow_bare_names(contract: Contract, node: Node) -> None:
-    only_out = frozenset((Role.OUTPUT,))
+    only_out = frozenset((t.Role.OUTPUT,))
     term = parse_formula("o == o", node, contract, roles=only_out)
-    assert isinstance(term, Compare)
+    assert isinstance(term, t.Compare)
     assert term.left == node.output("o").variable
     with pytest.raises(Rejected, match="RCL20"):
         parse_formula("b", node, contract, roles=only_out)
@@ -314,12 +285,12 @@ def test_roles_narrow_bare_names(contract: Contract, node: Node) -> None:
 
 
 def test_terms(contract: Contract, node: Node) -> None:
-    assert parse_term("red", node, contract) == EnumValue("red", EnumSort("RadStat", ("red", "orange", "green")))
+    assert parse_term("red", node, contract) == t.EnumValue("red", s.EnumSort("RadStat", ("red", "orange", "green")))
     assert parse_term("move(0, 1.5)", None, contract).sort == dict(contract.types)["Cmd"]
-    assert parse_term("3", None, contract, sort=REAL) == Literal(3, REAL)
-    assert parse_term("-3") == Literal(-3, INTEGER)
+    assert parse_term("3", None, contract, sort=s.REAL) == t.Literal(3, s.REAL)
+    assert parse_term("-3") == t.Literal(-3, s.INTEGER)
     with pytest.raises(Rejected, match="must be of type NATURAL"):
-        parse_term("-3", None, contract, sort=NATURAL)
+        parse_term("-3", None, contract, sort=s.NATURAL)
 
 
 def test_formula_errors_are_placed_in_the_plan(contract: Contract, node: Node) -> None:

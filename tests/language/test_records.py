@@ -100,7 +100,7 @@ def test_the_layout_and_the_contract_read_back() -> None:
     assert again is not None, faults
     assert again.nodes == contract.nodes
     laid = format_text(f"context {{ P : [ x,y:REAL , q : [ a:BOOL ] ]; }} node n {{ {PORTS} {text} }}", "n.rcl")
-    assert "P : [x : REAL, y : REAL, q : [a : BOOL]];" in laid
+    assert "P : [x, y : REAL, q : [a : BOOL]];" in laid
     assert format_text(laid, "n.rcl") == laid
 
 

@@ -138,7 +138,7 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     assert "HOARE410 (other numbers): " in invoke("check", "--explain", str(tmp_path))[1]
     assert "the sentence says “below 3”, the formula `n.in.r > 3`" in output
     (tmp_path / "plan.yaml").write_text(plan + requirement + "lints_off: [RCL413]\n")
-    assert "below 3" not in invoke("check", str(tmp_path))[1]
+    assert "the sentence says" not in invoke("check", str(tmp_path))[1]
 
 
 def test_fmt(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_smtlib_is_accepted_by_z3(root: Path) -> None:
     from avow.solving.smtlib import to_smtlib
 
     for contract in contracts(root)[2:]:
-        for script in to_smtlib(contract).split("(reset)"):
+        for script in to_smtlib(contract).text.split("(reset)"):
             assert len(z3.parse_smt2_string(script)) > 0
 
 
@@ -105,7 +105,7 @@ def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
     for contract in contracts(root)[2:]:
         solver = cvc5.Solver(cvc5.TermManager())
         parser = cvc5.InputParser(solver)
-        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, to_smtlib(contract), "contract")
+        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, to_smtlib(contract).text, "contract")
         count = 0
         while not (command := parser.nextCommand()).isNull():
             count += 1

@@ -8,7 +8,8 @@ import pytest
 from drawn.contracts import FUNCTION_OUTPUT, INPUTS, OUTPUTS, finite_formulas
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from oracle.values import Step, domain, holds, plain, situations
+from oracle.domains import domain, plain, situations
+from reference.meaning import Step, holds
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import digest, free_variables, normalise

@@ -8,7 +8,7 @@ from itertools import combinations, product
 
 import pytest
 from helpers import some
-from oracle.values import holds
+from reference.meaning import holds
 
 from avow.base.verdict import Verdict
 from avow.formulas.values import Value

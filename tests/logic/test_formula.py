@@ -18,23 +18,8 @@ from avow.formulas.formula import (
 )
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.traversal import depth
+from avow.language import terms as t
 from avow.language.sorts import BOOL, REAL, EnumSort, FunctionSort
-from avow.language.terms import (
-    TRUE,
-    And,
-    Apply,
-    Compare,
-    EnumValue,
-    Implies,
-    Literal,
-    Not,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 
 from .contracts import contract, formula, node
 
@@ -110,29 +95,29 @@ def test_types_count_by_definition() -> None:
 
 
 def test_substitution_does_not_capture() -> None:
-    x, y = Variable(Role.BOUND, "x", REAL), Variable(Role.BOUND, "y", REAL)
-    r = Variable(Role.INPUT, "r", REAL)
-    at = Variable(Role.INPUT, "at", FunctionSort((REAL, REAL), BOOL))
-    term = Quantified(Quantifier.FORALL, (x,), Apply(at, (x, r), BOOL))
+    x, y = t.Variable(t.Role.BOUND, "x", REAL), t.Variable(t.Role.BOUND, "y", REAL)
+    r = t.Variable(t.Role.INPUT, "r", REAL)
+    at = t.Variable(t.Role.INPUT, "at", FunctionSort((REAL, REAL), BOOL))
+    term = t.Quantified(t.Quantifier.FORALL, (x,), t.Apply(at, (x, r), BOOL))
     replaced = substitute(term, {r: x})
     assert free_variables(replaced) == {at, x}
-    assert digest(replaced) == digest(Quantified(Quantifier.FORALL, (y,), Apply(at, (y, x), BOOL)))
+    assert digest(replaced) == digest(t.Quantified(t.Quantifier.FORALL, (y,), t.Apply(at, (y, x), BOOL)))
     # a bound variable is not a free one of the same name
     assert substitute(term, {x: r}) == term
 
 
 def test_substitution_is_simultaneous() -> None:
-    a, b = Variable(Role.INPUT, "a", REAL), Variable(Role.INPUT, "b", REAL)
-    assert substitute(Compare("<", a, b), {a: b, b: a}) == Compare("<", b, a)
+    a, b = t.Variable(t.Role.INPUT, "a", REAL), t.Variable(t.Role.INPUT, "b", REAL)
+    assert substitute(t.Compare("<", a, b), {a: b, b: a}) == t.Compare("<", b, a)
 
 
 def test_junctions_of_constants() -> None:
-    b = Variable(Role.INPUT, "b", BOOL)
-    assert conjunction([]) == TRUE
-    assert conjunction([TRUE, b]) == b
-    assert conjunction([b, Not(TRUE)]) == And((b, Not(TRUE)))
-    assert disjunction([TRUE, b]) == TRUE
-    assert normalise(Or((b, Not(Not(b))))) == b
+    b = t.Variable(t.Role.INPUT, "b", BOOL)
+    assert conjunction([]) == t.TRUE
+    assert conjunction([t.TRUE, b]) == b
+    assert conjunction([b, t.Not(t.TRUE)]) == t.And((b, t.Not(t.TRUE)))
+    assert disjunction([t.TRUE, b]) == t.TRUE
+    assert normalise(t.Or((b, t.Not(t.Not(b))))) == b
 
 
 def test_negations_are_pushed_to_the_atoms() -> None:
@@ -140,11 +125,11 @@ def test_negations_are_pushed_to_the_atoms() -> None:
     assert digest(pushed) == digest(formula("in.b and exists(x in REAL | not in.r < x)", NODE))
 
 
-def nested(levels: int) -> Term:
-    r = Variable(Role.INPUT, "r", REAL)
-    term: Term = Compare("<", r, Literal(Fraction(1), REAL))
+def nested(levels: int) -> t.Term:
+    r = t.Variable(t.Role.INPUT, "r", REAL)
+    term: t.Term = t.Compare("<", r, t.Literal(Fraction(1), REAL))
     for k in range(levels):
-        term = Not(And((term, Implies(term if k < 3 else TRUE, Not(TRUE)))))
+        term = t.Not(t.And((term, t.Implies(term if k < 3 else t.TRUE, t.Not(t.TRUE)))))
     return term
 
 
@@ -153,9 +138,9 @@ def test_depth_is_no_obstacle() -> None:
     term = nested(4_000)
     assert depth(term) > 4_000
     assert len(digest(term)) == 64
-    r = Variable(Role.INPUT, "r", REAL)
+    r = t.Variable(t.Role.INPUT, "r", REAL)
     assert free_variables(term) == {r}
-    assert digest(substitute(term, {r: Literal(Fraction(2), REAL)})) != digest(term)
+    assert digest(substitute(term, {r: t.Literal(Fraction(2), REAL)})) != digest(term)
     push_negations(term)
 
 
@@ -163,5 +148,5 @@ def test_hostile_names_do_not_collide() -> None:
     # An encoding without lengths would read these two the same way.
     one, other = EnumSort("T", ("a", "b")), EnumSort("T", ("ab",))
     assert sort_digest(one) != sort_digest(other)
-    assert digest(Literal("1", one)) != digest(Literal(1, one))
-    assert digest(EnumValue("a", one)) != digest(EnumValue("b", one))
+    assert digest(t.Literal("1", one)) != digest(t.Literal(1, one))
+    assert digest(t.EnumValue("a", one)) != digest(t.EnumValue("b", one))

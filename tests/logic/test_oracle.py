@@ -14,7 +14,6 @@ from functools import cache
 import pytest
 from drawn.contracts import small_contract
 from oracle.sanity import Survey, is_small, judge
-from oracle.values import Meaning
 
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
@@ -128,7 +127,7 @@ def test_the_facts_of_a_contract_that_is_bad_in_every_way() -> None:
         "| assume limit_n ( n <= 1 ) assume TRUISM ( n >= 0 ) assume ( n <= 2 ) assume ONLY ( n == 0 )"
         " guarantee DEMAND ( in.i -> out.o ) guarantee NEVER ( n == 1 -> out.o ) guarantee DENIAL ( not out.o )"
     )
-    facts = Survey(bad, Meaning()).facts()
+    facts = Survey(bad).facts()
     assert {name for name, fact in facts.items() if not fact.holds} == {
         *("realizable", "not-tautological-NEVER", "not-vacuous-NEVER", "not-redundant-NEVER", "constrained-free"),
         *("determined-free", "not-tautological-TRUISM", "not-redundant-TRUISM", "needed-TRUISM"),

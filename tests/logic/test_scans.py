@@ -11,29 +11,17 @@ from typing import Any
 
 import pytest
 from helpers import some
-from oracle.values import holds
+from reference.meaning import holds
 
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import SequenceValue
+from avow.language import terms as t
 from avow.language.contract import Node
 from avow.language.load import parse_formula
 from avow.language.printer import show_term
 from avow.language.sorts import NATURAL, REAL
-from avow.language.terms import (
-    And,
-    Arithmetic,
-    Compare,
-    Implies,
-    Index,
-    Length,
-    Literal,
-    Quantified,
-    Role,
-    Term,
-    Variable,
-)
 from avow.sanity import witness_candidates, witness_search
 from avow.sanity.extremes import Extreme, bounded, measures
 from avow.sanity.realizability import realizable
@@ -168,9 +156,9 @@ def test_the_best_position_exists_and_is_one(seed: int) -> None:
     rng = random.Random(seed)
     last, greatest = rng.random() < 0.5, rng.random() < 0.5
     s, i, c = node("inputs( s : <REAL> ) outputs( b : BOOL ) | guarantee( b )").inputs[0].variable, POSITION, CONSTANT
-    element = Index(s, i, REAL)
-    near = Compare(rng.choice(("<", "==")), element, Literal(Fraction(rng.randrange(3)), REAL))
-    guard = And((Compare("<", i, Length(s, NATURAL)), *rng.choice(((), (near,)))))
+    element = t.Index(s, i, REAL)
+    near = t.Compare(rng.choice(("<", "==")), element, t.Literal(Fraction(rng.randrange(3)), REAL))
+    guard = t.And((t.Compare("<", i, t.Length(s, NATURAL)), *rng.choice(((), (near,)))))
     choice = Extreme(c, i, guard, element, greatest, last)
     meets = compile_term(choice.axiom())
     for scan in SCANS:
@@ -180,14 +168,14 @@ def test_the_best_position_exists_and_is_one(seed: int) -> None:
         assert good == (best[:1] if places else list(range(len(scan.items))))
 
 
-POSITION, CONSTANT = Variable(Role.BOUND, "i", NATURAL), Variable(Role.BOUND, "c", NATURAL)
+POSITION, CONSTANT = t.Variable(t.Role.BOUND, "i", NATURAL), t.Variable(t.Role.BOUND, "c", NATURAL)
 
 
-def inside(text: str, sort: str = "NATURAL") -> tuple[Variable, Term]:
+def inside(text: str, sort: str = "NATURAL") -> tuple[t.Variable, t.Term]:
     """The position i, and what is said of it."""
     ports = node("inputs( s : <REAL>, k : NATURAL, t : REAL ) outputs( m : REAL, at : NATURAL ) | guarantee( TRUE )")
     whole = parse_formula(f"exists(i in {sort}, j in NATURAL | {text})", ports)
-    assert isinstance(whole, Quantified)
+    assert isinstance(whole, t.Quantified)
     return whole.variables[0], whole.body
 
 
@@ -245,26 +233,26 @@ def test_of_all_whole_numbers_below_one_none_is_the_least() -> None:
 )
 def test_a_demand_suggests_what_decides_it(demand: str, found: list[tuple[str, bool, bool]]) -> None:
     position, said = inside(demand)
-    outputs = frozenset(v for v in free_variables(said) if v.role is Role.OUTPUT)
+    outputs = frozenset(v for v in free_variables(said) if v.role is t.Role.OUTPUT)
     suggested = measures(position, said, outputs)
     assert [(show_term(term, "rcl"), greatest, last) for term, greatest, last in suggested] == found
 
 
 def test_an_endless_guard_has_no_best() -> None:
     """Of the numbers above 3 none is the greatest."""
-    above = Compare(">", POSITION, Literal(3, NATURAL))
+    above = t.Compare(">", POSITION, t.Literal(3, NATURAL))
     assert not bounded(POSITION, above)
-    assert not bounded(POSITION, Compare("<", POSITION, Arithmetic("+", POSITION, Literal(1, NATURAL), NATURAL)))
+    assert not bounded(POSITION, t.Compare("<", POSITION, t.Arithmetic("+", POSITION, t.Literal(1, NATURAL), NATURAL)))
     endless = Extreme(CONSTANT, POSITION, above, POSITION, True, False)
     assert not endless.exists(frozenset())
 
 
 def test_a_constant_is_chosen_once() -> None:
-    bound = Compare("<", POSITION, Literal(3, NATURAL))
+    bound = t.Compare("<", POSITION, t.Literal(3, NATURAL))
     choice = Extreme(CONSTANT, POSITION, bound, POSITION, True, False)
     assert choice.exists(frozenset())
     assert not choice.exists({CONSTANT})
-    assert not replace(choice, guard=And((bound, Compare("<", CONSTANT, POSITION)))).exists(frozenset())
+    assert not replace(choice, guard=t.And((bound, t.Compare("<", CONSTANT, POSITION)))).exists(frozenset())
 
 
 def test_another_axiom_than_that_of_the_choice_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -272,9 +260,9 @@ def test_another_axiom_than_that_of_the_choice_proves_nothing(monkeypatch: pytes
     honest = Extreme.axiom
     about = scan("TRUE", LEAST)
 
-    def bold(self: Extreme) -> Term:
+    def bold(self: Extreme) -> t.Term:
         whole = honest(self)
-        assert isinstance(whole, Implies)
+        assert isinstance(whole, t.Implies)
         return whole.right
 
     found = witness_candidates.candidates

@@ -1,14 +1,13 @@
-"""The brute force that tests hold Avow against: meanings by the book, on finite domains, by trying everything.
+"""The brute force that tests hold Avow against: what follows from `reference.meaning`, by trying everything.
 
-- `values`: typed terms at one step, and over runs of steps (clauses with memory, responses);
-- `seconds`: the same over timed words, where limits are in seconds;
+- `domains`: some values of each type, and Avow's own values as the reference has them;
 - `stepping`: clauses with memory a step at a time, so that all runs of a system can be walked through;
 - `runs`: all runs of one node, and the game that it plays against its inputs;
 - `sanity`: what the sanity verdicts about a small contract have to be;
 - `rml`: RML as a monitor executes it, read by a grammar of its own;
 - `rosmonitoring`: what ROSMonitoring takes as a configuration.
 
-The first five read terms and contracts, and use none of Avow's evaluation, compilation to cells or solving.
+The first four use none of Avow's evaluation, compilation to cells or solving.
 
 Apart from it and from `drawn`, on purpose, stand
 
@@ -17,8 +16,7 @@ Apart from it and from `drawn`, on purpose, stand
   sequences within a scenario's domains, so with formulas of its own), `temporal.test_systems` and `test_timed_systems`
   (two nodes whose clauses have memory), `adversarial.drawn` (all that a system may have, and edits of it);
 - oracles whose subject is no typed term: `differential.oracle` (what was written, before Avow's parser saw it, and
-  programs that run), FRET's intervals in
-  `fretish.test_meaning`;
+  programs that run), FRET's intervals in `fretish.test_meaning`;
 - generators of terms that no text of a contract would be: those of `evaluate.test_against_z3` and
   `logic.test_one_point`.
 """

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
+from avow.backends.rosmonitoring.numbers import NotANumber, exact
 from oracle.rml_reader import Declared, Parsed, number, read
 
 Binding = dict[str, Any]
@@ -71,7 +71,7 @@ class Interpreter:
                 return self._next(_Closure(tree.children[-1], {**values, **fresh}), event)
             case "call":
                 parameters, body = self._spec.equations[str(tree.children[0])]
-                arguments = [self._value(a, values) for a in tree.children[1:]]
+                arguments = [_evaluate(a, values) for a in tree.children[1:]]
                 return self._next(_Closure(body, dict(zip(parameters, arguments, strict=True))), event)
             case other:
                 raise AssertionError(f"no rule for {other}")
@@ -107,18 +107,7 @@ class Interpreter:
         return None
 
     def _options(self, declared: Declared, event: Mapping[str, Any]) -> list[Binding]:
-        if declared.parents:
-            return [{} for parent in declared.parents if self._matches(parent, event, {}) is not None]
         return [b for pattern in declared.patterns for b in _match(pattern, event)]
-
-    def _value(self, tree: Any, values: Mapping[str, Any]) -> Any:
-        match tree.data:
-            case "name":
-                return values[str(tree.children[0])]
-            case "negative":
-                return -Fraction(str(tree.children[2]))
-            case _:  # a number
-                return number(tree)
 
 
 def _match(pattern: Any, value: Any) -> list[Binding]:
@@ -152,7 +141,7 @@ def _match(pattern: Any, value: Any) -> list[Binding]:
 
 def _number(value: Any) -> Fraction | None:
     """Our conditions are about numbers; what is none is taken to match nothing (the file says so)."""
-    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+    if isinstance(value, bool) or not isinstance(value, int | float | bytes):
         return None
     try:
         return Fraction(exact(value))
@@ -169,7 +158,9 @@ def _holds(tree: Any, values: Mapping[str, Any]) -> bool:
         case _:  # a comparison
             left, operator, right = tree.children
             a, b = _evaluate(left, values), _evaluate(right, values)
-            return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[str(operator)]
+            return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[
+                str(operator.children[0])
+            ]
 
 
 def _evaluate(tree: Any, values: Mapping[str, Any]) -> Fraction:
@@ -181,5 +172,8 @@ def _evaluate(tree: Any, values: Mapping[str, Any]) -> Fraction:
             left, operator, right = tree.children
             a, b = _evaluate(left, values), _evaluate(right, values)
             return a + b if operator == "+" else a - b if operator == "-" else a * b
+        case "applied":
+            function, left, right = tree.children
+            return {"max": max, "min": min}[str(function)](_evaluate(left, values), _evaluate(right, values))
         case _:  # a number
             return number(tree)

@@ -18,12 +18,11 @@ PREDECLARED = frozenset(("any", "none"))
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """An event type: its parameters, and either patterns with a condition or the event types that it covers."""
+    """An event type: its parameters, its patterns and its condition."""
 
     name: str
     parameters: tuple[str, ...]
     patterns: tuple[Any, ...]
-    parents: tuple[Any, ...]
     condition: Any
 
 
@@ -65,13 +64,10 @@ def _event(found: Parsed, tree: Any) -> None:
     if name in KEYWORDS:
         raise Malformed(f"{name} is a keyword")
     patterns = tuple(c for c in rest if c.data == "pattern")
-    parents = tuple(c for c in rest if c.data == "event")
     conditions = [c for c in rest if c.data in ("all", "any", "compare")]
     if (name, len(parameters)) in found.events:
         raise Malformed(f"{name} is declared twice")
-    found.events[name, len(parameters)] = Declared(
-        name, parameters, patterns, parents, conditions[0] if conditions else None
-    )
+    found.events[name, len(parameters)] = Declared(name, parameters, patterns, conditions[0] if conditions else None)
 
 
 def _head(tree: Any) -> tuple[str, tuple[str, ...]]:
@@ -88,8 +84,6 @@ def _equation(found: Parsed, tree: Any) -> None:
 
 def _check(found: Parsed) -> None:
     for declared in found.events.values():
-        for parent in declared.parents:
-            _known(found, parent)
         bound = {str(v.children[0]) for p in declared.patterns for v in p.find_data("variable")}
         if declared.patterns and not all(
             {str(v.children[0]) for v in p.find_data("variable")} <= set(declared.parameters) for p in declared.patterns

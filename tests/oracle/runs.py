@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from avow.language.terms import Term
+from reference.meaning import Step, keeps
 
-from .values import Step, keeps
+from avow.language.terms import Term
 
 BOTH = (False, True)
 

@@ -18,8 +18,7 @@ A claim *holds* of the cases listed, where its output ranges over the values of 
 
 Infinite types are cut off, which decides no less where the clauses that limit them (`LIMIT`) apply.
 Where they do not (a guarantee by itself, the limits themselves), an example decides, and that there is none does not.
-Elements outside a sequence and quotients by zero have two values in turn; an answer must be right with either, and a
-claim of a contract that asks for one may stay open.
+A claim of a contract that asks for elements of sequences or quotients may stay open.
 
 Left out: unspecified types (``{}``), infinite ones without limits, quantifiers over them, functions on them, scenarios;
 conflicts, counterexamples and explanations, and what is a consequence of what. A guarantee's triggers are Avow's own.
@@ -32,13 +31,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from reference.meaning import Meaning, Step, has_value_always, is_finite
+
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
 from avow.language.terms import Term, Variable
 from avow.sanity.claims import triggers
 from avow.sanity.results import SanityResult
 
-from .values import Meaning, Step, domain, is_finite
+from .domains import as_written, domain
 
 LIMIT = "limit_"
 """A clause of this name keeps the port named after it within the values of `values.domain`, and not all of these."""
@@ -76,17 +77,14 @@ def is_small(node: Node) -> bool:
 
 def judge(node: Node, results: Iterable[SanityResult]) -> Judgement:
     """Hold verdicts against the facts about a node that is small."""
-    surveys = [Survey(node, Meaning(0))]
-    strayed = surveys[0].meaning.strayed
-    if strayed:
-        surveys.append(Survey(node, Meaning(-1)))
-    tables = [survey.facts() for survey in surveys]
+    table = Survey(node).facts()
+    strayed = not all(has_value_always(as_written(clause)) for clause in node.clauses)
     found: dict[str, list[str]] = {"right": [], "wrong": [], "unknown": [], "hinging": []}
     for result in results:
         if result.verdict is Verdict.UNKNOWN:
             kind = "hinging" if strayed else "unknown"
         else:
-            kind = "right" if all(table[result.name].allows(result.verdict) for table in tables) else "wrong"
+            kind = "right" if table[result.name].allows(result.verdict) else "wrong"
         found[kind].append(result.name)
     return Judgement(**{kind: tuple(names) for kind, names in found.items()})
 
@@ -115,13 +113,13 @@ class Situation:
 class Survey:
     """All cases of a node."""
 
-    def __init__(self, node: Node, meaning: Meaning) -> None:
+    def __init__(self, node: Node) -> None:
         self.node = node
-        self.meaning = meaning
+        self.meaning = Meaning()
         self.outputs = [port.variable for port in node.outputs]
-        self.assumptions = {c.name: c.formula for c in node.assumptions}
-        self.guarantees = {c.name: c.formula for c in node.guarantees}
-        self.triggers = {name: triggers(formula) for name, formula in self.guarantees.items()}
+        self.assumptions = {c.name: as_written(c) for c in node.assumptions}
+        self.guarantees = {c.name: as_written(c) for c in node.guarantees}
+        self.triggers = {c.name: triggers(c.formula) for c in node.guarantees}
         self.situations = tuple(self._situations([port.variable for port in node.inputs]))
         self.allowed = tuple(situation for situation in self.situations if not situation.failed)
         self.all_inputs = all(is_finite(port.variable.sort) for port in node.inputs)
@@ -134,12 +132,12 @@ class Survey:
 
     def _case(self, at: tuple[int, ...], values: Step) -> Case:
         triggered = {
-            name: tuple(self.meaning.holds(trigger, values) for trigger in each) for name, each in self.triggers.items()
+            name: tuple(self.meaning.met(trigger, [values]) for trigger in each) for name, each in self.triggers.items()
         }
         return Case(at, self._failed(self.guarantees, values), triggered)
 
     def _failed(self, clauses: Mapping[str, Term], values: Step) -> frozenset[str]:
-        return frozenset(name for name, formula in clauses.items() if not self.meaning.holds(formula, values))
+        return frozenset(name for name, formula in clauses.items() if not self.meaning.met(formula, [values]))
 
     def facts(self) -> dict[str, Fact]:
         """By the claims' names."""

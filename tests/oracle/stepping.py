@@ -1,14 +1,14 @@
 """A clause with memory along a run, a step at a time: what it remembers is finite, so that all runs can be walked
-through. What `values` says by looking at all steps, in another way (`oracle.test_stepping` holds them together)."""
+through. `oracle.test_stepping` holds it against `reference.meaning`, which looks at all steps."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from reference.meaning import COMPARED, NOWHERE, Meaning, Run, Step
+
 from avow.language.subterms import subterms
 from avow.language.terms import RESPONSES, History, Implies, Literal, Past, Term
-
-from .values import COMPARED, NOWHERE, Meaning, Run, Step
 
 Memory = tuple[Any, ...]
 

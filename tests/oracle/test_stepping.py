@@ -6,10 +6,10 @@ import random
 
 import pytest
 from drawn.memory import clause, run_of
+from reference.meaning import keeps
 
 from avow.language.printer import show_term
 from oracle.stepping import Watch
-from oracle.values import keeps
 
 
 @pytest.mark.parametrize("seed", range(150))

@@ -24,7 +24,6 @@ from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
 from avow.pipeline import assess
-from avow.pipeline.assess import Assessment
 from avow.pipeline.reporter import _sweep
 from avow.pipeline.run_info import Run
 from avow.pipeline.state import State
@@ -43,7 +42,7 @@ def test_an_answer_that_a_killed_worker_did_not_give_is_asked_for_again(
     surveyed = survey(Path(shutil.copytree(TEMPLATE, workspace / "contracts" / "thermostat")))
     assert isinstance(surveyed, Survey)
     state = State(place, Run("r", False))
-    state.assessments.append(Assessment(state, surveyed))
+    state.surveyed.append(surveyed)
     assess.ledger_of.cache_clear()
     work = surveyed.work("hoare")
     record = replace(evidence(work.obligations[0]), method="hoare", key=work.keys[work.obligations[0].id])

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from helpers import avow
 from helpers import edit as replace
 
 
@@ -89,6 +90,50 @@ def test_the_new_workspace_verifies(made: Path) -> None:
     assert (made / "reports" / "index.html").is_file()
 
 
+def test_a_node_s_index_lists_what_can_be_checked_without_avow(made: Path) -> None:
+    page = (made / "artifacts/thermostat/thermostat/index.md").read_text()
+    assert "## warms: proved" in page
+    smt = "artifacts/thermostat/thermostat/hoare/warms.pre.smt2"
+    rows = [line for line in page.splitlines() if f"`z3 {smt}`" in line]
+    assert rows
+    assert "| hoare | proved | " in rows[0]
+    assert "it prints `unsat`" in rows[0]
+    assert (made / smt).is_file()
+    for target in re.findall(r"\]\(([^)]+)\)", page):
+        assert (made / "artifacts/thermostat/thermostat" / target).exists(), target
+
+
+def test_the_obligations_are_listed_those_of_sanity_apart(made: Path) -> None:
+    told = avow("obligations", "thermostat/thermostat", cwd=made)
+    assert told.returncode == 0, told.stderr
+    claims, _, sanity = told.stdout.partition("thermostat: whether the contract is worth verifying")
+    assert "thermostat/guarantee/warms" in claims
+    assert "hoare, hypothesis" in " ".join(claims.split())
+    assert "/sanity/" in sanity
+    assert "/sanity/" not in claims
+    assert "thermometer/" not in told.stdout
+    data = json.loads(avow("obligations", "--json", cwd=made).stdout)
+    (listed,) = data["systems"]
+    assert listed == json.loads((made / "artifacts/thermostat/obligations.json").read_text())
+    assert "thermometer/guarantee/calibrated" in avow("obligations", "thermometer", cwd=made).stdout
+    for wrong in ("nothing", "thermostat/nothing", "nothing/thermostat"):
+        refused = avow("obligations", wrong, cwd=made)
+        assert (refused.returncode, "CLI00" in refused.stderr) == (2, True), refused.stderr
+
+
+def test_a_node_is_explained_by_its_system_and_name(made: Path) -> None:
+    told = avow("explain", "thermostat/thermometer", cwd=made)
+    assert told.returncode == 0, told.stderr
+    assert "node thermometer" in told.stdout
+    assert "guarantees calibrated" in told.stdout
+
+
+def test_doit_lists_every_task_with_words(made: Path) -> None:
+    lines = run(made, "doit", "list", "--all").stdout.splitlines()
+    assert any(line.startswith("discharge:thermostat:thermostat:hoare ") for line in lines)
+    assert [line for line in lines if len(line.split()) < 4] == []
+
+
 @pytest.mark.slow
 def test_again_nothing_is_run(robot: Path) -> None:
     before = (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns
@@ -126,6 +171,7 @@ def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> 
     guarantees = {
         (e["obligation"].rsplit("/", 1)[1], e["method"], e["verdict"]) for e in new if "/guarantee/" in e["obligation"]
     }
+    assert "## warms: refuted" in (robot / "artifacts/thermostat/thermostat/index.md").read_text()
     assert ("warms", "hoare", "refuted") in guarantees
     assert ("warms", "hypothesis", "refuted") in guarantees
     assert not any(

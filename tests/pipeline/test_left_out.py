@@ -11,7 +11,7 @@ import pytest
 
 from avow.base.diagnostics import Rejected
 from avow.base.workspace import Workspace
-from avow.pipeline.check import left_out
+from avow.pipeline.plan_check import left_out
 from avow.pipeline.results import Result
 from avow.pipeline.stages import stages
 from avow.pipeline.state import State, system_of, task_name
@@ -98,15 +98,15 @@ def test_a_plan_below_a_system_that_does_not_take_it_in_is_left_out(tmp_path: Pa
 
 
 def test_what_is_left_out_is_told_in_every_summary_once() -> None:
-    pdf, plan = ("report.pdf", "typst is not installed"), ("contracts/crane/spare/plan.yaml", "not verified [CLI021]")
+    one, plan = ("contracts/old/plan.yml", "misnamed"), ("contracts/crane/spare/plan.yaml", "not verified [CLI021]")
     gates = (("all", True, "fine"),)
     found = [
-        Result("crane", 0, {"proved": 3}, "reports/crane/index.html", gates, (pdf, plan)),
-        Result("hook", 0, {"proved": 3}, "reports/hook/index.html", gates, (pdf,)),
+        Result("crane", 0, {"proved": 3}, "reports/crane/index.html", gates, (one, plan)),
+        Result("hook", 0, {"proved": 3}, "reports/hook/index.html", gates, (one,)),
     ]
     out = io.StringIO()
     print_summary(found, (), (), 0, 0.1, out)
     for text in (out.getvalue(), job_summary(found, ())):
-        assert text.count("typst is not installed") == text.count("CLI021") == 1
+        assert text.count("misnamed") == text.count("CLI021") == 1
     said = json.loads(results_json(found, (), (), 0))["systems"]
-    assert [[row["file"] for row in s["left_out"]] for s in said] == [[pdf[0], plan[0]], [pdf[0]]]
+    assert [[row["file"] for row in s["left_out"]] for s in said] == [[one[0], plan[0]], [one[0]]]

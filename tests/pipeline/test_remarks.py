@@ -12,7 +12,7 @@ from avow.base.tuning.shown import WARNINGS
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.pipeline.check import _tell
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.pipeline.worker import remarked
 from avow.system.load import load_system
 

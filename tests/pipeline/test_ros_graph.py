@@ -10,7 +10,8 @@ from helpers import edit, some
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.workspace import Workspace
-from avow.pipeline.check import check, diagnostics, is_current
+from avow.pipeline.check import check, is_current
+from avow.pipeline.plan_check import diagnostics
 from avow.pipeline.workload import Survey, survey
 from avow.system.load import load_system
 

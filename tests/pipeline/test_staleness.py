@@ -24,8 +24,9 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
 from avow.calculus.variables import frame
 from avow.pipeline.evidence_keys import surroundings
+from avow.pipeline.methods import method_job
 from avow.pipeline.slices import compose_slice, method_slice, sanity_slice
-from avow.pipeline.work import catalogue, method_job, planned_method
+from avow.pipeline.work import catalogue, planned_method
 from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
@@ -84,6 +85,8 @@ WHOLE = {("system/well-formed/contract", "language")}
 TOGETHER = {(f"system/composition/chain.{part}", "compose") for part in ("persistence", "one-output")}
 CHAIN = {("system/composition/chain.pilot.one_berth", "compose"), *TOGETHER}
 SAFE = {("system/requirement/SAFE", "compose")}
+# whether what the plan assumes leaves room for every guarantee
+ROOM = {(f"system/composition/environment.{port}", "compose") for port in ("gauge.depth", "pilot.free")}
 
 
 def guarantees(node: str, names: str, methods: str) -> set[tuple[str, str]]:
@@ -100,13 +103,13 @@ FERRY_EDITS: dict[str, tuple[str, tuple[str, str], Callable[[Keys], set[tuple[st
         "*.rcl",
         ("Minimum = 2.5;", "Minimum = 2.6;"),
         lambda k: guarantees("gauge", "shallow good deep", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
-        CHAIN,
+        CHAIN | ROOM,
     ),
     "a flipped operator": (
         "*.rcl",
         ("in.depth > Maximum", "in.depth >= Maximum"),
         lambda k: guarantees("gauge", "shallow good deep", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
-        CHAIN,
+        CHAIN | ROOM,
     ),
     "an assumption": (
         "*.rcl",
@@ -118,13 +121,13 @@ FERRY_EDITS: dict[str, tuple[str, tuple[str, str], Callable[[Keys], set[tuple[st
             | SAFE
             | {("system/composition/environment.gauge.wet", "compose")}
         ),
-        CHAIN,
+        CHAIN | ROOM,
     ),
     "a guarantee of the last node": (
         "*.rcl",
         ("in.level != ok -> out.order == wait", "in.level == low -> out.order == wait"),
         lambda k: guarantees("pilot", "docks waits", "ajpf hypothesis") | sanity(k, "pilot") | WHOLE | SAFE,
-        CHAIN,
+        CHAIN | ROOM,
     ),
     "an option": (
         "plan.yaml",
@@ -431,10 +434,10 @@ def test_an_experiment_is_judged_again_where_more_is_asked_of_its_node(tmp_path:
     (tmp_path / "system.rcl").write_text(
         "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee close( out.y - in.x <= 1 ) }"
     )
-    (tmp_path / "runs.csv").write_text("x,y\n" + "".join(f"1,1.{k}\n" for k in range(5)))
+    (tmp_path / "runs.csv").write_text("run,x,y\n" + "".join(f"{k},1,1.{k}\n" for k in range(5)))
     (tmp_path / "plan.yaml").write_text(
         "system: s\ncontract: system.rcl\nnodes:\n  n:\n    criticality: low\n    methods:\n"
-        "      - experiment: {data: runs.csv, measure: abs(y - x), within: 1}\n"
+        "      - experiment: {data: runs.csv, mapping: {in.x: x, out.y: y}}\n"
         "      - hypothesis: {subject: 'n.py:step'}\n"
     )
     (tmp_path / "n.py").write_text("def step(x):\n    return {'y': x}\n")

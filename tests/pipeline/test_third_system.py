@@ -15,8 +15,9 @@ from calculus.make import discharge as discharge_composition
 from avow.backend_kit.protocol import Limits
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
+from avow.pipeline.methods import method_backend, method_job
 from avow.pipeline.slices import SanitySlice
-from avow.pipeline.work import Work, method_backend, method_job, planned_method
+from avow.pipeline.work import Work, planned_method
 from avow.pipeline.worker import discharge_sanity
 from avow.pipeline.workload import Survey, survey
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Callable, Sequence
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import avow
 
 from avow.base import process, tools
 from avow.base.notes import cache_folder
 from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
+from avow.pipeline.methods import tool_identities
 from avow.pipeline.results import Result
-from avow.pipeline.work import engine_identity, tool_identities
+from avow.pipeline.work import engine_identity
 
 
 @pytest.fixture
@@ -144,33 +142,3 @@ def test_where_a_tools_library_is_another_there_is_something_to_do(tmp_path: Pat
     assert shortcut.Shortcut(workspace).nothing_to_do(("verify",)) == (done,)
     library.write_text("2")
     assert shortcut.Shortcut(workspace).nothing_to_do(("verify",)) is None
-
-
-@pytest.mark.slow
-def test_a_format_that_was_left_out_is_made_once_its_tool_is_there(tmp_path: Path) -> None:
-    """Nothing else changed: evidence, texts and day are the same."""
-    pytest.importorskip("typst")
-    folder = tmp_path / "contracts" / "s"
-    folder.mkdir(parents=True)
-    (tmp_path / "dodo.py").write_text("")
-    (folder / "s.rcl").write_text("node n { inputs() outputs( y : REAL ) topics() guarantee low ( out.y <= 1 ) }\n")
-    (folder / "plan.yaml").write_text("system: s\nnodes: {n: {criticality: low}}\n")
-    installed = metadata.version
-
-    def version(name: str) -> str:
-        if name == "typst":
-            raise metadata.PackageNotFoundError(name)
-        return installed(name)
-
-    made = tmp_path / "reports" / "s" / "report.pdf"
-    for there in (False, True, False):
-        with pytest.MonkeyPatch.context() as patch:
-            if not there:
-                patch.setattr(metadata, "version", version)
-                patch.setitem(sys.modules, "typst", None)
-            # it knows by files what is installed
-            (tmp_path / "artifacts" / ".settled.json").unlink(missing_ok=True)
-            avow("verify", cwd=tmp_path)
-        assert made.is_file() == there
-        known = json.loads((tmp_path / "artifacts" / "s" / "report.json").read_text())
-        assert ("pip install typst" in str(known)) != there

@@ -12,7 +12,7 @@ import yaml
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.python import BACKEND
 from avow.base.verdict import Outcome
-from avow.pipeline.work import method_job
+from avow.pipeline.methods import method_job
 from avow.system.load import load_system
 
 LIMITER = """

@@ -19,8 +19,9 @@ from avow.backend_kit.protocol import Limits, Report
 from avow.backends.python import BACKEND
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
+from avow.pipeline.methods import method_job
 from avow.pipeline.slices import method_slice
-from avow.pipeline.work import catalogue, method_job, method_work
+from avow.pipeline.work import catalogue, method_work
 from avow.system.load import load_system
 
 MODEL = "IF (v > 1.5) THEN u := 1.5 ELSE IF (v < -1.5) THEN u := -1.5 ELSE u := v\n"

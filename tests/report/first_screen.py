@@ -8,13 +8,13 @@ from typing import Any
 
 from avow.assurance.model import Case
 from avow.base.plain import identifiers
-from avow.report.answers_page import worded
+from avow.report.answers_page import render_argument, worded
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import LINES, WIDTH, WORDS, comment, markdown_head, terminal_lines
 from avow.report.wording import clean
 from report.chromium import dark, frames_of, measure
 
-OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 280, 3000, 900, 4.5
+OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 400, 3000, 900, 4.5
 """Own words above the signature, visible words in all, pixels within which the five boxes end, least contrast."""
 SHEET = 1010
 """Pixels of a sheet of A4 between its margins: 269 mm, less the rounding of lines."""
@@ -24,7 +24,7 @@ WIDTHS = (320, 390, 420, 1366, 1400)
 def departures(found: Case, page: str, folder: Path) -> list[str]:
     """In what the page departs from what it should be; empty where in nothing."""
     measured = measure(frames_of(page, WIDTHS) | {"dark": (dark(page), 1400)}, folder)
-    return [*_layout(measured), *_budgets(measured["1400"]), *counts(found, page)]
+    return [*_layout(measured), *_budgets(measured["1400"]), *counts(found, page + render_argument(found))]
 
 
 def _layout(measured: dict[str, Any]) -> list[str]:
@@ -44,8 +44,8 @@ def _layout(measured: dict[str, Any]) -> list[str]:
 
 def _budgets(wide: dict[str, Any]) -> list[str]:
     told = []
-    if [head[0] for head in wide["heads"]] != ["1", "2", "3", "4", "5"]:
-        told.append(f"the five questions: {wide['heads']}")
+    if [head[0] for head in wide["heads"]] != ["1", "2", "3", "4", "5", "6", "7"]:
+        told.append(f"the seven questions: {wide['heads']}")
     for name, most in (("own", OWN_WORDS), ("all", ALL_WORDS), ("bottom", BOXES_WITHIN)):
         if wide[name] > most:
             told.append(f"{name}: {wide[name]}, at most {most}")
@@ -54,7 +54,7 @@ def _budgets(wide: dict[str, Any]) -> list[str]:
 
 
 def counts(found: Case, page: str) -> list[str]:
-    """Page, Markdown, terminal, comment and PDF say the same, and each supposition in full once."""
+    """Page, Markdown, terminal, comment and PDF say the same, and each assumption in full once."""
     a, told = found.answers, []
     pdf = pdf_data(found)["first"]
     plain = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", "", page))
@@ -69,8 +69,8 @@ def counts(found: Case, page: str) -> list[str]:
     ):
         told += [f"{name} lacks {part!r}" for part in (a.verdict, *a.beside.split(" · ")) if part not in text]
     told += words(found)
-    if page.count('class="supposition"') != len(found.suppositions):
-        told.append("a supposition stands not once on the page")
+    if page.count('class="assumption"') != len(found.assumptions):
+        told.append("an assumption stands not once on the page")
     if len(re.findall(r'<details id="requirement', page)) != len(found.requirements):
         told.append("a requirement stands not once on the page")
     if len(terminal) > LINES or any(len(line) > WIDTH for line in terminal):
@@ -82,13 +82,12 @@ def counts(found: Case, page: str) -> list[str]:
 
 
 def words(found: Case) -> list[str]:
-    """One wording for one thing: bounds with their confidence, kinds of weakening, what was looked at, suppositions on
-    paper."""
+    """One wording for one thing: bounds with their confidence, deficits, what was looked at, assumptions on paper."""
     a, told = found.answers, []
     for said in (a.weakest.words if a.weakest else "", a.next_weakest):
         if " fail)" in said and not re.search(r"confidence( not recorded)?: at most [0-9.]+ % fail\)", said):
             told.append(f"a bound without its confidence: {said!r}")
-    if found.weakenings and a.weakened not in a.statement:
+    if found.deficits and a.weakened not in a.statement:
         told.append(f"{a.weakened!r} is counted otherwise when it is signed: {a.statement!r}")
     used = {word for b in a.bases for word in re.findall(r"\((\w+)", b.words)}
     explained = {part.split(":")[0] for part in a.objects.split("; ") if part}
@@ -97,7 +96,7 @@ def words(found: Case) -> list[str]:
     paper = pdf_data(found)["first"]
     listed = " ".join(" ".join(line) for line in paper["supposed"])
     if worded(found):
-        told += [f"on paper without words: {s.number}" for s in found.suppositions if clean(s.words) not in listed]
+        told += [f"on paper without words: {s.number}" for s in found.assumptions if clean(s.words) not in listed]
     elif any(line.more and clean(line.more) not in listed for line in a.supposed):
         told.append("on paper without a number")
     return told

@@ -54,7 +54,7 @@ def hostile_case() -> Case:
         expected=[Finding("*", "refuted", NAME, method=NAME)],
         accepted=[Finding("*/guarantee/*", "refuted", NAME, NAME, "2026-11-01")],
     )
-    derivation = Derivation(NAME, NAME, NAME, NAME, (node,), (SideCondition(NAME, side.id),), NAME, (NAME,))
+    derivation = Derivation(NAME, NAME, NAME, NAME, (node,), (SideCondition(NAME, side.id),), (NAME,))
     return case(
         subject,
         [target, side],

@@ -14,7 +14,7 @@ from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
-from avow.report.answers_page import render_answers, worded
+from avow.report.answers_page import render_answers, render_argument, worded
 from avow.report.page import render_page
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import markdown_head, terminal_lines
@@ -63,7 +63,7 @@ def large_case(nodes: int = 12, requirements: int = 30) -> Case:
     ]
     subject = system(made, plans=[node_plan(n, "low", "hoare", "hypothesis") for n in names], requirements=asked)
     words = Statement(
-        "suppositions.hypothesis.drawn", "Inputs are drawn as the robot will meet them", "", "A. Person", "2030-01-01"
+        "assumptions.hypothesis.drawn", "Inputs are drawn as the robot will meet them", "", "A. Person", "2030-01-01"
     )
     subject = replace(subject, plan=replace(subject.plan, statements=(words,)))
     return make_case(subject, claims, records)
@@ -80,28 +80,35 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_elements_nest_ids_are_unique_and_links_lead_somewhere(name: str) -> None:
     found = CASES[name]()
-    page, claims = Page(render_answers(found)), Page(render_page(found))
-    assert page.faults == []
-    assert page.open == []
-    assert {name for name in page.ids if page.ids.count(name) > 1} == set()
-    for _, attribute, value in page.attributes:
-        if attribute == "href" and value.startswith("#"):
-            assert value[1:] in page.ids, value
-        elif attribute == "href" and value.startswith("claims.html#"):
-            assert value.removeprefix("claims.html#") in claims.ids, value
+    made = {"index.html": render_answers, "argument.html": render_argument, "claims.html": render_page}
+    pages = {name: Page(render(found)) for name, render in made.items()}
+    for here in ("index.html", "argument.html"):
+        page = pages[here]
+        assert page.faults == []
+        assert page.open == []
+        assert {name for name in page.ids if page.ids.count(name) > 1} == set()
+        for _, attribute, value in page.attributes:
+            if attribute == "href" and "#" in value:
+                name, _, place = value.partition("#")
+                assert place in pages[name or here].ids, value
+
+
+def both(found: Case) -> str:
+    """The first page and the argument behind it."""
+    return render_answers(found) + render_argument(found)
 
 
 def test_texts_of_contract_and_plan_are_data() -> None:
-    text = render_answers(hostile_case())
+    text = both(hostile_case())
     assert "<script>alert" not in text
     assert "<img" not in text
-    assert text.count("<script>") == 1
+    assert text.count("<script>") == 2
 
 
-def test_each_supposition_stands_in_full_once_and_counts_agree() -> None:
+def test_each_assumption_stands_in_full_once_and_counts_agree() -> None:
     found = large_case()
-    text = render_answers(found)
-    assert text.count('class="supposition"') == len(found.suppositions)
+    text = both(found)
+    assert text.count('class="assumption"') == len(found.assumptions)
     assert found.answers.verdict in text
     assert len(re.findall(r'<details id="requirement', text)) == len(found.requirements)
     assert len(re.findall(r'<details id="node', text)) == len(found.nodes)
@@ -127,8 +134,9 @@ def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_pat
 @pytest.mark.slow
 @pytest.mark.needs_chromium
 def test_faults_of_layout_are_found(tmp_path: Path) -> None:
+    pages = {"picture": render_argument(rover_case())}
     text = render_answers(rover_case())
-    asked = {key: (text.replace("</style>", css + "</style>"), 420) for key, (css, _) in FAULTS.items()}
+    asked = {key: (pages.get(key, text).replace("</style>", css + "</style>"), 420) for key, (css, _) in FAULTS.items()}
     measured = measure(asked, tmp_path)
     assert [fault for fault in FAULTS if not measured[fault][FAULTS[fault][1]]] == []
 
@@ -160,25 +168,25 @@ def test_words_that_differ_are_told() -> None:
         assert words(replace(found, answers=bad)) != []
 
 
-def test_suppositions_stand_in_words_on_paper_or_with_the_page_that_has_them() -> None:
+def test_assumptions_stand_in_words_on_paper_or_with_the_page_that_has_them() -> None:
     found = rover_case()
     assert worded(found)
     assert words(found) == []
-    one = found.suppositions[0]
-    many = tuple(replace(one, number=f"S{at}", says="It is so " * 8) for at in range(1, 40))
-    line = replace(found.answers.supposed[0], number="S1", others=tuple(s.number for s in many[1:]))
-    full = replace(found, suppositions=many, answers=replace(found.answers, supposed=(line,)))
+    one = found.assumptions[0]
+    many = tuple(replace(one, number=f"A{at}", says="It is so " * 8) for at in range(1, 40))
+    line = replace(found.answers.supposed[0], number="A1", others=tuple(s.number for s in many[1:]))
+    full = replace(found, assumptions=many, answers=replace(found.answers, supposed=(line,)))
     assert not worded(full)
     assert words(full) == []
-    assert "also S2 to S39, in words under" in render_answers(full)
-    assert pdf_data(full)["first"]["supposed"][0][2] == "also S2 to S39"
+    assert "also A2 to A39, in words under" in both(full)
+    assert pdf_data(full)["first"]["supposed"][0][2] == "also A2 to A39"
 
 
 def test_counts_that_differ_are_told() -> None:
     found = large_case()
-    page = render_answers(found)
+    page = both(found)
     assert counts(found, page) == []
-    for good, bad in ((found.answers.verdict, "Holds"), ('class="supposition"', "class=s"), ("policy: ", "policy ")):
+    for good, bad in ((found.answers.verdict, "Holds"), ('class="assumption"', "class=s"), ("policy: ", "policy ")):
         assert counts(found, page.replace(good, bad)) != [], good
 
 
@@ -192,15 +200,15 @@ def test_what_evidence_supposes_is_told_whether_or_not_a_requirement_needs_it(re
     made = replace(made, plan=replace(made.plan, requirements=tuple(requirements)))
     listed = [evidence(g, hypotheses=("inputs are finite",) if g.node == "a" else ()) for g in claims]
     found = make_case(made, claims, listed)
-    (finite,) = [s for s in found.suppositions if s.text == "inputs are finite"]
+    (finite,) = [s for s in found.assumptions if s.text == "inputs are finite"]
     assert (finite.needed_by, finite.needing, finite.where) == ((), ("guarantees only",), (claims[0].id, claims[1].id))
-    assert finite.key in {w for kind in found.weakenings if kind.key == "unowned" for w in kind.claims}
-    assert "it rests on no suppositions" not in found.answers.statement
-    assert not counts(found, render_answers(found))
-    page = " ".join(render_answers(found).split())
+    assert finite.key in {w for kind in found.deficits if kind.key == "unowned" for w in kind.claims}
+    assert "it rests on no assumptions" not in found.answers.statement
+    assert not counts(found, both(found))
+    page = " ".join(both(found).split())
     assert "inputs are finite" in page
     assert "guarantees only" in page
     assert "inputs are finite" in str(pdf_data(found))
-    (line,) = [line for line in terminal_lines(found) if line.startswith("4 Supposed")]
-    assert line == f"4 Supposed ({found.answers.owned} with owner and date)"
+    (line,) = [line for line in terminal_lines(found) if line.startswith("4 Assumed")]
+    assert line == f"4 Assumed ({found.answers.owned} with owner and date)"
     assert "Nothing." not in "\n".join(markdown_head(found)).split("## 4")[1].split("## 5")[0]

@@ -48,7 +48,6 @@ def test_a_vacuous_pass_is_called_so_in_every_format() -> None:
     ]
     assert "hoare: vacuous" in made["pdf"]
     assert '"hoare: proved"' not in made["pdf"]
-    assert r"hoare: \textit{vacuous}" in made["report.tex"]
     assert not re.search(r'class="(chip|mini) good"[^>]*>(<span[^>]*>✔</span>)? *proved', made["traceability.html"])
     body = made["claims.html"].split('id="list"')[1].split("</section>")[0]
     assert "the tool said: proved" in body
@@ -218,7 +217,7 @@ def test_a_requirement_that_was_only_checked_says_within_what() -> None:
     assert "depth 28, scenario a1a1a1a1a1a1" in answer
     assert "a1" * 32 not in answer
     # words are only words: what a claim rests on is said by typed hypotheses, so that these count for nothing
-    assert [h.text for h in found.hypotheses] == ["agent/guarantee/g1", "the wind is weak"]
+    assert {"agent/guarantee/g1", "the wind is weak"} <= {a.text for a in found.assumptions}
 
 
 def test_measured_runs_say_how_they_were_made() -> None:
@@ -234,7 +233,7 @@ def test_measured_runs_say_how_they_were_made() -> None:
 def test_sentences_end_once() -> None:
     found = case(SUBJECT, [guarantee("agent", "g1", "It stops.")], [])
     made = texts(found)
-    assert "It stops.." not in made["report.tex"] + made["report.sarif"]
+    assert "It stops.." not in made["report.sarif"]
 
 
 def test_open_items_and_expected_findings_add_up() -> None:
@@ -283,7 +282,9 @@ def test_all_formats_count_alike(found: Case) -> None:
     first = json.loads(made["attestation.jsonl"].splitlines()[0])["predicate"]
     assert len(first["passedTests"]) == holding
     cases = [
-        t for t in ElementTree.fromstring(made["junit.xml"]).iter("testcase") if ".gates" not in t.attrib["classname"]
+        t
+        for t in ElementTree.fromstring(made["junit.xml"]).iter("testcase")
+        if not t.attrib["classname"].endswith((".gates", ".requirements"))
     ]
     assert len(cases) == len(found.obligations)
     assert sum(not len(t) for t in cases) == holding

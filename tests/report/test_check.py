@@ -66,8 +66,6 @@ def test_an_honest_report_agrees(place: Path) -> None:
             "gsn.svg",
             "traceability.csv",
             "traceability.html",
-            "report.tex",
-            "report.pdf",
         ],
         4,
     ),

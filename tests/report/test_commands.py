@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -167,20 +168,36 @@ def test_comparison_tells_new_gone_and_changed_claims() -> None:
     assert of_ledger("x", ()).claims == {}
 
 
-def test_doctor_prints_install_commands_whole(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("version", "fault", "code"), [(None, "", 0), ("1.0", "", 0), ("1.0", "it does not link", 3)])
+def test_doctor_prints_commands_whole_and_faults(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    version: str | None,
+    fault: str,
+    code: int,
 ) -> None:
-    """Brackets once were taken for markup, so that the extra's name was missing."""
+    """A required tool that fails its one-line job is as good as missing."""
     import avow.pipeline.doctor as doctor
 
-    told = doctor.Finding("a [use]", "thing", None, None, "pip install 'avow[signing]'", True)
-    monkeypatch.setattr(doctor, "findings", lambda: (told,))
+    told = doctor.Finding("a [use]", "thing", version, None, "pip install 'avow[signing]'", not fault, fault)
+    monkeypatch.setattr(doctor, "findings", lambda tried: (told,))
     from avow.cli import main
 
     with pytest.raises(SystemExit) as done:
         main(["doctor"])
-    assert done.value.code == 0
-    assert "pip install 'avow[signing]'" in capsys.readouterr().out
+    assert done.value.code == code
+    out = capsys.readouterr().out
+    assert ("pip install 'avow[signing]'" in out) == (version is None or bool(fault))
+    assert fault in out
+
+
+@pytest.mark.parametrize("edited", ["contracts/rover/system.rcl", "contracts/rover/plan.yaml"])
+def test_after_an_edit_a_report_answers_not_shown(root: Path, edited: str) -> None:
+    (root / edited).write_text((root / edited).read_text() + "\n")
+    for name in ("radiationSensor.medium", "REQ1"):
+        code, text = run(explain, name)
+        assert (code, f"{edited} has changed since" in text) == (1, True)
+        assert not {"proved", "checked", "tested", "argued"} & set(re.findall(r"\w+", text))
 
 
 @pytest.mark.parametrize("how", ["fifo", "folder", "cut", "gone", "edited"])
@@ -204,7 +221,12 @@ def test_what_a_report_says_is_shown_with_what_its_ledger_says(root: Path, how: 
             assert [d.code for d in caught.value.diagnostics] == ["LEDGER001"]
     else:
         code, text = run(explain, "radiationSensor")
-        assert (code, text.count("rover: as of an earlier state")) == (1, 1)
+        assert (code, text.count("rover: not shown: its report is stale")) == (1, 1)
+        code, text = run(explain, "radiationSensor.medium")
+        assert code == 1
+        assert "radiationSensor/guarantee/medium: not shown" in text
+        assert not {"proved", "checked", "tested"} & set(re.findall(r"\w+", text))
         code, text = run(explain, "radiationSensor.medium", "--json")
-        assert (code, list(json.loads(text)["differences"])) == (1, ["rover"])
+        told = json.loads(text)
+        assert (code, list(told["differences"]), told["obligations"]) == (1, ["rover"], [])
     assert run(report, "--check", "reports/rover")[0] == 1

@@ -27,7 +27,7 @@ from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
 from report.test_answers_page import REPORTS
 
-PAGES = ("index.html", "claims.html", "traceability.html")
+PAGES = ("index.html", "argument.html", "claims.html", "traceability.html")
 
 
 def shown(name: str) -> str:
@@ -86,11 +86,11 @@ def test_a_run_too_wide_for_the_terminal_is_told_by_what_changes() -> None:
 
 def test_every_name_that_the_first_page_shows_is_known() -> None:
     found = rover_case()
-    names = [r.id for r in found.requirements] + [s.number for s in found.suppositions]
-    names += [s.key for s in found.suppositions] + [node.title for node in found.nodes]
-    names += [gate.title for gate in found.gates] + [w.words for w in found.weakenings]
+    names = [r.id for r in found.requirements] + [s.number for s in found.assumptions]
+    names += [s.key for s in found.assumptions] + [node.title for node in found.nodes]
+    names += [gate.title for gate in found.gates] + [w.words for w in found.deficits]
     names += [d.derivation.name for d in found.derivations]
-    names += [r.how.value.split(",")[0] for r in found.requirements]
+    names += [r.level.value for r in found.requirements]
     for name in names:
         told = list(explained(found, name))
         assert told, name

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from assurance.sample import rover_case
 
-from avow.report.answers_page import render_answers
+from avow.report.answers_page import render_argument
 from avow.report.page import render_page
 from report.chromium import frames_of, measure
 from report.driven import Driven, driven
 
 pytestmark = pytest.mark.needs_chromium
 
-PAGES = {"index.html": render_answers, "claims.html": render_page}
+PAGES = {"argument.html": render_argument, "claims.html": render_page}
 
 
 @pytest.fixture(scope="module")

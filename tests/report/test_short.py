@@ -11,7 +11,7 @@ from assurance.sample import rover_case, system
 
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case
-from avow.report.answers_page import render_answers
+from avow.report.answers_page import render_answers, render_argument
 from avow.report.markdown import render_markdown
 from avow.report.short import LINES, WIDTH, WORDS, comment, terminal_lines
 from report.hostile import hostile_case
@@ -70,10 +70,10 @@ def test_page_markdown_terminal_and_pdf_count_alike(found: Case) -> None:
     for part in (a.verdict, a.weakened):
         for made in (page, plain, terminal, pdf):
             assert part in made
-    for s in found.suppositions:
+    for s in found.assumptions:
         assert plain.count(f"- {s.number} (") == 1
-        assert page.count(f'<tr id="{s.number}">') == 1
-    assert len(_data(found)["suppositions"]) == len(found.suppositions)
+        assert render_argument(found).count(f'<tr id="{s.number}">') == 1
+    assert len(_data(found)["assumptions"]) == len(found.assumptions)
 
 
 @pytest.mark.parametrize("name", ["rover", "large"])
@@ -91,7 +91,7 @@ def test_pdf_sheet_one_has_the_five_answers_and_the_signature(name: str, tmp_pat
     done = subprocess.run(
         ["pdftotext", "-f", "1", "-l", "1", "-layout", str(path), "-"], capture_output=True, text=True, check=True
     )
-    for head in ("1 What is claimed", "2 What is it based on", "3 What is the weakest", "4 What is supposed", "5 What"):
+    for head in ("1 What is claimed", "2 What is it based on", "3 What is the weakest", "4 What is assumed", "5 What"):
         assert head in done.stdout, done.stdout
     assert "Signature" in done.stdout
     assert "signature, or key fingerprint" in done.stdout

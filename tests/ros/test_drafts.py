@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from drawn.formulas import checked
+from helpers import avow
 
 from avow.base.diagnostics import Rejected
 from avow.cli.check import command as check
 from avow.cli.init import command as init
+from avow.ros.drafting import by_names
 from avow.system.graph import dataflow
 from avow.system.load import load_system
 
@@ -81,7 +87,7 @@ def run(folder: Path, *options: str) -> Path:
     (system,) = (folder / "contracts").iterdir()
     checked = CliRunner().invoke(check, [str(system)], standalone_mode=False, catch_exceptions=False)
     assert checked.return_value == 0, checked.output
-    assert "error" not in checked.output
+    assert checked.output == "1 file: no errors\n"  # and no warning
     return system
 
 
@@ -103,9 +109,32 @@ def test_a_ros1_bag_knows_who_publishes(tmp_path: Path) -> None:
 def test_a_ros2_bag_does_not_know_who_publishes(form: str, tmp_path: Path) -> None:
     system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", form)))
     loaded = load_system(system)
-    (node,) = loaded.contract.nodes
-    assert [p.name for p in node.outputs] == ["rate", "status_level", "status_rate", "status_in"]
+    assert {node.name: [p.name for p in node.outputs] for node in loaded.contract.nodes} == {
+        "geiger": ["rate"],
+        "robot1": ["status_level", "status_rate", "status_in"],
+    }
     assert "does not say who publishes" in (system / "system.rcl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("topics", "heard", "nodes"),
+    [
+        (["/a/x", "/a/y", "/b/x", "/x"], [], {"/a": ["/a/x", "/a/y"], "/b": ["/b/x"], "/robot": ["/x"]}),
+        (
+            ["/ns/a/x", "/ns/a/in/y", "/ns/z"],
+            ["/ns/a", "/ns/b"],
+            {"/ns/a": ["/ns/a/x", "/ns/a/in/y"], "/ns": ["/ns/z"]},
+        ),
+        (["/ab/x"], ["/a"], {"/ab": ["/ab/x"]}),
+        (
+            ["/grip/_request", "/arm/grip/_response"],
+            [],
+            {"/robot": ["/grip/_request"], "/arm": ["/arm/grip/_response"]},
+        ),
+    ],
+)
+def test_names_suggest_who_publishes(topics: list[str], heard: list[str], nodes: dict[str, list[str]]) -> None:
+    assert by_names(topics, heard) == nodes
 
 
 @pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])
@@ -161,6 +190,7 @@ CALLS = """\
   Service Servers:
     /grip: std_srvs/srv/SetBool
     /gripper/get_parameters: rcl_interfaces/srv/GetParameters
+    /gripper/change_state: lifecycle_msgs/srv/ChangeState
     /odd: nobody/srv/Knows
   Action Servers:
     /spin: control/action/Spin
@@ -182,6 +212,7 @@ def test_services_and_actions_of_a_graph_are_drafted(tmp_path: Path, monkeypatch
     assert "std_srvs/SetBool_Response /grip matches(out.grip_response_success)" in text
     assert "control/Spin_Goal /spin" in text
     assert "get_parameters" not in text
+    assert "change_state" not in text
     system = load_system(folder)
     assert {str(edge) for edge in dataflow(system).edges} == {
         "arm.grip_request → gripper.grip_request",
@@ -204,3 +235,79 @@ def test_services_of_a_bag_are_drafted(tmp_path: Path, monkeypatch: pytest.Monke
     assert "my_msgs/Go_Request /go matches(in." in text
     assert "my_msgs/Go_Response /go matches(out." in text
     assert CliRunner().invoke(check, [str(folder)]).exit_code == 0
+
+
+def written(system: Path, node: str, clause: str) -> None:
+    """Write a node's first guarantee in place of its placeholder."""
+    file = system / "system.rcl"
+    before, start, rest = file.read_text(encoding="utf-8").partition(f"node {node} {{")
+    file.write_text(f"{before}{start}{re.sub(PLACEHOLDER, lambda _: clause, rest, count=1)}", encoding="utf-8")
+
+
+PLACEHOLDER = r'guarantee to_write "[^"]*"\s*\( TRUE \)'
+
+
+def test_what_is_unwritten_is_counted_apart_and_behind_a_breach(tmp_path: Path) -> None:
+    """A draft with one guarantee written, which the record breaks: in every format the breach comes first, and what is
+    unwritten is neither refuted nor good."""
+    system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "mcap")))
+    reports = tmp_path / "w/reports/w"
+
+    def verified() -> dict[str, Any]:
+        done = avow("verify", cwd=tmp_path / "w")
+        assert done.returncode == 1, done.stdout
+        case: dict[str, Any] = json.loads((reports / "report.json").read_text(encoding="utf-8"))
+        return case
+
+    case = verified()
+    assert [gate["id"] for gate in case["gates"] if not gate["passed"]] == ["unwritten"]
+    monitored = avow("monitor", "w", str(tmp_path / "run"), cwd=tmp_path / "w")
+    assert monitored.returncode == 1
+    assert "nothing was judged: write what a node promises in place of `to_write`" in monitored.stdout
+    assert "to_write" not in monitored.stdout.replace("`to_write`", "")
+    statuses = {view["obligation"]["name"]: view["status"] for view in case["obligations"]}
+    assert statuses.pop("to_write") == "unwritten"
+    assert set(statuses.values()) == {"proved"}
+    assert len(json.loads((reports / "findings.sarif").read_text(encoding="utf-8"))["runs"][0]["results"]) == 2
+
+    written(system, "geiger", 'guarantee low "The rate is low" ( out.rate < 5 )')
+    plan = (system / "plan.yaml").read_text(encoding="utf-8")
+    (system / "plan.yaml").write_text(
+        plan.replace("out.rate: data", "out.rate: {field: data, nan: none, elsewhere: 0}")
+    )
+    case = verified()
+    failing = [gate["id"] for gate in case["gates"] if not gate["passed"]]
+    assert failing[:2] == ["refuted", "unwritten"]
+    assert [(item["kind"], item["claim"]) for item in case["open_items"] if not item["advice"]] == [
+        ("refuted", "w/geiger/guarantee/low"),
+        ("unwritten", "w/robot1/guarantee/to_write"),
+    ]
+    assert "Refuted: geiger" in (reports / "report.md").read_text(encoding="utf-8")
+    junit = (reports / "junit.xml").read_text(encoding="utf-8")
+    assert '<skipped message="unwritten' in junit
+    assert '<failure type="refuted"' in junit
+
+
+@pytest.mark.parametrize("formula", ["in.rate > 0 or TRUE", "FALSE"])
+def test_only_the_placeholder_is_unwritten(formula: str) -> None:
+    """A guarantee of that name with another formula is one like any other, and TRUE under another name says nothing."""
+    text = "node n {{ inputs( rate : REAL ) outputs( x : REAL ) topics( ) guarantee {} ( {} ) }}"
+    said = checked(text.format("to_write", formula)).nodes[0]
+    other = checked(text.format("other", "TRUE")).nodes[0]
+    assert not said.unwritten
+    assert not other.unwritten
+    assert checked(text.format("to_write", "TRUE")).nodes[0].unwritten
+
+
+@pytest.mark.parametrize("distro", [(), ("--distro", "humble")], ids=["alone", "humble"])
+def test_a_draft_stands_without_its_bag(distro: tuple[str, ...], tmp_path: Path) -> None:
+    """Types of the bag are files of the draft, the bag is named by its digest, and git is told to leave it out."""
+    system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "mcap")), *distro)
+    assert (system / "msg/geiger/msg/Status.msg").read_text() == (
+        "uint8 GREEN=0\nuint8 RED=2\nstd_msgs/Header header\nuint8 level\nfloat32 rate\nstring in\n"
+    )
+    assert (system / "msg/std_msgs/msg/Header.msg").exists() is not bool(distro)
+    assert (system / "traces/.gitignore").read_text(encoding="utf-8").endswith("/run\n")
+    shutil.rmtree(system / "traces/run")
+    done = CliRunner().invoke(check, [str(system)], standalone_mode=False)
+    assert (done.return_value, done.output) == (0, "1 file: no errors\n")

@@ -54,7 +54,7 @@ def write_case(folder: Path, traces: dict[str, list[str]] | None = None) -> Path
         plan["nodes"][name]["methods"] = [{"rosmonitoring": options}]
     plan.pop("expected", None)
     plan.pop("accepted", None)
-    plan.pop("suppositions", None)
+    plan.pop("assumptions", None)
     (target / "plan.yaml").write_text(json.dumps(plan, default=str), encoding="utf-8")
     return target
 

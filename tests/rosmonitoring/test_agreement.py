@@ -14,8 +14,9 @@ from typing import Any
 
 import pytest
 from helpers import some
+from oracle.domains import as_written
 from oracle.rml import Interpreter
-from oracle.values import Meaning
+from reference.meaning import Meaning
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
@@ -263,7 +264,7 @@ def brute_force(system: System, events: list[dict[str, Any]], when: str = "outpu
         if due:
             fresh = set()
         judged = due and mentioned <= snapshot.keys()
-        if judged and not MEANING.holds(clause.formula, snapshot):
+        if judged and not MEANING.met(as_written(clause), [snapshot]):
             return index
         if "out.marks" in awaited and len(awaited) > 1:
             if due:
@@ -285,10 +286,16 @@ def names_of(term: Term) -> set[str]:
 # -- the comparison ----------------------------------------------------------------------------------------------------
 
 
+def flat(event: dict[str, Any]) -> dict[str, Any]:
+    """As ROSMonitoring sends it: the message's fields beside its topic."""
+    inside = event.get("data")
+    return {**event, **inside} if isinstance(inside, dict) else event
+
+
 def first_rejected(text: str, events: list[dict[str, Any]]) -> int | None:
     monitor = Interpreter(text)
     for index, event in enumerate(events, start=1):
-        if monitor.step(event) == "false":
+        if monitor.step(flat(event)) == "false":
             return index
     return None
 

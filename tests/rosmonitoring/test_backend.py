@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import subprocess
@@ -188,21 +189,64 @@ node n {
 """
 
 
-def test_a_bag_is_not_run_without_the_package_that_reads_it(
-    make_system: Callable[..., System], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+LATE = """
+node n {
+  inputs( limit : REAL )  outputs( v : REAL )
+  topics( std_msgs/Float64 limit matches(in.limit), std_msgs/Float64 v matches(out.v) )
+  guarantee low ( out.v <= in.limit )
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("limit", "options", "verdict", "told"),
+    [
+        ("data", {}, Verdict.UNKNOWN, ["mapping: {in.limit: {…, initial: …}}", "decided: 0.9"]),
+        ("data", {"decided": 0.9}, Verdict.MONITORED, []),
+        ({"field": "data", "initial": 2}, {}, Verdict.MONITORED, []),
+    ],
+)
+def test_what_is_said_of_an_input_that_comes_late_is_what_helps(
+    limit: Any,
+    options: dict[str, Any],
+    verdict: Verdict,
+    told: list[str],
+    make_system: Callable[..., System],
+    tmp_path: Path,
 ) -> None:
-    system = make_system(MONITOR, {"out.v": "data"}, traces=["run.bag", "run.jsonl"])
-    (system.plan.root / "run.bag").write_bytes(b"#ROSBAG V2.0")
-    (system.plan.root / "run.jsonl").write_text('{"topic": "v", "time": 1, "data": 3.5}\n', encoding="utf-8")
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    """A latched input whose message is recorded after the first of ten answers."""
+    said = [("v", 1), ("limit", 2), *[("v", 1)] * 9]
+    lines = [json.dumps({"topic": topic, "time": k, "data": value}) for k, (topic, value) in enumerate(said)]
+    system = make_system(LATE, {"in.limit": limit, "out.v": "data"}, traces=["run.jsonl"], **options)
+    (system.plan.root / "run.jsonl").write_text("\n".join(lines), encoding="utf-8")
     outcome = discharge(system, "n", tmp_path)["low"]
-    assert outcome.verdict is Verdict.NOT_RUN
-    assert outcome.summary == (
-        "run.bag: reading bags needs the package rosbags; install it with: pip install 'avow[bags]'"
-    )
-    # what another trace refutes stays refuted
-    (system.plan.root / "run.jsonl").write_text('{"topic": "v", "time": 1, "data": 121}\n', encoding="utf-8")
-    assert discharge(system, "n", tmp_path)["low"].verdict is not Verdict.NOT_RUN
+    assert outcome.verdict is verdict
+    assert all(text in outcome.summary for text in told)
+
+
+def test_methods_share_their_nodes_mapping(make_system: Callable[..., System], tmp_path: Path) -> None:
+    """A method's own entry comes first; what reads no messages is given nothing."""
+    methods = [{"rosmonitoring": {"mapping": {"out.v": "own"}}}, {"hypothesis": {}}, {"hoare": {"program": "n.imp"}}]
+    node = {"mapping": {"in.limit": "data", "out.v": "data"}, "methods": methods}
+    plan = make_system(LATE, plan={"nodes": {"n": node}}).plan
+    found = [method.options.data.get("mapping") for method in plan.node("n").methods]
+    assert found == [{"in.limit": "data", "out.v": "own"}, {"in.limit": "data", "out.v": "data"}, None]
+
+
+def test_a_recording_named_by_its_digest_need_not_be_here(make_system: Callable[..., System], tmp_path: Path) -> None:
+    line = '{"topic": "v", "time": 1, "data": 3.5}\n'
+    entry = {"path": "run.jsonl", "sha256": hashlib.sha256(line.encode()).hexdigest()}
+    system = make_system(MONITOR, {"out.v": "data"}, traces=[entry])
+    job, file = job_for(system, "n"), system.plan.root / "run.jsonl"
+    assert [d.code for d in BACKEND.check(job)] == ["MON107"]
+    absent = discharge(system, "n", tmp_path)["low"]
+    assert (absent.verdict, "is not here" in absent.summary) == (Verdict.NOT_RUN, True)
+    file.write_text(line, encoding="utf-8")
+    assert [d.code for d in BACKEND.check(job)] == ["MON107"]
+    assert discharge(system, "n", tmp_path)["low"].verdict is Verdict.MONITORED
+    file.write_text(line * 2, encoding="utf-8")
+    assert [d.code for d in BACKEND.check(job)] == ["MON107", "MON102"]
+    assert discharge(system, "n", tmp_path)["low"].verdict is Verdict.ERROR
 
 
 COST = "monitors,WP1,the door\nnone,10,20.0\nnone,10,20.2\nn,10,20.1\nall,11,30.15\nother,1,1\n"

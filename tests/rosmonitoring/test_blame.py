@@ -245,7 +245,7 @@ def test_a_trace_may_say_whose_a_message_was(tmp_path: Path) -> None:
         "joy": (3, 1, 2),
         "auto": (3, 1, 2),
     }
-    assert running.unmonitored() == ["joy.slow", "auto.slow"]
+    assert [*running.unmonitored()] == ["joy.slow", "auto.slow"]
 
 
 def test_a_bag_with_a_publisher_that_is_not_modelled_is_refused(tmp_path: Path) -> None:

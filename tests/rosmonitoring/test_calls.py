@@ -111,7 +111,7 @@ def judged(system: System, bag: Path) -> tuple[list[tuple[str, int]], list[str]]
     """(what was broken, at which event), and what is unmonitored."""
     running = session(system, ("server",), bag)
     found = [(f"{v.node}.{v.clause}", v.index) for _, v in running.run(bag)]
-    return found, running.unmonitored()
+    return found, [*running.unmonitored()]
 
 
 @pytest.mark.parametrize("form", TEXTS)
@@ -214,7 +214,7 @@ def spinning(folder: Path) -> System:
 def broken(system: System, bag: Path) -> list[tuple[str, int]]:
     running = session(system, (), bag)
     found = [(v.clause, v.index) for _, v in running.run(bag)]
-    assert running.unmonitored() == []
+    assert [*running.unmonitored()] == []
     return found
 
 

@@ -157,14 +157,6 @@ def test_constructors_by_a_field(make_system: Callable[..., System], message: di
     assert expected in found if isinstance(expected, str) and isinstance(found, str) else found == expected
 
 
-def test_a_word_that_means_another_constructor_is_looked_up_once(make_system: Callable[..., System]) -> None:
-    """As RML has it: `halt` meant `inspect` here."""
-    command = {**COMMAND, "values": {"halt": "stop", "stop": "inspect"}}
-    system = make_system(RCL, {"out.cmd": command})
-    assert value_of(system, "out.cmd", {"topic": "cmd", "command": "halt"}) == Data("stop")
-    assert value_of(system, "out.cmd", {"topic": "cmd", "command": "stop", "id": 4}) == Data("inspect", (4,))
-
-
 def test_an_argument_of_an_algebraic_type_is_named_by_its_field(make_system: Callable[..., System]) -> None:
     """Where the message's type is known, too: the monitor could not be made, and died with a traceback."""
     rcl = """
@@ -290,3 +282,54 @@ def test_a_field_named_as_what_the_event_says_itself_is_the_messages(
     assert [v.fault for v in monitor.step({"topic": "s", "time": 2, "data": "x"})] == [Fault.MAPPING]
     assert monitor.values == {}
     assert "bears the name" in translate(found, system.contract.node("n").guarantees).refused["g"]
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [
+        ({"green": "red", "red": "green"}, "green"),
+        ({"green": "red"}, "green"),
+        ({"GREEN": "red"}, "GREEN"),
+        ({"green": "green", "GREEN": "red"}, "GREEN"),
+        ({"green": "green", "Red": "red"}, ""),
+        ({"g": "red", "r": "green"}, ""),
+    ],
+)
+def test_a_word_that_is_an_elements_name_means_that_element(
+    values: dict[str, str], word: str, make_system: Callable[..., System]
+) -> None:
+    system = make_system(RCL, {"in.c": {"field": "level", "values": values}})
+    _, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    told = [fault for fault in faults if "is an element too" in fault.message]
+    assert len(told) == (1 if word else 0)
+    assert all(repr(word) in fault.message and fault.span is not None for fault in told)
+
+
+BOTH = """node n { inputs( r : REAL, q : REAL ) outputs( v : REAL, at : REAL x REAL --> BOOL )
+  topics( a/R r matches(in.r), a/R q matches(in.q), a/V v matches(out.v), a/R at matches(out.at) )
+  guarantee g ( out.v == in.r ) guarantee h ( out.at(in.r, in.q) ) }"""
+INPUTS = {"in.r": "data", "in.q": "data"}
+
+
+@pytest.mark.parametrize(
+    ("mapping", "told"),
+    [
+        ({**INPUTS, "out.v": {"topic": "r", "field": "data"}}, "in.r"),
+        ({**INPUTS, "in.r": {"topic": "v", "field": "data"}}, "in.r"),
+        ({**INPUTS, "out.v": {"topic": "r", "field": "other"}}, ""),  # a message may carry input and answer
+        ({**INPUTS, "out.at": {"topic": "r", "fields": ["data", "other"]}}, ""),
+        (
+            {**INPUTS, "in.q": {"topic": "r", "field": "other"}, "out.at": {"topic": "r", "fields": ["data", "other"]}},
+            "in.r, in.q",
+        ),
+    ],
+)
+def test_what_a_node_is_told_is_no_answer_of_it(
+    mapping: dict[str, object], told: str, make_system: Callable[..., System]
+) -> None:
+    types = {"a/R": "float64 data\nfloat64 other", "a/V": "float64 data"}
+    system = make_system(BOTH, mapping, messages=types)
+    _, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    found = [fault for fault in faults if "it is read from the message that gives" in fault.message]
+    assert [fault.message.partition("gives ")[2] for fault in found] == ([told] if told else []), faults
+    assert all(fault.span is not None for fault in found)

@@ -74,6 +74,16 @@ def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[
     assert [n["node"] for n in whole["nodes"]] == ["radiationSensor"]
 
 
+def test_a_flood_of_one_clause_hides_no_breach_of_another() -> None:
+    event = '{"topic": "%s", "time": %d, "%s": %s}'
+    unreadable = [event % ("radiationStatus", n, "level", '"violet"') for n in range(30)]
+    breach = [event % ("r", 30, "radiation", "300"), event % ("radiationStatus", 31, "level", '"green"')]
+    done = monitor(str(CASE), "-", "--node", "radiationSensor", stdin="\n".join(unreadable + breach))
+    assert done.stdout.count(": message outside its mapping: radiationSensor.out.radiationStatus") == 10
+    assert "… and 20 more of radiationSensor.out.radiationStatus: message outside its mapping (--all" in done.stdout
+    assert "event 32 (t = 31): guarantee broken: this node: radiationSensor.high" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("trace", "words"),
     some(

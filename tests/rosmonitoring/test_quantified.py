@@ -6,7 +6,7 @@ import random
 from dataclasses import replace
 from typing import Any
 
-from oracle.values import Step
+from reference.meaning import Step
 from temporal import test_quantified_cells as quantified
 
 from avow.backends.rosmonitoring.engine import Monitor

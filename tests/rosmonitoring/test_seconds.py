@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from drawn.memory import TIMED_NODE, B, timed_formula, timed_response, word_of
-from oracle.seconds import InSeconds, Word
+from reference.meaning import Meaning, Word
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.memory import Silence
@@ -222,7 +222,7 @@ def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
     if singly:
         word, topics = by_message(rng, word)
     trigger, response = timed_response(rng, depth - 1)
-    meaning, judged, wrong = InSeconds(word), 0, list[str]()
+    meaning, judged, wrong = Meaning(), 0, list[str]()
     for whole in (term, Implies(trigger, response)):
         about, asked = free_variables(whole), free_variables(trigger)
         of_inputs = whole is not term and bool(asked) and asked <= {p.variable for p in TIMED_NODE.inputs}
@@ -242,12 +242,7 @@ def disagreement(known: Setup, rng: random.Random) -> tuple[int, list[str]]:
                 told += monitor.step({"topic": each, "time": time, **parts[each]})
         if monitor.tallies["g"].reason:  # refused by name
             continue
-        places = range(len(word.positions))
-        first = (
-            next((p for p in places if not meaning.at(term, p)), None)
-            if whole is term
-            else meaning.broken(trigger, response, word)
-        )
+        first = meaning.broken(whole, word)
         expected = [] if first is None else [str(word.positions[first].start)]
         judged += 1
         if [v.time for v in told][:1] != expected:

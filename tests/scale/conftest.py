@@ -15,10 +15,9 @@ from .made import programs
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workspace]:
+def place(tmp_path: Path) -> Iterator[Workspace]:
     programs(tmp_path / "contracts" / "made", 3, 2)
     (tmp_path / "dodo.py").touch()
-    monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)  # with another environment it is another fork server
     yield Workspace(tmp_path)
     ledger_of.cache_clear()
 

@@ -6,12 +6,10 @@ import contextlib
 import dataclasses
 import json
 import os
-import queue
-import random
 import socket
 import subprocess
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +20,18 @@ from avow.backend_kit.registry import backend
 from avow.base.tools import find_tool
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger, ledger_of
-from avow.pipeline import asking
+from avow.pipeline import dispatch
 from avow.pipeline.discharge import discharge
-from avow.pipeline.executors import Asked, Came, Elsewhere
+from avow.pipeline.methods import tool_identities
+from avow.pipeline.remote import Remote
+from avow.pipeline.requests import Request, Response, read_response, request_bytes, request_digest
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, catalogue, tool_identities
+from avow.pipeline.work import Work, catalogue
 from avow.pipeline.worker import answer
 from avow.system.load import load_system
 
 
-def works(place: Workspace, there: Elsewhere | None = None) -> list[Work]:
+def works(place: Workspace, there: Remote | None = None) -> list[Work]:
     found = catalogue(load_system(place.contracts / "made"), there.tools if there else None).works
     return [work for work in found if work.cut is not None]
 
@@ -45,45 +45,29 @@ def recorded(place: Workspace) -> list[object]:
     return sorted(json.loads(json.dumps(records, default=str)), key=lambda r: (r["obligation"], r["method"]))
 
 
-def settle(place: Workspace, there: Elsewhere | None = None) -> list[object]:
+def settle(place: Workspace, there: Remote | None = None) -> list[object]:
     place.ledger("made").unlink(missing_ok=True)
     ledger_of.cache_clear()
-    run = Run("a", False, elsewhere=there)
+    run = Run("a", False, remote=there)
     for work in works(place, there):
         discharge(place, work, run)
     return recorded(place)
 
 
-class Odd:
-    """Here, but answers come late, in another order, and twice."""
-
-    def __init__(self) -> None:
-        self.came: queue.SimpleQueue[Came] = queue.SimpleQueue()
-        self.chance = random.Random(7)
+class Answering:
+    """A remote executor that answers in this process."""
 
     def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
-        return {"odd": frozenset(tool_identities(backend("hoare")))}
+        return {"here": frozenset(tool_identities(backend("hoare")))}
 
-    def submit(self, asked: Asked) -> None:
-        came = Came(asked.key, answer(asked.data))
-        for _ in range(self.chance.choice((1, 2, 3))):
-            self.came.put(came)
-
-    def results(self) -> Iterator[Came]:
-        while True:
-            held = [self.came.get()]
-            while not self.came.empty():
-                held.append(self.came.get())
-            self.chance.shuffle(held)
-            yield from held
-
-    def cancel(self, keys: Collection[str]) -> None: ...
-    def close(self) -> None: ...
+    def run(self, request: Request) -> Response:
+        data = request_bytes(request)
+        return read_response(answer(data), request_digest(data))
 
 
-def one(place: Workspace, engine: str = "hoare") -> tuple[Work, Asked]:
+def one(place: Workspace, engine: str = "hoare") -> tuple[Work, Request]:
     work = next(w for w in works(place) if w.engine == engine)
-    return work, Asked.of(asking.request_of(place, work, work.obligations, place.root / "artifacts"))
+    return work, dispatch.request_of(place, work, work.obligations, place.root / "artifacts")
 
 
 HANGS = """#!/bin/sh

@@ -114,14 +114,14 @@ def test_each_fault_of_a_certificate_is_told(
         monkeypatch.setenv(f"AVOW_TLS_{name}", value)
     if client == "nonsense":
         with pytest.raises(Rejected, match=why):
-            Address.read("dask+tls://127.0.0.1:9").greet()
+            Address.read("dask+tls://127.0.0.1:9").security()
         return
     with listening(ours.file, *issued(server, "server")) as url:
         if why is None:
-            Address.read(url).greet()
+            Address.read(url).security()
         else:
             with pytest.raises(Rejected, match=f"CLUSTER005|{why}") as told:
-                Address.read(url).greet()
+                Address.read(url).security()
             assert told.value.diagnostics[0].code == "CLUSTER005"
 
 
@@ -132,4 +132,4 @@ def test_nobody_there_yet_is_no_matter_of_certificates(tmp_path: Path, monkeypat
         monkeypatch.setenv(f"AVOW_TLS_{name}", value)
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))  # bound and not listening: refused at once
-        Address.read(f"dask+tls://127.0.0.1:{closed.getsockname()[1]}").greet()
+        Address.read(f"dask+tls://127.0.0.1:{closed.getsockname()[1]}").security()

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,14 +17,14 @@ from typing import Any
 import pytest
 from helpers import edit, some, wait_for
 
-from avow.backend_kit.protocol import Limits
 from avow.base.tools import find_tool
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger, ledger_of
-from avow.pipeline import asking
+from avow.pipeline import dispatch
 from avow.pipeline.discharge import discharge
-from avow.pipeline.executors import Asked, Came
-from avow.pipeline.requests import Request
+from avow.pipeline.processes import Processes
+from avow.pipeline.remote import remote
+from avow.pipeline.requests import Response, request_bytes, request_digest
 from avow.pipeline.run_info import Run
 
 from .machines import HANGS, Machines, one, recorded, settle, with_dafny, works
@@ -40,11 +41,11 @@ def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspa
     here = settle(place)
     first, _ = machines.worker(), machines.worker()
     with machines.cluster(2) as cluster:
-        there = asking.elsewhere(cluster)
+        there = remote(cluster)
         assert settle(place, there) == here
         place.ledger("made").unlink()
         ledger_of.cache_clear()
-        run = Run("a", False, elsewhere=there)
+        run = Run("a", False, remote=there)
         for number, work in enumerate(works(place, there)):
             if number == 1:
                 first.send_signal(signal.SIGKILL)
@@ -70,13 +71,13 @@ def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
 
     try:
         with machines.cluster(2) as cluster:
-            there = asking.elsewhere(cluster)
+            there = remote(cluster)
             place.ledger("made").unlink()
             ledger_of.cache_clear()
             threading.Thread(target=trouble, daemon=True).start()
             for run in "abcd":  # what was lost three times is asked again
                 for work in works(place, there):
-                    discharge(place, work, Run(run, False, elsewhere=there))
+                    discharge(place, work, Run(run, False, remote=there))
             assert verdicts(recorded(place)) == verdicts(here)
     finally:
         over.set()
@@ -99,19 +100,20 @@ def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
     worker = machines.worker()
     try:
         with machines.cluster() as cluster:
-            there = asking.elsewhere(cluster)
+            there = remote(cluster)
             work = next(w for w in works(place, there) if w.engine == "dafny")
-            request = asking.request_of(place, work, work.obligations, place.root / "artifacts")
+            request = dispatch.request_of(place, work, work.obligations, place.root / "artifacts")
             assert request.wanted
-            asked = Asked.of(request)
-            cluster.submit(asked)
+            responses: list[Response] = []
+            thread = threading.Thread(target=lambda: responses.append(cluster.run(request)), daemon=True)
+            thread.start()
             wait_for(machines.hanging)
             match how:
                 case "cancelled":
-                    cluster.cancel([asked.key])
+                    cluster.close()
                 case "out of time":
-                    came = next(cluster.results())
-                    verdicts = asking.judged(work, work.obligations, asked.data, came.data, {}).outcomes
+                    thread.join(120)
+                    verdicts = dispatch.judged(work, work.obligations, responses[0]).outcomes
                     assert not any(o.verdict.supports for o in verdicts)
                 case _:  # the worker is killed
                     worker.send_signal(signal.SIGKILL)
@@ -147,46 +149,6 @@ def test_verify_on_a_cluster_says_what_verify_says(place: Workspace, machines: M
 
 
 @pytest.mark.slow
-def test_what_a_worker_pickles_is_not_read(
-    machines: Machines, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Neither as an answer nor as an error, and what it says is not shown."""
-    from avow.pipeline.cluster import _fetched
-
-    machines.worker()
-    here = os.getpid()
-
-    def evil(raised: bool) -> object:
-        import cloudpickle
-        import distributed
-
-        class EvilError(Exception):  # made there, so that it travels by value
-            def __reduce__(self) -> object:
-                code = f"import os\nif os.getpid() == {here}: os.mkdir({str(tmp_path / 'ran')!r})"
-                return exec, (code,)
-
-        distributed.print("all is proved")
-        distributed.get_worker().log_event("warn", {"message": cloudpickle.dumps(EvilError())})
-        if raised:
-            raise EvilError
-        return EvilError()
-
-    with machines.cluster() as cluster:
-        request = Request("", "", "", "sanity", {}, Limits(), b"", "")
-        for raised, status in ((False, "finished"), (True, "error")):
-            future = cluster._client.submit(evil, raised, pure=False)
-            wait_for(lambda: future.status in ("finished", "error"))  # noqa: B023
-            assert future.status == status
-            came = _fetched(Asked.of(request), future)
-            assert came is not None
-            assert came.data is None
-            assert came.failure
-        assert not (tmp_path / "ran").exists()
-        assert cluster.offers(), "it still hears what is said"
-    assert "proved" not in "".join(capfd.readouterr())
-
-
-@pytest.mark.slow
 def test_what_nobody_can_do_any_more_is_not_waited_for(
     place: Workspace, machines: Machines, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -196,45 +158,21 @@ def test_what_nobody_can_do_any_more_is_not_waited_for(
 
     monkeypatch.setattr(there, "CLUSTER_LOOK", 0.1)
     worker = machines.worker()
-    with machines.cluster() as cluster:
-        found = cluster.results()
-        _, asked = one(place, "sanity")
+    with machines.cluster() as cluster, ThreadPoolExecutor() as pool:
+        _, request = one(place, "sanity")
         worker.send_signal(signal.SIGKILL)
         worker.wait()
-        cluster.submit(asked)
+        response = pool.submit(cluster.run, request)
         wait_for(lambda: "no worker of the cluster is left" in capfd.readouterr().err)
         machines.worker()
-        assert next(found).data is not None
+        assert response.result().report is not None
         monkeypatch.setattr(there, "CLUSTER_PATIENCE", 0.5)
         for gone in (machines.processes[-1], machines.processes[0]):
             gone.send_signal(signal.SIGKILL)
             gone.wait()
-            cluster.submit(asked)
-            came = next(found)
-            assert came.data is None
-            assert ("no worker" if gone is not machines.processes[0] else "scheduler") in came.failure
+            failure = cluster.run(request).failure
+            assert ("no worker" if gone is not machines.processes[0] else "scheduler") in failure
     assert "Traceback" not in capfd.readouterr().err
-
-
-def test_works_may_be_submitted_while_it_is_looked_for_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing else ends the wait for a cluster that is lost: whoever looks must not fail."""
-    pytest.importorskip("distributed")
-    from avow.pipeline import cluster as there
-
-    cluster = object.__new__(there.Cluster)
-    cluster._lock, cluster._closed, cluster._under_way = threading.Lock(), threading.Event(), {}
-    cluster._wanted = {frozenset({"a"}), frozenset({"b"})}
-
-    class Offered(dict[str, int]):
-        def keys(self) -> Any:
-            cluster._wanted.add(frozenset({f"another {len(cluster._wanted)}"}))
-            cluster._closed.set()  # this look is the last
-            return super().keys()
-
-    monkeypatch.setattr(there, "CLUSTER_LOOK", 0)
-    monkeypatch.setattr(there.Cluster, "_workers", lambda self, seconds: {"w": Offered()})
-    cluster._watch()
-    assert len(cluster._wanted) == 4
 
 
 def test_only_a_worker_of_the_same_code_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,22 +209,23 @@ def test_a_worker_that_can_do_no_works_leaves_and_takes_none_with_it(
     (package / "base").mkdir(parents=True)
     (package / "base/some.py").write_text("A = 1")
     monkeypatch.setattr(engine_code, "_PACKAGE", package)
-    own, left = cluster_worker._Own(engine_code.code_mark()), list[object]()
+    own, left = cluster_worker.Own(engine_code.code_mark()), list[object]()
     worker = SimpleNamespace(extensions={"avow": own}, close="close", loop=SimpleNamespace(add_callback=left.append))
     monkeypatch.setattr(distributed, "get_worker", lambda: worker)
     monkeypatch.setattr(cluster_worker, "_cancelled", lambda worker: None)
-    monkeypatch.setattr(cluster_worker, "answered", lambda forks, data, key, *more: Came(key, b"it"))
-    assert cluster_worker.perform(b"", "k", 1) == b"+it"
+    data = request_bytes(one(place)[1])
+    monkeypatch.setattr(Processes, "run", lambda self, request, *more: Response(request_digest(data), failure="it"))
+    assert b"it (on " in cluster_worker.perform(data)
 
-    def full(*asked: object) -> Came:
+    def full(*asked: object) -> Response:
         raise OSError(28, "No space left on device")
 
     if why == "its disk is full":
-        monkeypatch.setattr(cluster_worker, "answered", full)
+        monkeypatch.setattr(Processes, "run", full)
     else:
         (package / "base/some.py").write_text("A = 10")
     with pytest.raises(distributed.Reschedule):
-        cluster_worker.perform(b"", "k", 1)
+        cluster_worker.perform(data)
     assert left == ["close"]
     assert ("No space" if "full" in why else "since this worker began") in own.unfit
 
@@ -341,7 +280,7 @@ def test_by_tls_the_same_and_no_word_with_whom_the_authority_does_not_know(
     try:
         machines.worker()
         with machines.cluster() as cluster:
-            assert settle(place, asking.elsewhere(cluster)) == here
+            assert settle(place, remote(cluster)) == here
         before = Ledger(place.ledger("made")).head
         for name, (cert, key) in {
             "expired": ours.issue("late", expired=True),

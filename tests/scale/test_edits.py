@@ -64,25 +64,14 @@ def test_always_is_fresh(place: Path) -> None:
     assert len(Ledger(ledger.path).records()) > before
 
 
-def test_info_shows_inputs_and_targets(place: Path) -> None:
-    doit(place, "verify")
-    told = doit(place, "info", "discharge:made:n0:hoare", code=0)
-    assert "up-to-date" in told
-    assert "contracts/made/models/n0.imp" in told
-    assert "artifacts/ledger/made.jsonl" in told
-    assert "in every run" in doit(place, "info", "verify:made", code=1)
-    assert "no task nothing" in doit(place, "info", "nothing", code=2)
-
-
 def test_clean_removes_what_is_made_again_and_no_evidence(place: Path) -> None:
     doit(place, "verify")
     ledger = (place / "artifacts" / "ledger" / "made.jsonl").read_bytes()
     made = place / "artifacts" / "made" / "n0" / "hoare"
     assert list(made.glob("*.smt2"))
-    told = doit(place, "clean", "-n", "verify:made", "export:made:n0:hoare", code=0)
+    doit(place, "clean", "-n", "verify:made", "export:made:n0:hoare", code=0)
     assert list(made.glob("*.smt2"))
-    told = doit(place, "clean", "verify:made", "export:made:n0:hoare", "sanity:made:n0", code=0)
-    assert "never removed" in told
+    doit(place, "clean", "verify:made", "export:made:n0:hoare", "sanity:made:n0", code=0)
     assert not list(made.glob("*.smt2"))
     assert not (place / "reports" / "made").exists()
     assert (place / "artifacts" / "ledger" / "made.jsonl").read_bytes() == ledger

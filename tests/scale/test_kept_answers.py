@@ -13,12 +13,12 @@ from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.calculus import entailment
 from avow.calculus.composition import Composition, compose
-from avow.calculus.kept_answers import KeptAnswers, keeping
+from avow.calculus.entailment import KeptAnswers, keeping
 from avow.calculus.obligations import reestablished
 from avow.evidence.ledger import ledger_of
 from avow.kernel.solvers import Said
-from avow.pipeline.asking import _earlier, read_answers
 from avow.pipeline.discharge import discharge
+from avow.pipeline.dispatch import _earlier, read_answers
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import COMPOSE, catalogue
@@ -121,8 +121,7 @@ def test_a_lie_that_was_kept_proves_nothing(tmp_path: Path, monkeypatch: pytest.
     system = load_path(path)
     composition = compose(system)
     with monkeypatch.context() as patch:
-        said = ("", Entailment(Verdict.PROVED, needed=("n0.g0",)))
-        patch.setattr(entailment, "entailed_before", lambda *_: said)
+        patch.setattr(entailment, "_implied", lambda *_: Entailment(Verdict.PROVED, needed=("n0.g0",)))
         patch.setattr(KeptAnswers, "find", lambda *_: Said.UNSAT)
         with keeping(KeptAnswers()):
             outcomes = settle_all(composition, all_obligations(composition), Limits(seconds=20))

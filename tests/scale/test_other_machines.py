@@ -19,33 +19,31 @@ from avow.base.workspace import Workspace
 from avow.evidence.record import RETRY
 from avow.isolation import tracing
 from avow.isolation.observed import Observed, Seen, look
-from avow.pipeline import asking, worker
+from avow.pipeline import dispatch, worker
 from avow.pipeline import work as work_module
 from avow.pipeline.discharge import discharge, open_obligations
-from avow.pipeline.executors import Asked, Came
-from avow.pipeline.requests import read_response, response_bytes
+from avow.pipeline.remote import remote
+from avow.pipeline.requests import Request, Response
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
-from avow.pipeline.worker import answer
 
-from .machines import HANGS, Machines, Odd, one, with_dafny, works
+from .machines import HANGS, Answering, Machines, one, with_dafny, works
 
 
-class Seeing(Odd):
-    """A worker on another machine, whose answers tell what was looked at there."""
+class Seeing(Answering):
+    """A worker on another machine, whose answers report what was observed there."""
 
     def __init__(self, observed: Sequence[Observed]) -> None:
-        super().__init__()
         self.observed = tuple(observed)
 
-    def submit(self, asked: Asked) -> None:
+    def run(self, request: Request) -> Response:
         with pytest.MonkeyPatch.context() as there:
             for module in (work_module, worker):
-                there.setattr(module, "tool_identities", lambda tool, offered=None: asked.request.tools)
-            good = read_response(answer(asked.data), asked.data)
+                there.setattr(module, "tool_identities", lambda tool, offered=None: request.tools)
+            good = super().run(request)
         assert good.report is not None
         seen = dataclasses.replace(good.report, observed=self.observed)
-        self.came.put(Came(asked.key, response_bytes(dataclasses.replace(good, report=seen, worker="wk\x1b1"))))
+        return dataclasses.replace(good, report=seen, worker="wk\x1b1")
 
 
 def as_it_is(kind: Seen, path: Path) -> Observed:
@@ -66,35 +64,31 @@ def test_what_a_worker_saw_is_held_against_this_machine(tmp_path: Path, monkeypa
         Seen.FOLDER: file.parent,
         Seen.STATE: file,
         Seen.KIND: file,
-        Seen.PLACE: tmp_path,
-        Seen.VARIABLE: Path("PATH"),
         Seen.MODULES: Path("module path"),
-        Seen.TRACER: Path("strace"),
-        Seen.SANDBOX: Path("bwrap"),
     }
     for kind, path in rows.items():
         row = as_it_is(kind, path)
-        assert not asking.unlike_here([row], tmp_path), kind
+        assert not dispatch.unlike_here([row], tmp_path), kind
         other = row._replace(digest="0" * 64) if kind is not Seen.MISSING else as_it_is(kind, file)
-        assert asking.unlike_here([row, other], tmp_path) == (other,)
+        assert dispatch.unlike_here([row, other], tmp_path) == (other,)
     outside = Observed(Seen.OUTSIDE, "the network")
-    assert asking.unlike_here([outside], tmp_path) == (outside,)
+    assert dispatch.unlike_here([outside], tmp_path) == (outside,)
     assert {*rows, Seen.OUTSIDE} == set(Seen)
     relative = as_it_is(Seen.READ, file)._replace(path="folder/file")  # of the workspace
-    assert not asking.unlike_here([relative], tmp_path)
-    assert asking.unlike_here([relative], tmp_path / "other") == (relative,)
+    assert not dispatch.unlike_here([relative], tmp_path)
+    assert dispatch.unlike_here([relative], tmp_path / "other") == (relative,)
 
 
 def first_of(place: Workspace, run: Run) -> tuple[Work, Report]:
-    work = next(w for w in works(place, run.elsewhere) if w.engine == "hoare")
-    return work, asking.settle(place, work, work.obligations, place.root, run)
+    work = next(w for w in works(place, run.remote) if w.engine == "hoare")
+    return work, dispatch.settle(place, work, work.obligations, place.root, run)
 
 
 def test_what_holds_here_too_stays_on_record_and_goes_stale_here(place: Workspace, tmp_path: Path) -> None:
     header = tmp_path / "header"
     header.write_text("1")
     rows = (as_it_is(Seen.READ, header), as_it_is(Seen.MISSING, tmp_path / "settings"))
-    run = Run("a", False, elsewhere=asking.elsewhere(Seeing(rows)))
+    run = Run("a", False, remote=remote(Seeing(rows)))
     work, report = first_of(place, run)
     assert report.observed == rows
     assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}, [o.summary for o in report.outcomes]
@@ -112,12 +106,12 @@ def test_what_holds_here_too_stays_on_record_and_goes_stale_here(place: Workspac
 def test_what_is_otherwise_on_a_worker_never_counts_unseen(
     place: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kind: Seen
 ) -> None:
-    """Done again where its tools are here; else an undeclared input, until something is done about it."""
+    """It is run again where its tools are here; else its answer is never reused."""
     header = tmp_path / "header"
     header.write_text("1")
     same, other = as_it_is(Seen.READ, place.contracts / "made" / "system.rcl"), Observed(kind, str(header), "")
     seeing = Seeing([same, other])
-    _, report = first_of(place, Run("a", False, elsewhere=asking.elsewhere(seeing)))
+    _, report = first_of(place, Run("a", False, remote=remote(seeing)))
     assert not report.observed, "it was done here, where nothing was looked at"
     assert {o.verdict for o in report.outcomes} == {Verdict.PROVED}, [o.summary for o in report.outcomes]
     said = capsys.readouterr().err
@@ -126,30 +120,30 @@ def test_what_is_otherwise_on_a_worker_never_counts_unseen(
     # a tool that only the workers have
     theirs = ("z3", "9.9", "x")
     monkeypatch.setattr(Seeing, "offers", lambda self: {"wk1": frozenset([theirs])})
-    seeing = Seeing([same, other])  # another desk, which alone listens to it
-    run = Run("b", False, elsewhere=asking.elsewhere(seeing))
+    seeing = Seeing([same, other])
+    run = Run("b", False, remote=remote(seeing))
     work, report = first_of(place, run)
     for outcome in report.outcomes:
-        assert outcome.verdict is Verdict.UNKNOWN
-        assert outcome.summary.startswith("undeclared input: ")
+        assert outcome.verdict is Verdict.PROVED
+        assert outcome.details[RETRY]
+        assert "re-run in every run" in outcome.summary
         assert f"{header} (on wk 1)" in outcome.summary
     assert same in report.observed
     assert not {o.digest for o in report.observed if o.kind is Seen.OUTSIDE} - {""}
     discharge(place, work, run)
-    assert open_obligations(place, work, Run("c", False, elsewhere=run.elsewhere)), "the next run asks again"
+    assert open_obligations(place, work, Run("c", False, remote=run.remote)), "the next run asks again"
     seeing.observed = (same,)
-    run = Run("c", False, elsewhere=run.elsewhere)
+    run = Run("c", False, remote=run.remote)
     assert {o.verdict for o in discharge(place, work, run)} == {Verdict.PROVED}
-    assert not open_obligations(place, work, Run("d", False, elsewhere=run.elsewhere))
+    assert not open_obligations(place, work, Run("d", False, remote=run.remote))
 
 
 def test_a_refutation_stays_one_whatever_the_worker_saw(place: Workspace) -> None:
-    asked = one(place)[1]
-    good = read_response(answer(asked.data), asked.data).report
+    good = Answering().run(one(place)[1]).report
     assert good is not None
     bad = tuple(dataclasses.replace(o, verdict=Verdict.REFUTED) for o in good.outcomes)
     row = Observed(Seen.READ, "/etc/other", "0")
-    report = asking._undeclared(dataclasses.replace(good, outcomes=bad, observed=(row,)), [row], "wk1")
+    report = dispatch._undeclared(dataclasses.replace(good, outcomes=bad, observed=(row,)), [row], "wk1")
     assert {o.verdict for o in report.outcomes} == {Verdict.REFUTED}
     assert all(o.details[RETRY] for o in report.outcomes)
 
@@ -179,12 +173,12 @@ def test_of_two_machines_only_what_is_as_here_is_on_record(
         only = machines.worker(*around)
         try:
             with machines.cluster() as cluster:
-                there = asking.elsewhere(cluster)
+                there = remote(cluster)
                 work = next(w for w in works(place, there) if w.engine == "dafny")
-                report = asking.settle(place, work, work.obligations, tmp_path, Run("a", False, elsewhere=there))
+                report = dispatch.settle(place, work, work.obligations, tmp_path, Run("a", False, remote=there))
                 (row,) = [o for o in report.observed if o.path == str(conf)]
                 assert row == as_it_is(Seen.READ, conf)
-                assert not asking.unlike_here(report.observed, place.root)
+                assert not dispatch.unlike_here(report.observed, place.root)
                 assert told in capsys.readouterr().err
         finally:
             only.kill()

@@ -14,7 +14,8 @@ from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, negation
 from avow.language.sorts import INTEGER
 from avow.language.terms import Arithmetic, Compare, Implies, Literal, Quantified, Quantifier, Role, Term, Variable
-from avow.pipeline.work import catalogue, method_backend, method_job, planned_method
+from avow.pipeline.methods import method_backend, method_job
+from avow.pipeline.work import catalogue, planned_method
 from avow.solving.questions import entails
 from avow.solving.settling import Settler
 from avow.system.load import load_system

@@ -10,15 +10,15 @@ import functools
 import random
 import re
 import shutil
+import signal
 import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-
-from language.fuzzing import at_most
 
 from avow.base.codec import to_json
 from avow.base.diagnostics import Rejected
@@ -28,6 +28,28 @@ from avow.system.load import load_system
 from avow.system.plan import System
 
 SECONDS = 20.0
+
+
+class Slow(Exception):  # noqa: N818 - it reads as what the text was
+    """A text that took longer than it may."""
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raises `Slow` after so much CPU time of this process."""
+
+    def stop(signal_number: int, frame: object) -> None:
+        raise Slow
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
 _TOKEN = re.compile(r"[A-Za-z_][\w.'-]*|\d+(?:\.\d+)?|\s+|.", re.DOTALL)
 _WORDS = (
     *(

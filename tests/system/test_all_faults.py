@@ -225,7 +225,7 @@ def test_wrong_types_remaps_and_publishers_are_told_by_check_in_one_round(
     [("my/Sped", ""), ("my/Speed", "nothing defines my/Speed"), ("std_srvs/SetBool", "which part of a call")],
 )
 def test_types_that_nothing_defines(tmp_path: Path, kind: str, message: str) -> None:
-    from avow.pipeline.check import of_plan
+    from avow.pipeline.plan_check import of_plan
 
     (tmp_path / "my").mkdir()
     (tmp_path / "my/Sped.msg").write_text("float64 v\n", encoding="utf-8")

@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.cli import main
+from avow.cli.check import command as check
+from avow.pipeline.plan_check import diagnostics
 from avow.system.graph import dataflow
 from avow.system.launched import told
 from avow.system.load import load_system
@@ -196,3 +199,84 @@ def test_an_include_that_is_not_read_is_no_doubt_of_what_comes_before_it(tmp_pat
     before, after = UNREAD[2].split('<include file="$(find-pkg-share other)/l.xml"/>')
     launch = before + after.replace("</launch>", '<include file="$(find-pkg-share other)/l.xml"/></launch>')
     assert edges(make(tmp_path, LAUNCH, launch)) == ["a.x → b.y /left/t"]
+
+
+CLASS = """
+from rclpy.node import Node
+
+
+class B(Node):
+    def __init__(self):
+        super().__init__("b")
+        self.limit = self.declare_parameter("limit", 1.0).value
+"""
+NODE = "<node name='b' pkg='p' exec='b'>{}</node>"
+
+
+@pytest.mark.parametrize(
+    ("own", "launched", "said"),
+    [
+        ("limit: 2.0", NODE.format("<param name='limit' value='2.0'/>"), ""),
+        ("limit: 2.0", NODE.format(""), ""),
+        ("limit: 2.0", NODE.format("<param from='$(dirname)/p.yaml'/>"), "limit = 3.0, and the plan says 2.0"),
+        ("limit: 3.0", NODE.format("<param from='$(dirname)/p.yaml'/>"), ""),
+        ("/left/b: {ros__parameters: {limit: 3.0}}", NODE.format("<param name='limit' value='2.0'/>"), "sets nothing"),
+        ("{}", NODE.format("<param name='limit' value='2.0'/>"), "limit = 2.0, and the plan does not set it"),
+        ("{limit: 2.0, x: 1}", NODE.format("<param name='limit' value='2.0'/>"), "the plan sets x of b"),
+        ("{limit: 2.0, x: 1}", NODE.format("<param name='limit' value='$(env L)'/>"), "not read"),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[{'limit': 3.0}])", "limit = 3.0"),
+        ("limit: 3.0", "Node(name='b', package='p', executable='b', parameters=[HERE, {'limit': 3.0}])", ""),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE])", "limit = 3.0"),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[unknown()])", "not read"),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE, unknown()])", "not read"),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=[HERE, 'p.yaml'])", "not read"),
+        ("limit: 2.0", "Node(name='b', package='p', executable='b', parameters=['p.yaml', HERE])", "limit = 3.0"),
+        (
+            "limit: 2.0",
+            "Node(name='b', package='p', executable='b', parameters=[unknown(), {'limit': 3.0}])",
+            "limit = 3.0",
+        ),
+    ],
+)
+def test_parameters_of_a_launch_file_are_compared(tmp_path: Path, own: str, launched: str, said: str) -> None:
+    """A class is examined with the parameters that the robot starts it with, or the difference is named."""
+    plan = "nodes: {b: {source: {python: b.py, class: B, kind: rclpy, parameters: p.yaml}, methods: []}}\n"
+    if launched.startswith("Node"):
+        here = "PathJoinSubstitution([ThisLaunchFileDir(), 'p.yaml'])"
+        text = f"def generate_launch_description():\n    return LaunchDescription([{launched.replace('HERE', here)}])\n"
+        folder = make(tmp_path, f"{plan}ros: {{launch: [../../launch/robot.launch.py]}}")
+        (tmp_path / "launch/robot.launch.py").write_text(text, encoding="utf-8")
+    else:
+        folder = make(tmp_path, plan + LAUNCH.replace(".launch]", ".launch.xml]"))
+        (tmp_path / "launch/robot.launch.xml").write_text(f"<launch>{launched}</launch>", encoding="utf-8")
+    (tmp_path / "launch/p.yaml").write_text("'/**': {ros__parameters: {limit: 3.0}}", encoding="utf-8")
+    (folder / "b.py").write_text(CLASS, encoding="utf-8")
+    (folder / "p.yaml").write_text(own, encoding="utf-8")
+    if said in ("", "not read", "sets nothing"):  # what the file itself lacks is told where the class is driven
+        unread = [d for d in told(load_system(folder)) if d.code == "ROS121" and "not read" in d.message]
+        assert len(unread) == (said == "not read")
+        return
+    with pytest.raises(Rejected) as caught:
+        load_system(folder)
+    assert [d.code for d in caught.value.diagnostics] == ["ROS127"]
+    assert said in caught.value.diagnostics[0].message
+
+
+def test_a_contract_drafted_of_what_runs_has_the_names_after_remapping(tmp_path: Path) -> None:
+    """No doubt about the direction of a launch file's remapping: the links are those of the running graph."""
+    contract = CONTRACT.replace("float64 t ", "float64 /left/t ").replace("float64 u ", "float64 /left/t ")
+    folder = make(tmp_path, LAUNCH, contract=contract)
+    assert edges(folder) == ["a.x → b.y /left/t"]
+    assert [d.code for d in diagnostics(load_system(folder)) if d.code == "ROS116"] == []
+
+
+def test_memory_needs_no_topic(tmp_path: Path) -> None:
+    contract = CONTRACT.replace("topics( float64 u matches(in.y) )", "topics( float64 z matches(out.z) )")
+    source = "nodes: {b: {source: {python: b.py, class: B}, memory: {y: self.y}, methods: []}}"
+    for plan, told_ in (("{}", ["RCL405"]), (source, [])):
+        folder = make(tmp_path, plan, contract=contract)
+        (folder / "b.py").write_text("class B: pass", encoding="utf-8")
+        found = [d.code for d in diagnostics(load_system(folder)) if d.code == "RCL405"]
+        assert found == told_
+        shown = CliRunner().invoke(check, [str(folder)]).output
+        assert ("no topic of `b` carries `in.y`" in shown) is bool(told_)

@@ -14,12 +14,12 @@ from avow.system.load import load_system
 RCL = "node made { inputs( r : REAL ) outputs( u : REAL ) topics() guarantee g ( out.u == in.r ) }"
 
 
-@pytest.mark.parametrize("who", ["Ada L\u200bovelace", "\u0410da", "?", "Ada L0velace"])
+@pytest.mark.parametrize("who", ["Ada L\u200bovelace", "?", "TBD"])
 @pytest.mark.parametrize(
     "place",
     [
         {"environment": {"in.r": {"assume": "in.r > 0", "because": "so it is", "who": "…"}}},
-        {"suppositions": {"hoare.x": {"says": "it is so", "because": "so it is", "who": "…"}}},
+        {"assumptions": {"hoare.x": {"says": "it is so", "because": "so it is", "who": "…"}}},
         {
             "requirements": {
                 "R": {
@@ -42,7 +42,7 @@ RCL = "node made { inputs( r : REAL ) outputs( u : REAL ) topics() guarantee g (
             ],
         },
     ],
-    ids=["environment", "suppositions", "confirmed", "accepted"],
+    ids=["environment", "assumptions", "confirmed", "accepted"],
 )
 def test_a_name_that_nobody_can_read_signs_nothing(tmp_path: Path, who: str, place: dict[str, Any]) -> None:
     (tmp_path / "system.rcl").write_text(RCL)

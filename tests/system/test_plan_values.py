@@ -11,7 +11,7 @@ from avow.system.load import load_bare
 from avow.system.plan_file import bare_plan, read_plan
 
 FINDING = "{{obligation: {}, verdict: refuted, reason: r, who: A. Person, date: 2026-01-01, expires: 2030-01-01{}}}"
-CONFIRMED = "requirements: {{R: {{text: t, confirmed: {{who: A. Person, on: {}, sentence: x}}}}}}"
+CONFIRMED = "requirements: {{R: {{text: t, validation: {{who: A. Person, date: {}, sentence: x}}}}}}"
 REQUIREMENT = "requirements: {{R: {{text: t, {}}}}}"
 BOTH = REQUIREMENT.format("formula: a, temporal: b")
 PICTURE = "scenario: {{t: [{{x: 1, y: 2}}]}}\npictures: {{p: {{table: {}, x: x, y: {}}}}}"
@@ -37,7 +37,7 @@ def findings(obligation: str, more: str = "") -> str:
             "PLAN110",
             "R: either formula",
         ),
-        (CONFIRMED.format("2026-01-01"), CONFIRMED.format("2026-02-30"), "PLAN105", "requirements.R.confirmed: "),
+        (CONFIRMED.format("2026-01-01"), CONFIRMED.format("2026-02-30"), "PLAN105", "requirements.R.validation: "),
         (findings('"a/*"', ", matched: [a/b]"), findings("a/b", ", matched: [a/b]"), "PLAN110", "'a/b' has no * or ?"),
         (
             findings("a/b", ", found: 3f09b2c41a7e"),

@@ -68,5 +68,5 @@ def test_faults(node: str, code: str, words: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["[1, 2]\n", "timeout: off\n", "timeout: 1:30\n"])
 def test_parameters_that_are_no_plain_mapping(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(text)
-    _, faults = parameters(tmp_path, Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {}))
+    _, faults = parameters(tmp_path, Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {}), "/n")
     assert {d.code for d in faults} == {"PLAN130"}

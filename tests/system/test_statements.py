@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.system.statements import unconfirmed, without_words
+from avow.system.statements import not_validated, without_words
 
 from .test_system import A, faults, make
 
@@ -36,14 +36,16 @@ def test_a_changed_guarantee_makes_what_is_linked_to_it_suspect(
     plan = (
         "compose: {{D: {{select: [a]}}}}\n"
         "requirements: {{R: {{text: T, supported_by: [{0}], "
-        "confirmed: {{who: A. P., on: 2026-01-01, sentence: '{1}'}}}}}}"
+        "validation: {{who: A. P., date: 2026-01-01, sentence: '{1}', formula: '{2}'}}}}}}"
     )
-    (first,) = unconfirmed(make(tmp_path / "a", rcl, plan.format(link, "?")))
-    digest = str(first.hint).partition('sentence: "')[2].partition('"')[0]
-    assert not list(unconfirmed(make(tmp_path / "b", rcl, plan.format(link, digest))))
+    first = make(tmp_path / "a", rcl, plan.format(link, "?", "?"))
+    assert len(list(not_validated(first))) == 1
+    (asked,) = first.plan.requirements
+    digests = asked.sentence_digest, asked.formula_digest
+    assert not list(not_validated(make(tmp_path / "b", rcl, plan.format(link, *digests))))
     assert edit[0] in rcl
-    changed = make(tmp_path / "c", rcl.replace(*edit), plan.format(link, digest))
-    assert [d.code for d in unconfirmed(changed)] == ["PLAN129"] * suspect
+    changed = make(tmp_path / "c", rcl.replace(*edit), plan.format(link, *digests))
+    assert [d.code for d in not_validated(changed)] == ["PLAN129"] * suspect
 
 
 def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> None:
@@ -51,7 +53,7 @@ def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> No
     silent = make(tmp_path / "b", A, "environment: {a.r: {assume: '0 <= in.r', because: b}}")
     assert [d.code for d in without_words(said)] == []
     assert [d.code for d in without_words(silent)] == ["PLAN128"]
-    assert faults(tmp_path / "c", A, "suppositions: {nobody.word: {says: x}}")[0].code == "PLAN106"
+    assert faults(tmp_path / "c", A, "assumptions: {nobody.word: {says: x}}")[0].code == "PLAN106"
 
 
 def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> None:
@@ -76,3 +78,14 @@ def test_that_an_input_does_not_change_has_words_of_its_own(tmp_path: Path) -> N
         assert len(silent) == sum(not words for _, words in wanted)
     assert [d.code for d in faults(tmp_path / "x", A, entry.format(f"constant: {own}"))] == ["PLAN110"]
     assert [d.code for d in faults(tmp_path / "y", A, entry.format("constant: {says: It stays}"))] == ["PLAN104"]
+
+
+def test_a_key_of_an_old_name_is_read_as_the_new_one_with_a_warning(tmp_path: Path) -> None:
+    entry = "{compose.map: {says: The map fits}}"
+    old, new = (make(tmp_path / key, A, f"{key}: {entry}").plan for key in ("suppositions", "assumptions"))
+    assert old.statements == new.statements
+    (warned,) = old.old_names
+    assert warned.code == "PLAN139"
+    assert "`assumptions`" in warned.message
+    assert warned.span is not None
+    assert new.old_names == ()

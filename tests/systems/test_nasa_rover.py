@@ -77,11 +77,16 @@ def requirement(name: str, limits: Limits | None = None, of: Composition | Syste
 # -- the requirements ------------------------------------------------------------------------------------------------
 
 
-def test_every_published_requirement_stands_in_the_plan_with_its_sentence() -> None:
+REWORDED = {"R1_1", "R2_2", "R2_2_1"}
+"""Requirements whose published sentence says more than their formula: the plan says what is shown, and why."""
+
+
+def test_the_plan_has_every_published_requirement_and_its_sentence() -> None:
     with (FOLDER / "data" / "nasa_rover_requirements.csv").open(encoding="utf-8") as file:
         published_set = {row["id"].replace(".", "_"): row["statement"] for row in csv.DictReader(file)}
     shown = {r.id: r.text.rstrip(".") for r in system().plan.requirements}
-    assert published_set.items() <= shown.items()
+    assert published_set.keys() <= shown.keys()
+    assert {name for name, text in published_set.items() if shown[name] != text} == REWORDED
     assert len(published_set) == 15
 
 

@@ -6,7 +6,7 @@ import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from avow.pipeline.check import diagnostics
+from avow.pipeline.plan_check import diagnostics
 from avow.system.load import load_system
 
 ROOT = Path(__file__).parent.parent.parent

@@ -7,7 +7,7 @@ import random
 import pytest
 from drawn.memory import A, B, N, formula, response, run_of
 from helpers import some
-from oracle.values import Step, broken, value
+from reference.meaning import Step, broken, value
 
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
@@ -43,7 +43,7 @@ def disagreement(rng: random.Random) -> str | None:
     trigger, wanted = response(rng)
     by_cells = judged(Implies(trigger, wanted), run)
     first = next((k for k, holds in enumerate(by_cells) if not holds), None)
-    return None if first == broken(trigger, wanted, run) else show_term(Implies(trigger, wanted), "rcl")
+    return None if first == broken(Implies(trigger, wanted), run) else show_term(Implies(trigger, wanted), "rcl")
 
 
 @pytest.mark.slow
@@ -173,7 +173,7 @@ def test_the_smtlib_script_is_one_step_of_any_run() -> None:
         contract, found = check_text(text, "n.rcl")
         assert contract is not None, found
         node = compiler.compile_node(contract.nodes[0])
-        script = z3.parse_smt2_string(to_smtlib(contract))
+        script = z3.parse_smt2_string(to_smtlib(contract).text)
         first = {c.name: evaluate(c.initial, {}) for c in node.cells if c.initial is not None}
         for a, b, n in ((a, b, n) for a in (False, True) for b in (False, True) for n in (0, 2)):
             given = {"in.a": a, "out.b": b, "in.n": n} | {f"in.{name}": v for name, v in first.items()}

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import pytest
 from drawn.memory import TIMED_NODE, timed_formula, timed_response, word_of
-from oracle.seconds import InSeconds, Word
+from reference.meaning import Meaning, Word
 
 from avow.evaluation.evaluate import evaluate
 from avow.evaluation.running import Keeper
@@ -59,7 +59,7 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
     """A formula of which cells and definition say something else somewhere in a word; empty where it is not said."""
     term, word = timed_formula(rng, depth), word_of(rng)
     trigger, response = timed_response(rng, depth - 1)
-    meaning = InSeconds(word)
+    meaning = Meaning()
     for whole in (term, Implies(trigger, response)):
         if timed(whole) is None:
             continue
@@ -77,13 +77,13 @@ def disagreement(rng: random.Random, depth: int) -> str | None:
             return f"{shown}: an interval is not alike"
         places = range(len(word.positions))
         if whole is term:
-            expected = [bool(meaning.at(term, p)) for p in places]
+            expected = [meaning.met(term, word, p) for p in places]
             if values != expected:
                 return f"{shown}: {[p for p in places if values[p] != expected[p]]} of {word.times}"
         else:
             first = next((p for p in places if not values[p]), None)
-            if first != meaning.broken(trigger, response, word):
-                return f"{shown}: first broken {first}, {meaning.broken(trigger, response, word)} of {word}"
+            if first != meaning.broken(whole, word):
+                return f"{shown}: first broken {first}, {meaning.broken(whole, word)} of {word}"
         for k in range(len(word.steps)):  # a step tells of itself, and of the silence before it unless it was told then
             before = word.places[k - 1] + 1 if k else 0
             told = k > 0 and not values[before - 1]

@@ -9,7 +9,8 @@ import pytest
 from drawn.formulas import NATURAL as NUMBER
 from drawn.formulas import Formulas, checked
 from helpers import some
-from oracle.values import Meaning, Step, plain
+from oracle.domains import plain
+from reference.meaning import Meaning, Step
 
 from avow.base.tuning.bounds import INSTANCES
 from avow.evaluation.evaluate import NotEvaluable, evaluate

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from helpers import some
 from oracle.runs import longer
-from oracle.values import Step, keeps
+from reference.meaning import Step, keeps
 
 from avow.base.verdict import Verdict
 from avow.calculus import refinement
@@ -140,7 +140,7 @@ def test_a_refutation_over_runs_shows_ports_and_not_what_is_remembered() -> None
     found = refines(_node("", "guarantee( y == 0 )"), _node("", "guarantee( once(in.x > 0) -> y > 0 )"))
     (shown,) = (demand.counterexample for demand in found.demands)
     assert shown is not None
-    assert shown.values == (("in.x", "1"), ("n.y", "0"))
+    assert shown.values == (("in.x", "1"), ("out.y", "0"))
 
 
 @pytest.mark.parametrize("assumed", ["in.c == red", "once(in.c == red)"])

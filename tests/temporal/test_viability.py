@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from drawn.memory import N, clause, formula
 from helpers import some
-from oracle.runs import environment_wins, runs
-from oracle.values import breaks
+from oracle.runs import environment_wins, runs, step
+from oracle.stepping import Watch
+from reference.meaning import breaks
 
 from avow.base.verdict import Verdict
 from avow.formulas.formula import substitute
@@ -261,19 +263,61 @@ def test_what_is_not_a_safety_property_is_not_called_realizable() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(150), 6))
-def test_determined_and_needed_against_all_runs(seed: int) -> None:
+def test_what_is_needed_is_so_in_all_runs(seed: int) -> None:
     node = node_of(*drawn(seed))
-    found = {r.name: r.verdict for r in analyse(node)}
-    allowed = [run for length in range(1, 5) for run in runs((c.formula for c in node.clauses), length)]
-    answers: dict[tuple[object, ...], set[object]] = {}
-    for run in allowed:
-        before = tuple(tuple(step.values()) for step in run[:-1])
-        answers.setdefault((*before, run[-1]["in.a"]), set()).add(run[-1]["out.b"])
-    two = any(len(each) > 1 for each in answers.values())
-    assert found["determined-b"] is not Verdict.PROVED or not two
-    assert found["determined-b"] is not Verdict.REFUTED or two or not allowed
+    found = {r.name: r.verdict for r in analyse(node, wanted={"needed-a"})}
     if remembers(node) and found.get("needed-a") in (Verdict.PROVED, Verdict.REFUTED):
         without = replace(node, assumptions=())
         always: Term = Not(Literal(False, node.assumptions[0].formula.sort))
         loses = environment_wins(always, [c.formula for c in without.guarantees], DEPTH)
         assert found["needed-a"] is Verdict.PROVED or not loses
+
+
+MOST_MEMORIES = 1000
+"""A count that is never reset leaves ever new memories."""
+
+
+def determined(assumed: Term, promised: list[Term]) -> tuple[bool | None, int]:
+    """Whether, wherever a run can go on for ever, one output alone lets it; None where none does or there are too many
+    memories to walk them all. And the number of memories."""
+    rules, start = Watch(assumed), tuple(Watch(g).begins for g in promised)
+    watches, moves = [Watch(g) for g in promised], dict[Any, list[dict[bool, Any]]]()
+    waiting: list[Any] = [(rules.begins, start)]
+    for memory in waiting:
+        if memory in moves:
+            continue
+        if len(moves) == MOST_MEMORIES:
+            return None, len(moves)
+        moves[memory] = []
+        for a in (False, True):
+            allowed, _ = rules.step(step(a, False), memory[0])
+            answers: dict[bool, Any] = {}
+            for b in (False, True):
+                told = [w.step(step(a, b), m) for w, m in zip(watches, memory[1], strict=True)]
+                if allowed and all(held for held, _ in told):
+                    answers[b] = (rules.step(step(a, b), memory[0])[1], tuple(left for _, left in told))
+            moves[memory] += [answers] if allowed else []
+            waiting += answers.values()
+    live = set(moves)
+    while dead := {m for m in live if any(not (set(answers.values()) & live) for answers in moves[m])}:
+        live -= dead
+    if waiting[0] not in live:
+        return None, len(moves)
+    reached = [waiting[0]]
+    for memory in reached:
+        left = {after for answers in moves[memory] for after in answers.values() if after in live}
+        reached += [after for after in left if after not in reached]
+    alone = all(sum(after in live for after in answers.values()) < 2 for m in reached for answers in moves[m])
+    return alone, len(moves)
+
+
+@pytest.mark.parametrize("seed", some(range(400), 4, slow=40))
+def test_what_is_determined_is_known_where_all_memories_are(seed: int) -> None:
+    assumed, promised = drawn(seed)
+    node = node_of(assumed, promised)
+    wanted, memories = determined(assumed, promised)
+    if wanted is None or not remembers(node):
+        return
+    (found,) = analyse(node, wanted={"determined-b"})
+    if found.verdict is not Verdict.UNKNOWN or memories <= 50:
+        assert found.verdict is (Verdict.PROVED if wanted else Verdict.REFUTED), found

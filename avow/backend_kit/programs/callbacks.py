@@ -190,8 +190,8 @@ def driver(system: System, name: str) -> Driver:
     node = system.contract.node(name)
     source = next((entry.source for entry in plan.nodes if entry.node == node.name), None)
     if source is None or not source.python:
-        hint = "source: {python: src/node.py, class: Node, kind: rospy}"
-        raise Rejected(Diagnostic("DRIVE100", f"the plan says of no program that it is {node.name}", hint=hint))
+        hint = "source: {python: src/node.py, class: Node, kind: rclpy}, or kind: rospy"
+        raise Rejected(Diagnostic("DRIVE100", f"the plan names no program for the node {node.name}", hint=hint))
     place = source.place.at("source")
     if source.kind is Driving.STEP:
         text = f"{source.class_name} is a class with a method step, which has no topics: `hypothesis` drives it"
@@ -200,14 +200,14 @@ def driver(system: System, name: str) -> Driver:
     path = inside(root, source.python)
     if path is None or not path.is_file():
         raise Rejected(Diagnostic("DRIVE100", f"there is no file `{source.python}` in the system's folder", place))
-    params, faults = parameters(root, source)
+    placed = plan.ros.names.placed(node.name)
+    params, faults = parameters(root, source, placed.name)
     if faults:
         raise Rejected(*faults)
     known = require(definitions(plan.messages, plan.ros.distro))
     if known.get(HEADER) is None:
         header = _ROS1_HEADER if source.kind is Driving.ROSPY else _HEADER
         known = Definitions({**known.messages, HEADER: header})
-    placed = plan.ros.names.placed(node.name)
     ros = {
         "kind": source.kind.value,
         "name": placed.name,
@@ -215,8 +215,7 @@ def driver(system: System, name: str) -> Driver:
         "most": DRIVEN_CALLBACKS,
         "messages": _messages(node, path, known, source.kind),
     }
-    judged = tuple(f"{system.name}/{node.name}/guarantee/{clause.name}" for clause in node.guarantees)
-    subject = Subject(root, path, source.class_name, params, {}, (), judged, ros)
+    subject = Subject(root, path, source.class_name, params, {}, (), ros)
     ((topics,), _) = _runs(source, subject, [((), 0, 0)], quiet=True)
     found = Driver(system, node, source, subject, known, topics)
     if found.topics.wrong:
@@ -355,10 +354,10 @@ def code(wire: Wire, value: Any, known: Definitions) -> Any:
                 raise ValueError(f"{value!r} is no {name}")
             return {"i": str(value)}
         case Scalar(name=name):
-            text = getattr(value, "text", value)  # a decimal is kept as its digits
-            if isinstance(text, bool) or not isinstance(text, int | float | str) or isinstance(value, str):
+            # a decimal of a trace is kept as its digits, in bytes
+            if isinstance(value, bool) or not isinstance(value, int | float | bytes):
                 raise ValueError(f"{value!r} is no {name}")
-            return {"f": _as_float(float(text), name).hex()}
+            return {"f": _as_float(float(value), name).hex()}
 
 
 def _as_float(number: float, name: str) -> float:

@@ -32,8 +32,6 @@ class Subject:
     memory: Mapping[str, str]
     attributes: tuple[str, ...]
     """Whose values after `__init__` are wanted."""
-    names: tuple[str, ...] = ()
-    """What has a verdict: `avow.isolation.printed.Names.of`."""
     ros: Mapping[str, Any] | None = None
     """Of a callback class: what stands in for ROS (`avow.drive.callbacks`)."""
 
@@ -60,7 +58,6 @@ class Question:
     cases: tuple[str, ...]
     seconds: float
     batch: int
-    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +91,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         place = Path(scratch) / "cases.json"
         where = str(subject.root), str(subject.file), subject.spec
-        question = Question(*where, tuple(cases), seconds, SUBJECT_BATCH, subject.names)
+        question = Question(*where, tuple(cases), seconds, SUBJECT_BATCH)
         place.write_text(canonical(to_json(question)), encoding="utf-8")
         done, answer = judge.ask(
             Told,
@@ -123,7 +120,7 @@ def main() -> None:
     adopt_orphans()
     question = from_text(Question, Path(sys.argv[2]).read_bytes())
     patience = max(1.0, min(SUBJECT_PATIENCE, question.seconds / 3))
-    process = SubjectProcess(Path(question.file), question.spec, patience, Path(question.root), question.names)
+    process = SubjectProcess(Path(question.file), question.spec, patience, Path(question.root))
     replies: list[Any] = []
     fault = ""
     try:

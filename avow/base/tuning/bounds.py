@@ -24,6 +24,12 @@ INPUTS_AHEAD = 3
 AHEAD_SIZE = 20_000
 """Operators of such a question, at most: what is remembered is written out, step into step."""
 
+FORMULAS_KEPT = 2_000
+"""Formulas that a session of questions keeps as expressions of Z3: a node's analysis asks about a few hundred."""
+
+QUESTIONS_KEPT = 500
+"""Questions of evaluation to one Z3 context: what it keeps of them does not grow without end."""
+
 CHOICES_FOUND = 300
 """Answers that the solver is asked for, where they cannot be enumerated: each costs one question."""
 
@@ -51,6 +57,12 @@ STATES_CHECKED = 50_000
 
 RUNS_TRIED = 20
 """Runs tried before a search: a violation that is common is found by one of them in a fraction of a search's time."""
+
+REQUIREMENT_MUTANTS = 12
+"""Mutants of a requirement's formula that are tried: the first that the contracts exclude ends the search."""
+
+PROPERTY_ATOMS = 6
+"""State formulas of a temporal property up to which every combination of their values is looked at."""
 
 RUN_LENGTH = 60
 """The length of such a run, in steps."""
@@ -80,10 +92,6 @@ OFFER_PLACES = 8
 OFFER_LENGTH = 300
 """Characters of a clause that is worth offering: a longer one explains nothing."""
 
-OFFER_REWRITINGS = 5
-"""Rounds in which foreign names are replaced by what equations say of them: longer chains of links make longer
-clauses than are worth offering."""
-
 COMPLETIONS = 3
 """Values tried in the places that the search left undecided."""
 
@@ -96,20 +104,11 @@ SMALL_TABLE = 3
 VALUES_ENUMERATED = 1_000_000
 """More values than this are not enumerated: the answer would not come in useful time."""
 
-CONSTRAINTS = 1_500
-"""Elimination stops (`TooMany`) when there are more constraints than this: each variable may square their number."""
-
-LINEAR_CASES = 256
-"""Cases into which inequalities may fall: each is an elimination of its own."""
-
 DISJUNCTION_DEPTH = 5
 """How far disjunctions within disjunctions are followed: the cost of planning is exponential in it."""
 
 ROWS_WITHOUT_INDEX = 3
 """A table of so few rows is walked through; an index costs more than it saves."""
-
-REPRESENTATIVES = 2_000
-"""More representatives than this for one variable are refused: the search would be too slow to be of use."""
 
 ATOMS_MADE = 500
 """Atoms made, at most: cases within cases multiply."""
@@ -130,23 +129,6 @@ POINTWISE_PARTS = 100
 
 SEQUENCE_SHOWN = 1_000
 """Elements of a sequence that a solver's model is read back into: beyond it, the model is given up."""
-
-LETTERS_EXHAUSTED = 10
-"""Up to this many letters every assignment is tried, else samples of them: each letter doubles their number."""
-
-ASSIGNMENTS_SAMPLED = 2000
-"""Assignments tried of more letters: two readings that differ at one in five hundred are told apart 98 times in a
-hundred."""
-
-SAMPLES_BY_SIZE = 400_000
-"""Samples times operators, at most: a formula of thousands of parts gets fewer samples."""
-
-CHAIN = 64
-"""Up to so many operators a chain becomes the tree that it is written as; and no chain's tree is deeper."""
-
-CHAIN_BLOCK = 8
-"""How many terms are put together at each level of a long chain. 8 ** 7 is more than a text may have tokens, and a
-spine of 7 levels is 7 * 8 < CHAIN terms long."""
 
 CONFLICTS = 64
 """Conflicts that are looked for: whoever mends so many asks again."""

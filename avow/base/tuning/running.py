@@ -1,4 +1,7 @@
-"""Times and retries of a run: workers, the fork server, a cluster, the language server. In wall-clock seconds."""
+"""Times and retries of a run: workers, a cluster, the language server. In wall-clock seconds."""
+
+TRIAL_SECONDS = 120.0
+"""For the one-line job with which `avow doctor` tries a tool: a cold start of .NET takes ten."""
 
 CHARACTERS_PER_SECOND = 500_000
 """About how fast texts are checked: a text so long that it takes a while is checked when its author pauses."""
@@ -12,12 +15,6 @@ CONFORMANCE_PATIENCE = 60.0
 SUBJECT_PATIENCE = 10.0
 """Seconds that a subject may take for one answer: a robot's step takes milliseconds, its first import seconds."""
 
-SIGHTS = {"sights": 600, "times": 68, "items": 64, "text": 200, "bits": 1100, "constants": 400}
-"""Of a subject that is looked at: comparisons that one question tells, and of one place in its program; items of a
-container, characters of a text, bits of a number (all of a double's) and constants of its modules that are told."""
-
-CHANNEL_PATIENCE = 5.0
-"""Seconds that the last of a channel may take once its writer has ended; after that, somebody else holds it."""
 
 CLUSTER_CONNECT = 30.0
 """Seconds to reach a cluster's scheduler, which may just be starting."""
@@ -37,20 +34,11 @@ CLUSTER_PATIENCE = 60.0
 WORKER_GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to translate and write."""
 
-QUEUE_PATIENCE = 3600.0
-"""Seconds above all that for works that wait for their turn."""
-
-FORK_MESSAGE = 1 << 20
-"""Bytes of a request to the fork server: a command line and an environment."""
-
-FORK_START = 60.0
-"""Seconds that the server gets for its imports, on a loaded machine."""
-
 FORK_LOOK = 0.5
 """Seconds between two looks whether a work is still wanted."""
 
 FORK_STOP = 15.0
-"""Seconds that it gets to kill a fork."""
+"""Seconds that a supervisor gets to end a job's process."""
 
 VERSION_SECONDS = 20.0
 """For a tool to say its version: one that runs on Java or .NET takes seconds on a loaded machine."""
@@ -141,7 +129,3 @@ them have different times, where the file system counts less than seconds."""
 SETTLED_NS = 2_000_000_000
 """Nanoseconds after a file's last change for which another change might show no other time: coarse clocks tick in
 hundredths of a second, some file systems in two seconds."""
-
-PRINTED_GATHERS = 0.005
-"""Seconds for which what a subject prints gathers before it is read: who prints line by line would wake its judge so
-often."""

@@ -35,6 +35,9 @@ SENTENCE_CHARACTERS = 60
 DIAGNOSTICS = 200
 """More than this of one file are of no use to anyone: reading ends there."""
 
+ALIKE = 5
+"""Diagnostics of one file that differ in their place alone: one mistake, made again and again, hides no other."""
+
 FAULTS = 20
 """Faults of one JSON text that a message lists: whoever mends so many tries again."""
 
@@ -88,7 +91,7 @@ PDF_OBLIGATIONS = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 
 SHEET_LETTERS = 1400
-"""Letters of suppositions and listed requirements for which the first printed sheet has room."""
+"""Letters of assumptions and listed requirements for which the first printed sheet has room."""
 
 PDF_COLUMNS = 9
 """Columns of a run that fit on a page; a wider one is told by its reason alone."""
@@ -128,6 +131,3 @@ TIMELINE_PORTS = 12
 
 TIMELINES = 4
 """Timelines of one guarantee in its evidence, those with a finding first."""
-
-PRINTED_SHOWN = 120
-"""Characters of a printed line that a message shows: enough to find it by."""

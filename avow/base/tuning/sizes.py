@@ -39,8 +39,8 @@ DECLARED_PARTS = 20_000
 """So many parts a constant or a type may have, written out: one that doubles another that doubles another soon
 fills the memory."""
 
-CONTRACT_PARTS = 2_000_000
-"""So many parts all formulas of a contract may have together, constants written out."""
+CLAUSE_PARTS = 200_000
+"""So many parts a clause may have, constants written out."""
 
 REFERENCES_AHEAD = 100
 """Declarations that stand before what they refer to: so long a row of them, since following it recurses."""
@@ -68,7 +68,7 @@ DEFINITION_BYTES = 2_000_000
 """Of one file that defines message types: the largest package's definitions together are a tenth of it."""
 
 STATEMENT_WORDS = 14
-"""Words of a supposition's `says`: so many fit in a line of a report's first screen."""
+"""Words of an assumption's `says`: so many fit in a line of a report's first screen."""
 
 PLAN_BYTES = 8_000_000
 """A larger file is no plan: data belongs in a table beside it."""
@@ -133,14 +133,5 @@ FOLDED = 4
 """Files of one folder that a tool looked at, from which on a record tells of the folder: a compiler reads hundreds of
 headers, and a record that names each would be a hundred times as long."""
 
-PRINTED_AT_ONCE = 1 << 20
-"""Bytes that a subject may print before it waits for its judge: the most that Linux gives a user's pipe."""
-
-PRINTED_LINE = 1 << 16
-"""Bytes of a printed line that are kept until it ends: a longer one is read in parts."""
-
-PRINTED_KEPT = 20_000
+LOG_KEPT = 20_000
 """Bytes of a program's standard error that are kept, the last: a sanitizer's report is its end."""
-
-SCRATCH_BYTES = 200_000_000
-"""Bytes that a subject may leave in its scratch folder: a log has some megabytes, and the disk is everybody's."""

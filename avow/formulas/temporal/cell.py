@@ -10,39 +10,8 @@ from typing import assert_never
 from avow.base.diagnostics import Span
 from avow.base.records import dataclass
 from avow.formulas.formula import equation, free_variables
-from avow.language.sorts import (
-    NATURAL,
-    REAL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    Apply,
-    Construct,
-    EnumValue,
-    History,
-    Literal,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceTerm,
-    Term,
-    TupleTerm,
-    Variable,
-)
+from avow.language import sorts as s
+from avow.language import terms as t
 
 CELL = "#"
 """In the name of every cell, and in that of no port."""
@@ -61,15 +30,15 @@ class Unsaid(Exception):  # noqa: N818 - it names what happened
 class Cell:
     """What one step leaves to the next."""
 
-    before: Variable
+    before: t.Variable
     """What the step before has left: a function of the `parameters`, where there are some. Its name says which record
     it is of, so that a formula that reads it has another digest where the record is another."""
-    parameters: tuple[Variable, ...]
-    initial: Term | None
+    parameters: tuple[t.Variable, ...]
+    initial: t.Term | None
     """What it is before the first step, at every argument; None: any value, which nothing looks at."""
-    now: Term
+    now: t.Term
     """What this step leaves, at the `parameters`: over the node's ports and what the step before has left."""
-    record: History | None = field(default=None, compare=False, repr=False)
+    record: t.History | None = field(default=None, compare=False, repr=False)
     """What it is kept for; None of whether a step is the first, and of what lasts through a silence."""
 
     @property
@@ -77,66 +46,66 @@ class Cell:
         return self.before.name
 
     @property
-    def sort(self) -> Sort:
+    def sort(self) -> s.Sort:
         return self.before.sort
 
     @property
-    def read(self) -> Term:
+    def read(self) -> t.Term:
         """What the step before has left at the `parameters`."""
         return at(self.before, self.parameters)
 
-    def begins(self, cell: Variable | None = None) -> Term:
+    def begins(self, cell: t.Variable | None = None) -> t.Term:
         """That a variable (the cell's own) is as the cell is before the first step."""
         if self.initial is None:
-            return TRUE
+            return t.TRUE
         return self._everywhere(equation(at(cell or self.before, self.parameters), self.initial))
 
-    def leaves(self, after: Variable) -> Term:
+    def leaves(self, after: t.Variable) -> t.Term:
         """That a variable is what this step leaves."""
         return self._everywhere(equation(at(after, self.parameters), self.now))
 
-    def _everywhere(self, formula: Term) -> Term:
-        return Quantified(Quantifier.FORALL, self.parameters, formula) if self.parameters else formula
+    def _everywhere(self, formula: t.Term) -> t.Term:
+        return t.Quantified(t.Quantifier.FORALL, self.parameters, formula) if self.parameters else formula
 
 
-def some_value(sort: Sort) -> Term | None:
+def some_value(sort: s.Sort) -> t.Term | None:
     """A value of a sort, written down; None of an unspecified type, which has no name for one, and of functions."""
     match sort:
-        case BoolSort():
-            return FALSE
-        case NaturalSort() | IntegerSort():
-            return Literal(0, NATURAL)
-        case RealSort():
-            return Literal(Fraction(0), REAL)
-        case StringSort():
-            return Literal("", sort)
-        case EnumSort(members=(first, *_)):
-            return EnumValue(first, sort)
-        case SequenceSort():
-            return SequenceTerm((), sort)
-        case TupleSort(items=items):
+        case s.BoolSort():
+            return t.FALSE
+        case s.NaturalSort() | s.IntegerSort():
+            return t.Literal(0, s.NATURAL)
+        case s.RealSort():
+            return t.Literal(Fraction(0), s.REAL)
+        case s.StringSort():
+            return t.Literal("", sort)
+        case s.EnumSort(members=(first, *_)):
+            return t.EnumValue(first, sort)
+        case s.SequenceSort():
+            return t.SequenceTerm((), sort)
+        case s.TupleSort(items=items):
             parts = tuple(map(some_value, items))
-            return TupleTerm(tuple(p for p in parts if p is not None), sort) if None not in parts else None
-        case DataSort(constructors=constructors):
+            return t.TupleTerm(tuple(p for p in parts if p is not None), sort) if None not in parts else None
+        case s.DataSort(constructors=constructors):
             for made in constructors:
                 arguments = tuple(map(some_value, made.parameters))
                 if None not in arguments:
-                    return Construct(made.name, tuple(a for a in arguments if a is not None), sort)
+                    return t.Construct(made.name, tuple(a for a in arguments if a is not None), sort)
             return None
-        case EnumSort() | OpaqueSort() | FunctionSort() | SetSort():  # nothing is known of it
+        case s.EnumSort() | s.OpaqueSort() | s.FunctionSort() | s.SetSort():  # nothing is known of it
             return None
         case _:
             assert_never(sort)
 
 
-def at(variable: Variable, parameters: tuple[Variable, ...]) -> Term:
+def at(variable: t.Variable, parameters: tuple[t.Variable, ...]) -> t.Term:
     sort = variable.sort
-    return Apply(variable, parameters, sort.result) if parameters and isinstance(sort, FunctionSort) else variable
+    return t.Apply(variable, parameters, sort.result) if parameters and isinstance(sort, s.FunctionSort) else variable
 
 
-def at_the_parameters(name: str, parts: Iterable[Term], sort: Sort) -> tuple[Variable, tuple[Variable, ...]]:
+def at_the_parameters(name: str, parts: Iterable[t.Term], sort: s.Sort) -> tuple[t.Variable, tuple[t.Variable, ...]]:
     """The variable of a cell for what is said of some terms, and its parameters: their bound variables."""
-    bound = {v for part in parts for v in free_variables(part) if v.role is Role.BOUND}
+    bound = {v for part in parts for v in free_variables(part) if v.role is t.Role.BOUND}
     parameters = tuple(sorted(bound, key=lambda v: v.name))
-    kept = FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort
-    return Variable(Role.INPUT, name, kept), parameters
+    kept = s.FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort
+    return t.Variable(t.Role.INPUT, name, kept), parameters

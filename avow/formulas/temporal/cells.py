@@ -15,25 +15,11 @@ from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, digest, disjunction, equation, free_variables, negation
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at, at_the_parameters, some_value
 from avow.formulas.temporal.responses import in_the_past
+from avow.language import terms as t
 from avow.language.contract import Clause, Node
 from avow.language.definedness import defined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, Sort
 from avow.language.subterms import histories
-from avow.language.terms import (
-    FALSE,
-    TRUE,
-    Arithmetic,
-    Builtin,
-    Compare,
-    Conditional,
-    History,
-    Literal,
-    Operation,
-    Past,
-    Role,
-    Term,
-    Variable,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +33,7 @@ class Remembering:
     """The clauses that speak of other steps all the same, each with the reason."""
 
     @property
-    def before(self) -> tuple[Variable, ...]:
+    def before(self) -> tuple[t.Variable, ...]:
         return tuple(cell.before for cell in self.cells)
 
 
@@ -84,10 +70,10 @@ class Records:
     """The cells of some formulas, made as they are asked for."""
 
     cells: list[Cell] = field(default_factory=list)
-    _values: dict[str, Term] = field(default_factory=dict)
+    _values: dict[str, t.Term] = field(default_factory=dict)
     _first: Cell | None = None
 
-    def clause(self, formula: Term) -> Term:
+    def clause(self, formula: t.Term) -> t.Term:
         """A clause, which may be a response, as a formula of one step. Raises Unsaid, and has then made no cell."""
         with self._undone():
             return self.term(in_the_past(formula))
@@ -103,9 +89,9 @@ class Records:
             self._values, self._first = values, first
             raise
 
-    def term(self, term: Term) -> Term:
+    def term(self, term: t.Term) -> t.Term:
         """A term of the past as one of this step. Raises Unsaid."""
-        if isinstance(term, History):
+        if isinstance(term, t.History):
             meaning = digest(term)  # what means the same has one cell: a cell is named by its meaning
             if meaning not in self._values:
                 self._values[meaning] = self._record(term)
@@ -114,108 +100,112 @@ class Records:
         made = tuple(map(self.term, parts))
         return term if all(one is other for one, other in zip(parts, made, strict=True)) else term.rebuild(made)
 
-    def _record(self, term: History) -> Term:
+    def _record(self, term: t.History) -> t.Term:
         parts = tuple(map(self.term, term.arguments))
         amount = self._amount(term)
         match term.operator:
-            case Past.PREVIOUS:
+            case t.Past.PREVIOUS:
                 value, first = _with_any_value(parts[0]), parts[1]
                 if not free_variables(first):
                     return self._cell(term, value, first, term.sort).read
                 before = self._cell(term, value, some_value(term.sort), term.sort).read
-                return Conditional(self._is_first(), first, before, term.sort)
-            case Past.ROSE:
-                return conjunction((parts[0], negation(self._cell(term, parts[0], FALSE).read)))
-            case Past.FELL:
-                return conjunction((negation(parts[0]), self._cell(term, parts[0], FALSE).read))
-            case Past.CHANGED:
+                return t.Conditional(self._is_first(), first, before, term.sort)
+            case t.Past.ROSE:
+                return conjunction((parts[0], negation(self._cell(term, parts[0], t.FALSE).read)))
+            case t.Past.FELL:
+                return conjunction((negation(parts[0]), self._cell(term, parts[0], t.FALSE).read))
+            case t.Past.CHANGED:
                 before = self._cell(term, _with_any_value(parts[0]), some_value(parts[0].sort)).read
                 return conjunction((negation(self._is_first()), negation(equation(parts[0], before))))
-            case Past.ONCE if amount is None:
-                return self._kept(term, BOOL, FALSE, lambda before: disjunction((parts[0], before)))
-            case Past.HISTORICALLY if amount is None:
-                return self._kept(term, BOOL, TRUE, lambda before: conjunction((parts[0], before)))
-            case Past.SINCE if amount is None:
+            case t.Past.ONCE if amount is None:
+                return self._kept(term, BOOL, t.FALSE, lambda before: disjunction((parts[0], before)))
+            case t.Past.HISTORICALLY if amount is None:
+                return self._kept(term, BOOL, t.TRUE, lambda before: conjunction((parts[0], before)))
+            case t.Past.SINCE if amount is None:
                 holds, began = parts
-                return self._kept(term, BOOL, FALSE, lambda b: disjunction((began, conjunction((holds, b)))))
-            case Past.COUNTED:
+                return self._kept(term, BOOL, t.FALSE, lambda b: disjunction((began, conjunction((holds, b)))))
+            case t.Past.COUNTED:
                 holds, began = parts
                 return self._kept(term, NATURAL, _ZERO, lambda b: _if(began, _ZERO, _if(holds, _plus_one(b), b)))
-            case Past.ONCE:
+            case t.Past.ONCE:
                 assert amount is not None
-                return self._latest(term, TRUE, parts[0], "<=", amount)
-            case Past.HISTORICALLY:
+                return self._latest(term, t.TRUE, parts[0], "<=", amount)
+            case t.Past.HISTORICALLY:
                 assert amount is not None
-                return negation(self._latest(term, TRUE, negation(parts[0]), "<=", amount))
-            case Past.HELD:
+                return negation(self._latest(term, t.TRUE, negation(parts[0]), "<=", amount))
+            case t.Past.HELD:
                 assert amount is not None
                 return self._earliest(term, parts[0], parts[0], ">=", amount)
-            case Past.SINCE:
+            case t.Past.SINCE:
                 assert amount is not None
                 assert term.limit is not None
                 (holds, began), relation = parts, term.limit.relation
                 age = self._earliest if relation in (">", ">=") else self._latest
                 return age(term, holds, began, relation, amount)
-            case Past.ARRIVED | Past.STEPS:
+            case t.Past.ARRIVED | t.Past.STEPS:
                 raise Unsaid(f"`{term.operator}`, which is no matter of steps alone", term.span)
-            case Past.NEXT | Past.WITHIN | Past.FOR | Past.UNTIL | Past.EVENTUALLY:
+            case t.Past.NEXT | t.Past.WITHIN | t.Past.FOR | t.Past.UNTIL | t.Past.EVENTUALLY:
                 raise Unsaid(f"`{term.operator}` in a place where no response stands", term.span)
             case _:
                 assert_never(term.operator)
 
-    def _amount(self, term: History) -> Term | None:
+    def _amount(self, term: t.History) -> t.Term | None:
         if term.limit is None:
             return None
         if not term.limit.steps:
             raise Unsaid(f"`{term.operator}` with a limit in seconds", term.span)
         return self.term(term.limit.amount)
 
-    def _latest(self, term: History, holds: Term, began: Term, relation: str, amount: Term) -> Term:
+    def _latest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
         """``holds since[<= amount] began``: the cell has how many steps ago the latest beginning is, -1 for none. One
         that is older than a limit that is written down is as good as none."""
         most = written(amount)
 
-        def age(before: Term) -> Term:
-            young = [Compare("<=", _ZERO, before)]
+        def age(before: t.Term) -> t.Term:
+            young = [t.Compare("<=", _ZERO, before)]
             if most is not None:
-                young.append(Compare("<", before, Literal(most, INTEGER)))
+                young.append(t.Compare("<", before, t.Literal(most, INTEGER)))
             return _if(began, _ZERO, _if(conjunction((holds, *young)), _plus_one(before), _NONE))
 
         found = self._kept(term, INTEGER, _NONE, age)
-        return conjunction((Compare("<=", _ZERO, found), Compare(relation, found, amount)))
+        return conjunction((t.Compare("<=", _ZERO, found), t.Compare(relation, found, amount)))
 
-    def _earliest(self, term: History, holds: Term, began: Term, relation: str, amount: Term) -> Term:
+    def _earliest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
         """``holds since[>= amount] began``: the cell has how many steps ago the earliest beginning is, -1 for none.
         Beyond a limit that is written down it stays."""
         most = written(amount)
 
-        def age(before: Term) -> Term:
+        def age(before: t.Term) -> t.Term:
             older = _plus_one(before)
             if most is not None:
-                older = Operation(Builtin.MIN, (older, Literal(max(most + 1, 0), INTEGER)), INTEGER)
-            return _if(conjunction((holds, Compare("<=", _ZERO, before))), older, _if(began, _ZERO, _NONE))
+                older = t.Operation(t.Builtin.MIN, (older, t.Literal(max(most + 1, 0), INTEGER)), INTEGER)
+            return _if(conjunction((holds, t.Compare("<=", _ZERO, before))), older, _if(began, _ZERO, _NONE))
 
         found = self._kept(term, INTEGER, _NONE, age)
-        return conjunction((Compare("<=", _ZERO, found), Compare(relation, found, amount)))
+        return conjunction((t.Compare("<=", _ZERO, found), t.Compare(relation, found, amount)))
 
-    def _kept(self, term: History, sort: Sort, initial: Term, now: Callable[[Term], Term]) -> Term:
+    def _kept(self, term: t.History, sort: Sort, initial: t.Term, now: Callable[[t.Term], t.Term]) -> t.Term:
         """What a step leaves, as a function of what the one before has left: also the value now."""
         cell = self._cell(term, now, initial, sort)
         return cell.now
 
-    def _named(self, term: History) -> str:
+    def _named(self, term: t.History) -> str:
         """The name of a record's cell."""
         return f"{term.operator}{CELL}{digest(term)[:12]}"
 
-    def _is_first(self) -> Term:
+    def _is_first(self) -> t.Term:
         """Whether this is the first step."""
         if self._first is None:
-            self._first = Cell(Variable(Role.INPUT, f"first step{CELL}", BOOL), (), TRUE, FALSE)
+            self._first = Cell(t.Variable(t.Role.INPUT, f"first step{CELL}", BOOL), (), t.TRUE, t.FALSE)
             self.cells.append(self._first)
         return self._first.read
 
     def _cell(
-        self, term: History, now: Term | Callable[[Term], Term], initial: Term | None, sort: Sort | None = None
+        self,
+        term: t.History,
+        now: t.Term | Callable[[t.Term], t.Term],
+        initial: t.Term | None,
+        sort: Sort | None = None,
     ) -> Cell:
         """A new cell for a record; `now` is what a step leaves, or makes that of what the one before has left."""
         if sort is None:
@@ -228,13 +218,13 @@ class Records:
         return cell
 
 
-def written(amount: Term) -> int | None:
+def written(amount: t.Term) -> int | None:
     """A number of steps that is written down."""
-    value = amount.value if isinstance(amount, Literal) else None
+    value = amount.value if isinstance(amount, t.Literal) else None
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
-def longest_limits(formulas: Iterable[Term]) -> int:
+def longest_limits(formulas: Iterable[t.Term]) -> int:
     """The most steps that the limits in one formula come to together, of those that are written down."""
     totals = (
         sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
@@ -243,20 +233,20 @@ def longest_limits(formulas: Iterable[Term]) -> int:
     return max(totals, default=0)
 
 
-_ZERO, _NONE, _ONE = Literal(0, NATURAL), Literal(-1, INTEGER), Literal(1, NATURAL)
+_ZERO, _NONE, _ONE = t.Literal(0, NATURAL), t.Literal(-1, INTEGER), t.Literal(1, NATURAL)
 
 
-def _if(condition: Term, then: Term, otherwise: Term) -> Term:
+def _if(condition: t.Term, then: t.Term, otherwise: t.Term) -> t.Term:
     sort = then.sort if then.sort == otherwise.sort else INTEGER
-    return Conditional(condition, then, otherwise, sort)
+    return t.Conditional(condition, then, otherwise, sort)
 
 
-def _with_any_value(term: Term) -> Term:
+def _with_any_value(term: t.Term) -> t.Term:
     """What is kept of a term for the next step: some value where the term has none, so that every run can be judged.
     A claim that looks at it is not met, whatever it is (`avow.language.definedness`)."""
     has, otherwise = defined(term), some_value(term.sort)
-    return term if term.sort == BOOL or has == TRUE or otherwise is None else _if(has, term, otherwise)
+    return term if term.sort == BOOL or has == t.TRUE or otherwise is None else _if(has, term, otherwise)
 
 
-def _plus_one(term: Term) -> Term:
-    return Arithmetic("+", term, _ONE, term.sort)
+def _plus_one(term: t.Term) -> t.Term:
+    return t.Arithmetic("+", term, _ONE, term.sort)

@@ -34,36 +34,13 @@ from avow.formulas.temporal.ages import (
 from avow.formulas.temporal.cell import CELL, Cell, Unsaid, at_the_parameters, some_value
 from avow.formulas.temporal.cells import Records, Remembering, compiled
 from avow.formulas.temporal.responses import in_the_past
+from avow.language import terms as t
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.sorts import BOOL, REAL
 from avow.language.subterms import histories, timed
-from avow.language.terms import (
-    FALSE,
-    RESPONSES,
-    TRUE,
-    And,
-    Apply,
-    Arithmetic,
-    Builtin,
-    Compare,
-    Conditional,
-    History,
-    Implies,
-    Limit,
-    Literal,
-    Not,
-    Operation,
-    Or,
-    Past,
-    Quantified,
-    Quantifier,
-    Role,
-    Term,
-    Variable,
-)
 
-_EVER = (Past.ONCE, Past.HISTORICALLY, Past.SINCE)
-GOES_ON = Compare("<", NO_TIME, CLOCK)
+_EVER = (t.Past.ONCE, t.Past.HISTORICALLY, t.Past.SINCE)
+GOES_ON = t.Compare("<", NO_TIME, CLOCK)
 """From step to step, time goes by."""
 
 
@@ -73,27 +50,27 @@ def compile_timed(node: Node, longest: Fraction | None = None) -> Remembering:
     return compiled(node, Timed(longest=longest or longest_limit(c.formula for c in node.clauses)))
 
 
-def longest_limit(formulas: Iterable[Term]) -> Fraction | None:
+def longest_limit(formulas: Iterable[t.Term]) -> Fraction | None:
     """The longest limit in seconds; None where one is not written down."""
     limits = [h.limit for formula in formulas for h in histories(formula) if h.limit is not None]
     seconds = [limit.amount for limit in limits if not limit.steps]
-    known = [Fraction(a.value) for a in seconds if isinstance(a, Literal) and not isinstance(a.value, bool | str)]
+    known = [Fraction(a.value) for a in seconds if isinstance(a, t.Literal) and not isinstance(a.value, bool | str)]
     return max(known, default=None) if len(known) == len(seconds) else None
 
 
-def arrival(term: History) -> Variable:
+def arrival(term: t.History) -> t.Variable:
     """Whether a message of an input has come since the step before; at the first step all inputs' have."""
     (port,) = term.arguments
-    assert isinstance(port, Variable)
-    return Variable(Role.INPUT, f"arrived {port.name}{CELL}", BOOL)
+    assert isinstance(port, t.Variable)
+    return t.Variable(t.Role.INPUT, f"arrived {port.name}{CELL}", BOOL)
 
 
-def is_arrival(variable: Variable) -> bool:
+def is_arrival(variable: t.Variable) -> bool:
     """Whether it says that a message has arrived."""
     return variable.name.endswith(CELL) and variable.name.startswith("arrived ")
 
 
-def events(remembering: Remembering) -> tuple[Variable, ...]:
+def events(remembering: Remembering) -> tuple[t.Variable, ...]:
     """What a step's formulas read beside ports and cells: `CLOCK`, and which messages have arrived."""
     spoken = (*(clause.formula for clause in remembering.node.clauses), *(cell.now for cell in remembering.cells))
     cells = set(remembering.before)
@@ -101,7 +78,7 @@ def events(remembering: Remembering) -> tuple[Variable, ...]:
     return tuple(sorted(found, key=lambda v: v.name))
 
 
-def pace_of(node: Node) -> Limit | None:
+def pace_of(node: Node) -> t.Limit | None:
     """How far apart the node's steps are, as far as its contract says (``steps(every 20 ms)``)."""
     return next((clause.pace for clause in node.guarantees if clause.pace is not None), None)
 
@@ -113,7 +90,7 @@ def one_step(node: Node) -> Remembering:
     others = tuple(c for c in node.guarantees if c.pace is None)
     made = compile_timed(replace(node, assumptions=(*node.assumptions, *paced), guarantees=others))
     read = events(made)
-    ports = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in read)
+    ports = tuple(Port(t.Role.INPUT, v.name, v.sort, str(v.sort)) for v in read)
     goes_on = Clause(ClauseKind.ASSUMPTION, CLOCK.name, 0, GOES_ON)
     assumed = (*made.node.assumptions, *((goes_on,) if CLOCK in read else ()))
     return replace(made, node=replace(made.node, inputs=(*node.inputs, *ports), assumptions=assumed))
@@ -122,7 +99,7 @@ def one_step(node: Node) -> Remembering:
 def one_pace(nodes: Iterable[Node]) -> bool:
     """Whether the steps of all these nodes can be the same steps."""
     paces = [pace for node in nodes if (pace := pace_of(node)) is not None]
-    lengths = [(pace.relation, pace.amount.value) for pace in paces if isinstance(pace.amount, Literal)]
+    lengths = [(pace.relation, pace.amount.value) for pace in paces if isinstance(pace.amount, t.Literal)]
     every = {value for relation, value in lengths if relation == "=="}
     return len(every) <= 1 and all(v <= most for v in every for _, most in lengths)  # type: ignore[operator]
 
@@ -137,45 +114,45 @@ class Timed(Records):
     """Older than that, nothing is told apart."""
     _machines: dict[str, Cell] = field(default_factory=dict)
 
-    def clause(self, formula: Term) -> Term:
+    def clause(self, formula: t.Term) -> t.Term:
         """A clause at a step and in the silence before it. Raises Unsaid, and has then made no cell."""
         if timed(formula) is None:
             return Records.clause(self, formula)
         with self._undone():
             held = self.positions(formula)
-            silence = disjunction((self._is_first(), Compare("<=", CLOCK, NO_TIME), self.throughout(held)))
+            silence = disjunction((self._is_first(), t.Compare("<=", CLOCK, NO_TIME), self.throughout(held)))
             return _small(conjunction((silence, held.now)), formula)
 
-    def positions(self, formula: Term) -> Lasting:
+    def positions(self, formula: t.Term) -> Lasting:
         """A clause with a limit in seconds, which may be a response, over positions. Raises Unsaid."""
         with self._timing():
             return self.over(in_the_past(formula))
 
-    def past(self, formula: Term, *, in_time: bool) -> Term:
+    def past(self, formula: t.Term, *, in_time: bool) -> t.Term:
         """A formula of the past at a step, over positions where that is wanted. Raises Unsaid."""
         if not in_time:
             return Records.term(self, formula)
         with self._timing():
             return self.over(formula).now
 
-    def instants(self, formula: Lasting) -> tuple[Mapping[Side, Term], tuple[Term, ...]]:
+    def instants(self, formula: Lasting) -> tuple[Mapping[Side, t.Term], tuple[t.Term, ...]]:
         """Of a formula in the silence after a step, over what that has left: its values so many seconds (`ELAPSED`)
         after the step, and when it may change: for each value of a quantified variable, which is then only an argument
         of what is remembered. Raises Unsaid."""
         for at in formula.breaks:
-            if any(v.role is Role.BOUND for v in free_variables(_unapplied(at))):
+            if any(v.role is t.Role.BOUND for v in free_variables(_unapplied(at))):
                 raise Unsaid("limits in seconds that hang on a quantified variable")
         found = {side: formula.silent(Instant(ELAPSED, side)) for side in Side}
-        begun = Compare("<=", ELAPSED, NO_TIME)  # right after the step: what that itself demands, it may have had
-        found[Side.AFTER] = Conditional(begun, formula.silent(Instant(NO_TIME, Side.AFTER)), found[Side.AFTER], BOOL)
+        begun = t.Compare("<=", ELAPSED, NO_TIME)  # right after the step: what that itself demands, it may have had
+        found[Side.AFTER] = t.Conditional(begun, formula.silent(Instant(NO_TIME, Side.AFTER)), found[Side.AFTER], BOOL)
         return found, formula.breaks
 
-    def throughout(self, formula: Lasting) -> Term:
+    def throughout(self, formula: Lasting) -> t.Term:
         """That a formula is true all through the silence before a step. Raises Unsaid."""
         match formula.trend:
             case Trend.STAYS:
                 assert formula.last is not None
-                return TRUE if formula.steady else self._held(formula.last)
+                return t.TRUE if formula.steady else self._held(formula.last)
             case Trend.FALLS:
                 return formula.silent(Instant(CLOCK, Side.BEFORE))
             case Trend.RISES:
@@ -183,14 +160,14 @@ class Timed(Records):
             case Trend.CHANGES:
                 demanded = [formula.silent(Instant(NO_TIME, Side.AFTER))]
                 for at in _closed(formula):
-                    inside = conjunction((Compare("<", NO_TIME, at), Compare("<", at, CLOCK)))
+                    inside = conjunction((t.Compare("<", NO_TIME, at), t.Compare("<", at, CLOCK)))
                     both = conjunction((formula.silent(Instant(at)), formula.silent(Instant(at, Side.AFTER))))
-                    demanded.append(Implies(inside, both))
+                    demanded.append(t.Implies(inside, both))
                 return conjunction(demanded)
 
-    def over(self, term: Term) -> Lasting:
+    def over(self, term: t.Term) -> Lasting:
         """A term over positions. Raises Unsaid."""
-        if isinstance(term, History):
+        if isinstance(term, t.History):
             meaning = digest(term)
             if meaning not in self._positions:
                 self._positions[meaning] = self._over_history(term)
@@ -201,53 +178,53 @@ class Timed(Records):
         if all(each is not None for each in last):
             return self._constant(now, _remade(term, [each for each in last if each is not None]))
 
-        def silent(instant: Instant) -> Term:
+        def silent(instant: Instant) -> t.Term:
             return _remade(term, [part.silent(instant) for part in parts])
 
         breaks = tuple(dict.fromkeys(at for part in parts for at in part.breaks))
         return Lasting(now, silent, None, breaks, _trend(term, parts))
 
-    def term(self, term: Term) -> Term:
+    def term(self, term: t.Term) -> t.Term:
         """A term at a step."""
         return self.over(term).now if self._in_time else Records.term(self, term)
 
-    def _record(self, term: History) -> Term:
-        if term.operator is Past.ARRIVED:
+    def _record(self, term: t.History) -> t.Term:
+        if term.operator is t.Past.ARRIVED:
             return disjunction((self._is_first(), arrival(term)))
         return Records._record(self, term)
 
     # -- records -------------------------------------------------------------------------------------------------------
 
-    def _over_history(self, term: History) -> Lasting:
+    def _over_history(self, term: t.History) -> Lasting:
         limited = term.limit is not None and not term.limit.steps
         match term.operator:
-            case Past.STEPS:
+            case t.Past.STEPS:
                 return self._pace(term)
             case operator if limited or (operator in _EVER and term.limit is None):
                 return self._aged(term)
-            case operator if operator in RESPONSES:
+            case operator if operator in t.RESPONSES:
                 raise Unsaid(f"`{operator}` in a place where no response stands", term.span)
-            case Past.ROSE | Past.FELL | Past.CHANGED | Past.ARRIVED:
+            case t.Past.ROSE | t.Past.FELL | t.Past.CHANGED | t.Past.ARRIVED:
                 if any(self.over(part).last is None for part in term.arguments):
                     raise Unsaid(f"`{term.operator}` of what may change between steps", term.span)
-                return self._constant(self._record(term), FALSE)
+                return self._constant(self._record(term), t.FALSE)
             case _:  # what is of steps only stays as it was at the last
                 now = self._record(term)
                 return self._constant(now, now)
 
-    def _pace(self, term: History) -> Lasting:
+    def _pace(self, term: t.History) -> Lasting:
         assert term.limit is not None
         amount, relation = term.limit.amount, term.limit.relation
-        now = disjunction((self._is_first(), Compare(relation, CLOCK, amount)))
-        return Lasting(now, lambda i: Compare(sided("<=", i.side), i.elapsed, amount), None, (amount,), Trend.FALLS)
+        now = disjunction((self._is_first(), t.Compare(relation, CLOCK, amount)))
+        return Lasting(now, lambda i: t.Compare(sided("<=", i.side), i.elapsed, amount), None, (amount,), Trend.FALLS)
 
-    def _aged(self, term: History) -> Lasting:
+    def _aged(self, term: t.History) -> Lasting:
         """A record of the past that looks at positions: by the age of the latest or the earliest that counts."""
-        if term.operator is Past.HISTORICALLY:
+        if term.operator is t.Past.HISTORICALLY:
             unmet = negation(term.arguments[0])
             return self._negated(self._machine(term, _kind(term), None, self.over(unmet)))
         parts = tuple(map(self.over, term.arguments))
-        if term.operator is Past.HELD:
+        if term.operator is t.Past.HELD:
             return self._machine(term, Kind.EARLIEST, parts[0], parts[0])
         return self._machine(term, _kind(term), parts[0] if len(parts) == 2 else None, parts[-1])
 
@@ -256,13 +233,23 @@ class Timed(Records):
             return self._constant(negation(part.now), negation(part.last))
         return Lasting(negation(part.now), lambda i: negation(part.silent(i)), None, part.breaks, part.trend.flipped())
 
-    def _machine(self, term: History, kind: Kind, holds: Lasting | None, began: Lasting) -> Lasting:
+    def _machine(self, term: t.History, kind: Kind, holds: Lasting | None, began: Lasting) -> Lasting:
         inner = tuple(dict.fromkeys((*(_closed(holds) if holds is not None else ()), *_closed(began))))
         if len(inner) > LIMITS_NESTED:
             raise Unsaid(f"`{term.operator}` of what has more than {LIMITS_NESTED} limits in seconds", term.span)
         relation, amount, most = self._seconds(term)
         record = Record(
-            self.begun, self.longest, kind, holds, began, _sorted(inner), relation, amount.now, amount.silent, most
+            self.begun,
+            self.longest,
+            kind,
+            holds,
+            began,
+            _inside(term),
+            _sorted(inner),
+            relation,
+            amount.now,
+            amount.silent,
+            most,
         )
         cell = self._kept_for(record)
         record.left = cell.read
@@ -272,66 +259,68 @@ class Timed(Records):
             if constant and began.last is not None and (holds is None or holds.last is not None):
                 if began.steady and (holds is None or holds.steady):
                     return self._constant(cell.now, cell.now)
-                gone_on = conjunction(((TRUE if holds is None else holds.last) or FALSE, cell.now))
+                gone_on = conjunction(((t.TRUE if holds is None else holds.last) or t.FALSE, cell.now))
                 return self._constant(cell.now, disjunction((began.last, gone_on)))
             return Lasting(cell.now, record.silent, None, inner, record.trend)
-        now = conjunction((Compare("<=", NO_TIME, cell.now), Compare(relation, cell.now, amount.now)))
+        now = conjunction((t.Compare("<=", NO_TIME, cell.now), t.Compare(relation, cell.now, amount.now)))
         limit = amount.silent(Instant(NO_TIME, Side.AFTER))
-        breaks: list[Term] = [Arithmetic("-", limit, cell.read, REAL)]
-        if not constant or (kind is Kind.EARLIEST and began.last not in (began.now, FALSE)):
-            breaks += [*inner, limit, *(Arithmetic("+", at, limit, REAL) for at in inner)]
+        breaks: list[t.Term] = [t.Arithmetic("-", limit, cell.read, REAL)]
+        if not constant or (kind is Kind.EARLIEST and began.last not in (began.now, t.FALSE)):
+            breaks += [*inner, limit, *(t.Arithmetic("+", at, limit, REAL) for at in inner)]
         trend = record.trend
         return Lasting(now, record.silent, None, tuple(dict.fromkeys(breaks)), trend)
 
     def _kept_for(self, record: Record) -> Cell:
         """The cell of a record, which all with the same beginnings share, whatever their limits."""
-        began, holds = record.began.now, TRUE if record.holds is None else record.holds.now
-        name = f"{record.kind}{CELL}{digest(History(Past.SINCE, (holds, began), BOOL))[:12]}"
+        began, holds = record.began.now, t.TRUE if record.holds is None else record.holds.now
+        parts = [part for part in (record.holds, record.began) if part is not None]
+        silent = [p.last for p in parts if p.last is not None and p.last != p.now]  # an event, and what is said as one
+        name = f"{record.kind}{CELL}{digest(t.History(t.Past.SINCE, (holds, began, *silent), BOOL))[:12]}"
         if name not in self._machines:
             ever = record.kind is Kind.EVER
             before, parameters = at_the_parameters(name, (holds, began), BOOL if ever else REAL)
-            cell = Cell(before, parameters, FALSE if ever else NONE, TRUE)
+            cell = Cell(before, parameters, t.FALSE if ever else NONE, t.TRUE)
             self._machines[name] = replace(cell, now=record.step(cell.read))
             self.cells.append(self._machines[name])
         return self._machines[name]
 
-    def _seconds(self, term: History) -> tuple[str, Lasting, Fraction | None]:
+    def _seconds(self, term: t.History) -> tuple[str, Lasting, Fraction | None]:
         """The limit: how an age is held against it, its length, and the length where it is written down."""
         if term.limit is None:
             return "", self._constant(NO_TIME, NO_TIME), None
         amount = self.over(term.limit.amount)
         if amount.last is None:
             raise Unsaid("a limit that changes between steps", term.span)
-        value = amount.now.value if isinstance(amount.now, Literal) else None
+        value = amount.now.value if isinstance(amount.now, t.Literal) else None
         most = Fraction(value) if value is not None and not isinstance(value, bool | str) else None
-        relation = term.limit.relation or (">=" if term.operator is Past.HELD else "<=")
+        relation = term.limit.relation or (">=" if term.operator is t.Past.HELD else "<=")
         return relation, amount, most
 
     # -- what a silence is like ----------------------------------------------------------------------------------------
 
-    def _constant(self, now: Term, last: Term) -> Lasting:
+    def _constant(self, now: t.Term, last: t.Term) -> Lasting:
         return Lasting(now, lambda _: self._held(last), last)
 
-    def _held(self, last: Term) -> Term:
+    def _held(self, last: t.Term) -> t.Term:
         """What the step before has left to the silence after it; a formula is false before the first step."""
         if last.sort != BOOL and not free_variables(last):
             return last
-        if last == FALSE:
-            return FALSE
+        if last == t.FALSE:
+            return t.FALSE
         name = f"silence{CELL}{digest(last)[:12]}"
         known = next((cell for cell in self.cells if cell.name == name), None)
         if known is None:
-            initial = FALSE if last.sort == BOOL else some_value(last.sort)
+            initial = t.FALSE if last.sort == BOOL else some_value(last.sort)
             known = Cell(*at_the_parameters(name, (last,), last.sort), initial, last)
             self.cells.append(known)
         return known.read
 
-    def begun(self, formula: Lasting, instant: Instant) -> Term:
+    def begun(self, formula: Lasting, instant: Instant) -> t.Term:
         """That there is a silence before this step, and a formula is so in it."""
         found = formula.silent(instant)
         return found if formula.last is not None else conjunction((negation(self._is_first()), found))
 
-    def _named(self, term: History) -> str:
+    def _named(self, term: t.History) -> str:
         return f"{'timed ' if self._in_time else ''}{Records._named(self, term)}"
 
     @contextmanager
@@ -355,24 +344,30 @@ class Timed(Records):
                 raise
 
 
-def _kind(term: History) -> Kind:
+def _kind(term: t.History) -> Kind:
     if term.limit is None:
         return Kind.EVER
     return Kind.EARLIEST if term.limit.relation in (">", ">=") else Kind.LATEST
 
 
-def _trend(term: Term, parts: tuple[Lasting, ...]) -> Trend:
+def _trend(term: t.Term, parts: tuple[Lasting, ...]) -> Trend:
     match term:
-        case Not():
+        case t.Not():
             return parts[0].trend.flipped()
-        case And() | Or() | Quantified(quantifier=Quantifier.FORALL | Quantifier.EXISTS):
+        case t.And() | t.Or() | t.Quantified(quantifier=t.Quantifier.FORALL | t.Quantifier.EXISTS):
             return _together(part.trend for part in parts)
-        case Implies():
+        case t.Implies():
             return _together((parts[0].trend.flipped(), parts[1].trend))
-        case Conditional() if parts[0].trend is Trend.STAYS and term.sort == BOOL:
+        case t.Conditional() if parts[0].trend is Trend.STAYS and term.sort == BOOL:
             return _together((parts[1].trend, parts[2].trend))
         case _:  # it may go either way
             return Trend.CHANGES
+
+
+def _inside(term: t.History) -> bool:
+    """Whether what has to hold since the beginning is a part of the beginning."""
+    holds, *others = term.arguments
+    return all(began == holds or (isinstance(began, t.And) and holds in began.items) for began in others)
 
 
 def _together(trends: Iterable[Trend]) -> Trend:
@@ -380,51 +375,51 @@ def _together(trends: Iterable[Trend]) -> Trend:
     return Trend.STAYS if not found else found.pop() if len(found) == 1 else Trend.CHANGES
 
 
-def _closed(formula: Lasting) -> tuple[Term, ...]:
+def _closed(formula: Lasting) -> tuple[t.Term, ...]:
     """The breaks of a formula, none of which may be of one of many values of a variable. Raises Unsaid."""
     own = free_variables(formula.now)
     for at in formula.breaks:
-        if any(v.role is Role.BOUND and v not in own for v in free_variables(at)):
+        if any(v.role is t.Role.BOUND and v not in own for v in free_variables(at)):
             raise Unsaid("limits in seconds under a quantifier, inside another")
     return formula.breaks
 
 
-def _unapplied(term: Term) -> Term:
+def _unapplied(term: t.Term) -> t.Term:
     """The term without what functions that have kept something are given."""
-    if isinstance(term, Apply) and isinstance(term.function, Variable) and term.function.name.find(CELL) >= 0:
+    if isinstance(term, t.Apply) and isinstance(term.function, t.Variable) and term.function.name.find(CELL) >= 0:
         return term.function
     return term.rebuild(tuple(map(_unapplied, term.children))) if term.children else term
 
 
-def _sorted(breaks: tuple[Term, ...]) -> tuple[Term, ...]:
+def _sorted(breaks: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
     """In order, whatever their values are."""
     if len(breaks) < 2:
         return breaks
     one, other = breaks
-    return Operation(Builtin.MIN, (one, other), REAL), Operation(Builtin.MAX, (one, other), REAL)
+    return t.Operation(t.Builtin.MIN, (one, other), REAL), t.Operation(t.Builtin.MAX, (one, other), REAL)
 
 
-def _remade(term: Term, parts: list[Term]) -> Term:
+def _remade(term: t.Term, parts: list[t.Term]) -> t.Term:
     """The term with other parts; what is sure is not kept in formulas."""
     match term:
-        case And():
+        case t.And():
             return conjunction(parts)
-        case Or():
+        case t.Or():
             return disjunction(parts)
-        case Not():
+        case t.Not():
             return negation(parts[0])
-        case Implies() if FALSE in parts[:1] or TRUE in parts[1:]:
-            return TRUE
+        case t.Implies() if t.FALSE in parts[:1] or t.TRUE in parts[1:]:
+            return t.TRUE
         case _:  # nothing to leave out
             same = all(one is other for one, other in zip(term.children, parts, strict=True))
             return term if same else term.rebuild(tuple(parts))
 
 
-def _small(made: Term, said: Term) -> Term:
+def _small(made: t.Term, said: t.Term) -> t.Term:
     """A formula that can be worked with. Raises Unsaid: each limit inside another doubles the formula a few times."""
     sizes: dict[int, int] = {}
 
-    def size(term: Term) -> int:
+    def size(term: t.Term) -> int:
         if id(term) not in sizes:
             sizes[id(term)] = 1 + sum(map(size, term.children))
         return sizes[id(term)]

@@ -8,65 +8,53 @@ from dataclasses import replace
 from avow.base.records import dataclass
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.formulas.temporal.cell import Unsaid
+from avow.language import terms as t
 from avow.language.sorts import BOOL
-from avow.language.terms import (
-    FALSE,
-    RESPONSES,
-    TRUE,
-    History,
-    Implies,
-    Limit,
-    Past,
-    Quantified,
-    Quantifier,
-    Term,
-    Variable,
-)
 
 
-def in_the_past(formula: Term) -> Term:
+def in_the_past(formula: t.Term) -> t.Term:
     """A clause without responses: what it demands of later steps, said of earlier ones. Raises Unsaid where it demands
     that something comes at some time, which no first steps of a run can break."""
     match formula:
-        case Quantified(quantifier=Quantifier.FORALL):
+        case t.Quantified(quantifier=t.Quantifier.FORALL):
             return formula.rebuild((in_the_past(formula.body),))
-        case Implies() | History() if (found := _response(formula)) is not None:
+        case t.Implies() | t.History() if (found := _response(formula)) is not None:
             triggers, response = found
             return _demanded(conjunction(triggers), response)
         case _:  # it has none
             return formula
 
 
-def _response(formula: Term) -> tuple[list[Term], History] | None:
+def _response(formula: t.Term) -> tuple[list[t.Term], t.History] | None:
     """What stands before a response that is a formula's right side, and the response; None where there is none."""
-    triggers = list[Term]()
-    while isinstance(formula, Implies):
+    triggers = list[t.Term]()
+    while isinstance(formula, t.Implies):
         triggers.append(formula.left)
         formula = formula.right
-    return (triggers, formula) if isinstance(formula, History) and formula.operator in RESPONSES else None
+    return (triggers, formula) if isinstance(formula, t.History) and formula.operator in t.RESPONSES else None
 
 
-def _demanded(trigger: Term, response: History) -> Term:
+def _demanded(trigger: t.Term, response: t.History) -> t.Term:
     wanted, limit, span = response.arguments[0], response.limit, response.span
     match response.operator:
-        case Past.NEXT:
-            return Implies(History(Past.PREVIOUS, (trigger, FALSE), BOOL, None, span), wanted, span)
-        case Past.WITHIN:
+        case t.Past.NEXT:
+            return t.Implies(t.History(t.Past.PREVIOUS, (trigger, t.FALSE), BOOL, None, span), wanted, span)
+        case t.Past.WITHIN:
             assert limit is not None
-            late = Limit(">=" if limit.steps else ">", limit.amount, limit.steps)
+            late = t.Limit(">=" if limit.steps else ">", limit.amount, limit.steps)
             unmet = negation(wanted)
-            return negation(History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, late, span))
-        case Past.FOR:
-            return Implies(History(Past.ONCE, (trigger,), BOOL, limit, span), wanted, span)
-        case Past.UNTIL:
+            return negation(t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, late, span))
+        case t.Past.FOR:
+            return t.Implies(t.History(t.Past.ONCE, (trigger,), BOOL, limit, span), wanted, span)
+        case t.Past.UNTIL:
             ended = response.arguments[1]
             waiting = conjunction((trigger, negation(ended)))
-            return Implies(History(Past.SINCE, (negation(ended), waiting), BOOL, None, span), wanted, span)
+            return t.Implies(t.History(t.Past.SINCE, (negation(ended), waiting), BOOL, None, span), wanted, span)
         case _:
             raise Unsaid(f"`{response.operator}`, which no first steps of a run can break", span)
 
 
-def pending(formula: Term) -> Term | None:
+def pending(formula: t.Term) -> t.Term | None:
     """When a clause that is a response demands something of steps to come (of any values of its quantified variables),
     as a formula of the past; None where it is no response, or one that no first steps can break."""
     if (found := responding(formula)) is None:
@@ -75,18 +63,18 @@ def pending(formula: Term) -> Term | None:
     return None if waits is None else _somewhere(found[0], waits)
 
 
-def _waits(trigger: Term, response: History) -> Term | None:
+def _waits(trigger: t.Term, response: t.History) -> t.Term | None:
     match response.operator:
-        case Past.NEXT:
+        case t.Past.NEXT:
             return trigger
-        case Past.WITHIN | Past.FOR:
+        case t.Past.WITHIN | t.Past.FOR:
             assert response.limit is not None
             early = replace(response.limit, relation="<")
-            unmet = negation(response.arguments[0]) if response.operator is Past.WITHIN else TRUE
-            return History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, early, response.span)
-        case Past.UNTIL:
+            unmet = negation(response.arguments[0]) if response.operator is t.Past.WITHIN else t.TRUE
+            return t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, early, response.span)
+        case t.Past.UNTIL:
             going = negation(response.arguments[1])
-            return History(Past.SINCE, (going, conjunction((trigger, going))), BOOL, None, response.span)
+            return t.History(t.Past.SINCE, (going, conjunction((trigger, going))), BOOL, None, response.span)
         case _:  # it comes at some time
             return None
 
@@ -95,13 +83,13 @@ def _waits(trigger: Term, response: History) -> Term | None:
 class Due:
     """``T -> next(R)`` and its like: `triggers` together are T, `outer` the quantified variables around it."""
 
-    outer: tuple[Variable, ...]
-    triggers: tuple[Term, ...]
-    full: Term
+    outer: tuple[t.Variable, ...]
+    triggers: tuple[t.Term, ...]
+    full: t.Term
     """That all of what a trigger demands has come due, of some trigger, as a formula of the past."""
 
 
-def due(formula: Term) -> Due | None:
+def due(formula: t.Term) -> Due | None:
     """When a clause that is a response demands something; None of other clauses."""
     found = responding(formula)
     if found is None:
@@ -109,39 +97,39 @@ def due(formula: Term) -> Due | None:
     outer, triggers, response = found
     full = conjunction(triggers)
     match response.operator:
-        case Past.NEXT:
-            full = History(Past.PREVIOUS, (full, FALSE), BOOL)
-        case Past.WITHIN | Past.FOR:
+        case t.Past.NEXT:
+            full = t.History(t.Past.PREVIOUS, (full, t.FALSE), BOOL)
+        case t.Past.WITHIN | t.Past.FOR:
             assert response.limit is not None
-            full = History(Past.SINCE, (TRUE, full), BOOL, replace(response.limit, relation=">="))
+            full = t.History(t.Past.SINCE, (t.TRUE, full), BOOL, replace(response.limit, relation=">="))
         case _:  # with the trigger
             pass
     return Due(outer, triggers, full)
 
 
-def responding(formula: Term) -> tuple[tuple[Variable, ...], tuple[Term, ...], History] | None:
+def responding(formula: t.Term) -> tuple[tuple[t.Variable, ...], tuple[t.Term, ...], t.History] | None:
     """Of a clause that is a response: the variables of the quantifiers around it, what triggers it, and the response;
     None of other clauses."""
-    outer = list[Variable]()
-    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
+    outer = list[t.Variable]()
+    while isinstance(formula, t.Quantified) and formula.quantifier is t.Quantifier.FORALL:
         outer.extend(formula.variables)
         formula = formula.body
     found = _response(formula)
     return None if found is None else (tuple(outer), tuple(found[0]), found[1])
 
 
-def fulfilled(formula: Term) -> Term | None:
+def fulfilled(formula: t.Term) -> t.Term | None:
     """When a clause ``T -> within[…](R)`` is met (of any values of its quantified variables), as a formula of the past;
     None of other clauses."""
     found = responding(formula)
-    if found is None or found[2].operator is not Past.WITHIN:
+    if found is None or found[2].operator is not t.Past.WITHIN:
         return None
     trigger, wanted = conjunction(found[1]), found[2].arguments[0]
     unmet = negation(wanted)
-    waiting = History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL)
-    met = conjunction((wanted, disjunction((trigger, History(Past.PREVIOUS, (waiting, FALSE), BOOL)))))
+    waiting = t.History(t.Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL)
+    met = conjunction((wanted, disjunction((trigger, t.History(t.Past.PREVIOUS, (waiting, t.FALSE), BOOL)))))
     return _somewhere(found[0], met)
 
 
-def _somewhere(outer: tuple[Variable, ...], formula: Term) -> Term:
-    return Quantified(Quantifier.EXISTS, outer, formula) if outer else formula
+def _somewhere(outer: tuple[t.Variable, ...], formula: t.Term) -> t.Term:
+    return t.Quantified(t.Quantifier.EXISTS, outer, formula) if outer else formula

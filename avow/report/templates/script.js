@@ -67,7 +67,7 @@
   reachable();
   // Paper has no folds: what has something to tell is opened; good news keeps to its line, logs stay on the screen.
   let folded = [];
-  const good = ["proved", "checked", "tested", "monitored", "reviewed", "justified", "linked"];
+  const good = ["proved", "checked", "tested", "monitored", "reviewed", "justified", "argued"];
   addEventListener("beforeprint", () => {
     folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !d.querySelector(".tree") && !("screen" in d.dataset) && !("advice" in d.dataset)
       && !(d.classList.contains("ob") && d.dataset.kind !== "guarantee" && good.includes(d.dataset.status)));

@@ -8,6 +8,6 @@ https://docs.ros.org/en/rolling/How-To-Guides/Launch-file-different-formats.html
 
 from __future__ import annotations
 
-from avow.ros.launch.reading import Launched, Started, read_launch
+from avow.ros.launch.reading import Launched, Setting, Started, read_launch
 
-__all__ = ["Launched", "Started", "read_launch"]
+__all__ = ["Launched", "Setting", "Started", "read_launch"]

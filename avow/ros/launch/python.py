@@ -181,6 +181,8 @@ class _Python:
                 texts[_RENAMED[keyword.arg]] = self.text(keyword.value)
             elif keyword.arg == "remappings":
                 children += self.remaps(keyword.value)
+            elif keyword.arg == "parameters":
+                children += self.parameters(keyword.value)
             elif keyword.arg in ("arguments", "ros_arguments"):
                 parts = self.items(keyword.value)
                 texts["args"] = (
@@ -203,6 +205,19 @@ class _Python:
             if len(texts) != 2:
                 texts = [self.unknown(pair)] * 2
             found.append(Element("remap", {"from": texts[0], "to": texts[1]}, (), self.at(pair)))
+        return found
+
+    def parameters(self, node: ast.expr) -> list[Element]:
+        """Files and mappings; what cannot be read is left out."""
+        found: list[Element] = []
+        for item in self.items(node) or [node]:
+            value = self.value(item)
+            if isinstance(value, ast.Dict):
+                pairs = [(k or v, v) for k, v in zip(value.keys, value.values, strict=True)]
+                texts = [{"name": self.text(k), "value": self.text(v)} for k, v in pairs]
+            else:
+                texts = [{"from": self.text(value)}]
+            found += [Element("param", one, (), self.at(item)) for one in texts]
         return found
 
     def include(self, call: ast.Call) -> Element:

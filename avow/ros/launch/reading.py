@@ -34,6 +34,18 @@ class Started:
     remaps: tuple[tuple[str, str], ...] = ()
     unread: tuple[str, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
+    parameters: tuple[Setting, ...] = ()
+    """In their order, as far as they can be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter's name and value as text; a file's path, where the name is empty. The value is empty where it is not
+    known."""
+
+    name: str
+    value: str
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,9 +323,17 @@ class _Reading:
                 self.tell(element, f"the node's name is not known: {why}")
         parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
         kind = "/".join(part for part in parts if part)
-        self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span))
+        settings = tuple(self.settings(element, scope))
+        self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span, settings))
         if element.tag.endswith("container"):
             self.each((e for e in element.children if e.tag == "composable_node"), outer)
+
+    def settings(self, element: Element, scope: _Scope) -> Iterator[Setting]:
+        """The parameters that a node is started with, as far as they are known."""
+        for child in element.children:
+            if child.tag == "param" and self.condition(child, scope) is True:
+                name, value = self.shown(child.get("name"), scope), self.shown(child.get("from", "value"), scope)
+                yield Setting(name, value if name or "from" in child.attributes else "", child.span)
 
     def command_line(
         self, element: Element, scope: _Scope, doubt: list[str]

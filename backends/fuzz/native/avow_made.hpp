@@ -1,6 +1,8 @@
 // A node made with its parameters, and what its values look like to Avow.
 #pragma once
 
+#include <type_traits>
+
 #include "avow_tables.hpp"
 #include "contract.inc"
 
@@ -18,6 +20,13 @@ inline Parameters parameters() {
     made.put(given.name, std::move(value));
   }
   return made;
+}
+
+// The node of an adapter; one that takes no parameters needs no constructor.
+template <class Node>
+inline Node made() {
+  if constexpr (std::is_constructible_v<Node, const Parameters&>) return Node(parameters());
+  else return Node();
 }
 
 // Memory that a node says it has; nothing where the contract has none.

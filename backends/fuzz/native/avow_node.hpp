@@ -3,7 +3,7 @@
 // An adapter includes this file and the node's own, and defines, outside of any namespace,
 //
 //     struct AvowNode {
-//       explicit AvowNode(const avow::Parameters& given);                  // the plan's parameters
+//       explicit AvowNode(const avow::Parameters& given);                  // only where it takes the plan's parameters
 //       void step(const avow::Inputs& in, avow::Outputs& out);             // one step
 //       void memory(avow::Outputs& out) const;                             // where the plan has `memory:`
 //     };

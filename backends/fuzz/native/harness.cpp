@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   avow::Drawn drawn(data, size);
   int steps = 1 + int(drawn.take(1) % AVOW_STEPS);
   within = true;
-  AvowNode node(avow::parameters());
+  AvowNode node = avow::made<AvowNode>();
   within = false;
   avow::Inputs in, given;
   for (int k = 0; k < steps && (k == 0 || drawn.left()); ++k) {

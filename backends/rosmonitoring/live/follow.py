@@ -152,8 +152,8 @@ class Board:
 def graph_of(
     text: str, running: Session, host: str, *, enforce: bool = False, warn: Callable[[str], None] = lambda text: None
 ) -> Graph:
-    """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. `warn`: as `Ros1`.
-    Raises Rejected."""
+    """``ros1``, ``ros1:http://host:11311``, ``ros2``, ``ros2:42`` (or ``dds``), ``rosbridge:ws://host:9090``. `warn`:
+    as `Ros1`. Raises Rejected."""
     heard = [topic for topic in running.topics if not is_part(topic)]
     filters = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
     kind, _, address = text.partition(":")
@@ -162,7 +162,7 @@ def graph_of(
         graph = Ros1(master_of(text), heard, host, filters, warn)
     elif enforce:
         raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
-    elif kind == "dds":
+    elif kind in ("dds", "ros2"):
         try:
             domain = domain_of(text)
         except ValueError as error:
@@ -171,7 +171,7 @@ def graph_of(
     elif kind == "rosbridge" and address.startswith(("ws://", "wss://")):
         graph = Rosbridge(address, heard)
     else:
-        hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"
+        hint = "ros1, ros1:http://host:11311, ros2, ros2:42, or rosbridge:ws://host:9090"
         raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
     for topic in running.topics:
         if topic not in heard:

@@ -20,6 +20,9 @@ from typing import Any
 from urllib.parse import urlparse
 from xmlrpc.server import SimpleXMLRPCServer
 
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
 from avow.ros.master import FAILURES, interface
@@ -113,8 +116,8 @@ class Ros1:
         return spoken
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
-        """What says verdicts on a topic. Raises Rejected without the package rosbags."""
-        store, full = _typestore("ROS1_NOETIC"), "diagnostic_msgs/msg/DiagnosticArray"
+        """What says verdicts on a topic."""
+        store, full = get_typestore(Stores.ROS1_NOETIC), "diagnostic_msgs/msg/DiagnosticArray"
         definition, digest = store.generate_msgdef(full, ros_version=1)
         spoken = self.speak(topic, "diagnostic_msgs/DiagnosticArray", definition, digest)
         types, numbers = store.types, itertools.count()
@@ -316,23 +319,9 @@ def _exactly(line: socket.socket, count: int) -> bytes:
     return b"".join(parts)
 
 
-def _typestore(name: str) -> Any:
-    """Raises Rejected without the package rosbags."""
-    try:
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        hint = "pip install 'avow[bags]'"
-        raise Rejected(Diagnostic("MON202", "messages of ROS 1 need the package rosbags", hint=hint)) from None
-    return get_typestore(Stores[name])
-
-
 def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str, Any]]:
-    """What a publisher's messages hold, by the definition that it sent. Raises ValueError where it contradicts itself,
-    Rejected without the package rosbags."""
-    store = _typestore("EMPTY")
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import TypesysError, get_types_from_msg
-
+    """A reader of a publisher's messages. Raises ValueError if its definition contradicts itself."""
+    store = get_typestore(Stores.EMPTY)
     kind = fields.get("type", "")
     package, _, name = kind.partition("/")
     full = f"{package}/msg/{name}"

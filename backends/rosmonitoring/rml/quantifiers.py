@@ -15,42 +15,34 @@ from avow.base.tuning.bounds import ATOMS_MADE
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.disjunctions import Part, alternatives, conjunction
+from avow.formulas.formula import conjunction as every_of
 from avow.formulas.one_point_rule import made_with, solved
 from avow.formulas.renaming import bound_names, rename_apart
+from avow.formulas.traversal import transform
+from avow.language import sorts as s
+from avow.language import terms as t
 from avow.language.operators import OPERATORS, Why
-from avow.language.sorts import BOOL, BoolSort, DataSort, FunctionSort, RealSort, TupleSort
-from avow.language.terms import (
-    And,
-    Apply,
-    Argument,
-    Arithmetic,
-    Compare,
-    Conditional,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Literal,
-    Negative,
-    Not,
-    Operation,
-    Or,
-    Quantified,
-    Quantifier,
-    Role,
-    SequenceTerm,
-    SetTerm,
-    Term,
-    TupleTerm,
-    Variable,
-    Widen,
-)
 
 from ..tuning import COMPARISONS
-from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
-from .syntax import FALSE, TRUE, Calculation, Condition, NotRml, Number, Numeric, compare, every, opposite, size, some
+from .symbols import Points, Scalar, Symbol, Table, Tracked, Variant, code, constant, equal
+from .syntax import (
+    FALSE,
+    TRUE,
+    Calculation,
+    Condition,
+    Name,
+    NotRml,
+    Number,
+    Numeric,
+    compare,
+    every,
+    opposite,
+    size,
+    some,
+    without_exclusions,
+)
 
+_INFINITE = (s.RealSort, s.IntegerSort, s.NaturalSort)
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 
 Bound = Mapping[str, Symbol]
@@ -66,10 +58,10 @@ class Eliminator:
     symbols: Mapping[str, Symbol]
     _work: int = 0
 
-    def condition(self, formula: Term) -> Condition:
+    def condition(self, formula: t.Term) -> Condition:
         """Raises NotRml with the reason why the formula is none."""
         try:
-            found = self._formula(rename_apart(lifted(formula)), {})
+            found = self._formula(rename_apart(lifted(self._without_functions(formula))), {})
         except TooManyCases:
             raise NotRml(
                 f"its conditionals (`if`, `min`, `max`, `abs`) make more than {ATOMS_MADE} comparisons"
@@ -80,51 +72,80 @@ class Eliminator:
             raise NotRml(f"the condition without quantifiers has {size(found)} parts, more than {COMPARISONS}")
         return found
 
-    def _formula(self, term: Term, bound: Bound) -> Condition:
+    def _without_functions(self, formula: t.Term) -> t.Term:
+        """Each value of a function with a result as a choice: at its known arguments, or elsewhere."""
+        made = dict(self.symbols)
+
+        def part(name: str, symbol: Symbol, sort: s.Sort) -> t.Variable:
+            variable = t.Variable(t.Role.INPUT, name, sort)
+            made[variable.qualified] = symbol
+            return variable
+
+        def chosen(term: t.Term) -> t.Term:
+            match term:
+                case t.Apply(function=t.Variable(sort=s.FunctionSort(parameters=sorts, result=sort), qualified=of)) if (
+                    isinstance(table := self.symbols.get(of), Table)
+                ):
+                    value: t.Term = part(f"{of} elsewhere", table.elsewhere, sort)
+                    for k, (arguments, result) in enumerate(table.points):
+                        names = enumerate(zip(term.arguments, arguments, sorts, strict=True))
+                        here = (
+                            t.Compare("==", a, part(f"{of} argument {k} {n}", p, item)) for n, (a, p, item) in names
+                        )
+                        value = t.Conditional(every_of(here), part(f"{of} value {k}", result, sort), value, sort)
+                    return value
+                case _:  # any other term stays as it is
+                    return term
+
+        changed = transform(formula, chosen)
+        self.symbols = made
+        return changed
+
+    def _formula(self, term: t.Term, bound: Bound) -> Condition:
         self._tick()
         match term:
-            case Literal(value=bool() as value):
+            case t.Literal(value=bool() as value):
                 return every([]) if value else some([])
-            case Not(body=body):
+            case t.Not(body=body):
                 return opposite(self._formula(body, bound))
-            case And(items=items):
+            case t.And(items=items):
                 return every([self._formula(item, bound) for item in items])
-            case Or(items=items):
+            case t.Or(items=items):
                 return some([self._formula(item, bound) for item in items])
-            case Implies(left=left, right=right):
+            case t.Implies(left=left, right=right):
                 return some([opposite(self._formula(left, bound)), self._formula(right, bound)])
-            case Iff(left=left, right=right):
+            case t.Iff(left=left, right=right):
                 return self._iff(left, right, bound)
-            case Compare():
+            case t.Compare():
                 return self._compare(term, bound)
-            case In(item=item, collection=SetTerm(items=items) | SequenceTerm(items=items)):
+            case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
                 left_side = self._value(item, bound)
                 return some([equal(left_side, self._value(each, bound)) for each in items])
-            case Apply():
+            case t.Apply():
                 return self._apply(term, bound)
-            case Variable(sort=BoolSort()):
+            case t.Variable(sort=s.BoolSort()):
                 return compare("==", self._number(term, bound), Number(Fraction(1)))
-            case Quantified(quantifier=Quantifier.EXISTS):
+            case t.Quantified(quantifier=t.Quantifier.EXISTS):
                 return self._exists(term.variables, term.body, True, bound)
-            case Quantified(quantifier=Quantifier.FORALL):
+            case t.Quantified(quantifier=t.Quantifier.FORALL):
                 return opposite(self._exists(term.variables, term.body, False, bound))
-            case Quantified(quantifier=Quantifier.UNIQUE):
+            case t.Quantified(quantifier=t.Quantifier.UNIQUE):
                 return self._unique(term, bound)
             case _:
                 raise NotRml(f"a {type(term).__name__.lower()} is not expressible in RML")
 
-    def _iff(self, left: Term, right: Term, bound: Bound) -> Condition:
+    def _iff(self, left: t.Term, right: t.Term, bound: Bound) -> Condition:
         one, other = self._formula(left, bound), self._formula(right, bound)
         return every([some([opposite(one), other]), some([one, opposite(other)])])
 
-    def _compare(self, term: Compare, bound: Bound) -> Condition:
+    def _compare(self, term: t.Compare, bound: Bound) -> Condition:
         made = made_with(term)
         if made is not None:
             known = self._value(term.left, bound)
             assert isinstance(known, Variant)
-            assert isinstance(term.left.sort, DataSort)
+            assert isinstance(term.left.sort, s.DataSort)
             return compare(term.operator, known.tag, Number(Fraction(code(term.left.sort, made))))
-        if term.left.sort == BOOL:
+        if term.left.sort == s.BOOL:
             same = self._iff(term.left, term.right, bound)
             return same if term.operator == "==" else opposite(same)
         if term.operator in ("==", "!="):
@@ -132,7 +153,7 @@ class Eliminator:
             return same if term.operator == "==" else opposite(same)
         return compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
 
-    def _apply(self, term: Apply, bound: Bound) -> Condition:
+    def _apply(self, term: t.Apply, bound: Bound) -> Condition:
         arguments = [self._value(a, bound) for a in term.arguments]
         tracked = self._tracked(term)
         if tracked is not None:
@@ -145,65 +166,65 @@ class Eliminator:
             ]
         )
 
-    def _tracked(self, term: Apply) -> Tracked | None:
-        found = self.symbols.get(term.function.qualified) if isinstance(term.function, Variable) else None
+    def _tracked(self, term: t.Apply) -> Tracked | None:
+        found = self.symbols.get(term.function.qualified) if isinstance(term.function, t.Variable) else None
         return found if isinstance(found, Tracked) else None
 
-    def _points(self, term: Apply) -> Points:
-        if isinstance(term.function, Variable):
+    def _points(self, term: t.Apply) -> Points:
+        if isinstance(term.function, t.Variable):
             found = self.symbols.get(term.function.qualified)
             if isinstance(found, Points):
                 return found
         raise NotRml("an application of a function that is no relation")
 
-    def _value(self, term: Term, bound: Bound) -> Symbol:
+    def _value(self, term: t.Term, bound: Bound) -> Symbol:
         self._tick()
         match term:
-            case Variable(role=Role.BOUND, name=name):
+            case t.Variable(role=t.Role.BOUND, name=name):
                 if name in bound:
                     return bound[name]
                 raise NotRml(f"nothing fixes {name}")
-            case Variable():
+            case t.Variable():
                 return self.symbols[term.qualified]
-            case EnumValue(name=name, sort=sort):
+            case t.EnumValue(name=name, sort=sort):
                 return Scalar(Number(Fraction(code(sort, name))))
-            case Construct(constructor=name, arguments=arguments, sort=sort):
+            case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 given = tuple(self._value(a, bound) for a in arguments)
                 rows = tuple(
                     given if c.name == name else tuple(Scalar(Number(Fraction(0))) for _ in c.parameters)
                     for c in sort.constructors
                 )
                 return Variant(Number(Fraction(code(sort, name))), rows)
-            case Argument(value=whole, constructor=name, position=position):
+            case t.Argument(value=whole, constructor=name, position=position):
                 known = self._value(whole, bound)
                 assert isinstance(known, Variant)
-                assert isinstance(whole.sort, DataSort)
+                assert isinstance(whole.sort, s.DataSort)
                 return known.arguments[code(whole.sort, name) - 1][position]
             case _:  # a number, or refused by name
                 return Scalar(self._number(term, bound))
 
-    def _number(self, term: Term, bound: Bound) -> Numeric:
+    def _number(self, term: t.Term, bound: Bound) -> Numeric:
         match term:
-            case Literal(value=value) if not isinstance(value, str):
+            case t.Literal(value=value) if not isinstance(value, str):
                 return Number(Fraction(value))
-            case Widen(term=inside):
+            case t.Widen(term=inside):
                 return self._number(inside, bound)
-            case Negative(term=inside):
+            case t.Negative(term=inside):
                 return self._calculate("-", Number(Fraction(0)), self._number(inside, bound), term)
-            case Arithmetic(operator=operator, left=left, right=right):
+            case t.Arithmetic(operator=operator, left=left, right=right):
                 return self._calculate(operator, self._number(left, bound), self._number(right, bound), term)
-            case Variable() | Argument():
+            case t.Variable() | t.Argument():
                 found = self._value(term, bound)
                 if isinstance(found, Scalar):
                     return found.number
-            case Operation(operator=name):
+            case t.Operation(operator=name):
                 said = OPERATORS[name].rml
                 raise NotRml(f"`{name}`: {said.reason if isinstance(said, Why) else _NOT_LIFTED}")
-            case Conditional():
+            case t.Conditional():
                 raise NotRml(f"`if`: {_NOT_LIFTED}")
         raise NotRml(f"{type(term).__name__.lower()} terms of this sort are not expressible in RML")
 
-    def _calculate(self, operator: str, left: Numeric, right: Numeric, term: Term) -> Numeric:
+    def _calculate(self, operator: str, left: Numeric, right: Numeric, term: t.Term) -> Numeric:
         if isinstance(left, Number) and isinstance(right, Number):
             match operator:
                 case "+":
@@ -214,19 +235,19 @@ class Eliminator:
                     return Number(left.value * right.value)
                 case "/" if right.value:
                     return Number(left.value / right.value)
-        if isinstance(term.sort, RealSort) or operator == "/":
+        if isinstance(term.sort, s.RealSort) or operator == "/":
             raise NotRml("it calculates with REAL numbers, which the RML monitor does in floating point")
         return Calculation(operator, left, right)
 
-    def _unique(self, term: Quantified, bound: Bound) -> Condition:
+    def _unique(self, term: t.Quantified, bound: Bound) -> Condition:
         """One, and no other."""
-        copy = rename_apart(And((term, term)))
-        assert isinstance(copy, And)
+        copy = rename_apart(t.And((term, term)))
+        assert isinstance(copy, t.And)
         one, other = copy.items
-        assert isinstance(one, Quantified)
-        assert isinstance(other, Quantified)
-        differ = Or(tuple(Compare("!=", a, b) for a, b in zip(one.variables, other.variables, strict=True)))
-        two = And((one.body, other.body, differ))
+        assert isinstance(one, t.Quantified)
+        assert isinstance(other, t.Quantified)
+        differ = t.Or(tuple(t.Compare("!=", a, b) for a, b in zip(one.variables, other.variables, strict=True)))
+        two = t.And((one.body, other.body, differ))
         return every(
             [
                 self._exists(one.variables, one.body, True, bound),
@@ -234,28 +255,38 @@ class Eliminator:
             ]
         )
 
-    def _exists(self, variables: Sequence[Variable], body: Term, positive: bool, bound: Bound) -> Condition:
+    def _exists(self, variables: Sequence[t.Variable], body: t.Term, positive: bool, bound: Bound) -> Condition:
         parts, inner = conjunction(body, positive)
         if len(parts) == 1:
             options = alternatives(parts[0].term, parts[0].positive)
             if options is not None:
                 own = (*variables, *inner)
                 return some([self._exists(own, option, truth, bound) for option, truth in options])
-        return self._solve(parts, (*variables, *inner), bound)
+        return self._solve(parts, (*variables, *inner), bound, TRUE)
 
-    def _solve(self, parts: Sequence[Part], variables: Sequence[Variable], bound: Bound) -> Condition:
+    def _solve(
+        self, parts: Sequence[Part], variables: Sequence[t.Variable], bound: Bound, given: Condition
+    ) -> Condition:
+        """That some values of the free variables meet all parts. `given`: what holds around; where that contradicts the
+        parts, nothing has to fix a variable."""
         self._tick()
         free = {v.name: v for v in variables if v.name not in bound}
         ready = [p for p in parts if not p.names & free.keys()]
         pending = [p for p in parts if p.names & free.keys()]
         known = every([self._part(p, bound) for p in ready])
-        if not pending or known == FALSE:
+        facts = every([given, known])
+        if facts == FALSE:
+            return FALSE
+        if not pending:
             return known
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
             cases = self._binders(part, free, bound)
             if cases is not None:
-                found = [every([holds, self._solve([*more, *others], variables, now)]) for holds, more, now in cases]
+                found = [
+                    every([holds, self._solve([*more, *others], variables, now, every([facts, holds]))])
+                    for holds, more, now in cases
+                ]
                 return every([known, some(found)])
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
@@ -264,13 +295,20 @@ class Eliminator:
                 branches = []
                 for option, truth in options:
                     new, inner = conjunction(option, truth)
-                    branches.append(self._solve([*new, *others], (*variables, *inner), bound))
+                    branches.append(self._solve([*new, *others], (*variables, *inner), bound, facts))
                 return every([known, some(branches)])
         for name, variable in free.items():
             finite = finite_values(variable.sort)
-            if finite is not None and any(name in p.names for p in pending):
-                found = [self._solve(pending, variables, {**bound, name: constant(v, variable.sort)}) for v in finite]
+            if any(name in p.names for p in pending) and finite is not None:
+                values = [constant(v, variable.sort) for v in finite]
+                found = [self._solve(pending, variables, {**bound, name: value}, facts) for value in values]
                 return every([known, some(found)])
+            if any(name in p.names for p in pending) and isinstance(variable.sort, _INFINITE):
+                anything = Name(f"{name}?{self._work}")
+                open_ = self._solve(pending, variables, {**bound, name: Scalar(anything)}, facts)
+                left = without_exclusions(open_, anything)
+                if left is not None:
+                    return every([known, left])
         names = ", ".join(sorted(n for n in free if any(n in p.names for p in pending)))
         raise NotRml(f"nothing fixes {names}")
 
@@ -278,11 +316,13 @@ class Eliminator:
         found = self._formula(part.term, bound)
         return found if part.positive else opposite(found)
 
-    def _binders(self, part: Part, free: Mapping[str, Variable], bound: Bound) -> list[_Case] | None:
+    def _binders(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> list[_Case] | None:
         """The ways in which a part can hold, each with what it fixes; None if the part fixes nothing."""
         match part.term:
-            case Apply(
-                function=Variable(role=Role.INPUT | Role.OUTPUT, sort=FunctionSort(parameters=sorts)) as relation,
+            case t.Apply(
+                function=t.Variable(
+                    role=t.Role.INPUT | t.Role.OUTPUT, sort=s.FunctionSort(parameters=sorts)
+                ) as relation,
                 arguments=arguments,
             ) if part.positive:
                 if self._tracked(part.term) is not None:
@@ -290,15 +330,15 @@ class Eliminator:
                 cases = []
                 for k, (holds, row) in enumerate(self._points(part.term).tuples):
                     names = (f"{relation.qualified} row {k} {n}" for n in range(len(row)))
-                    point = tuple(Variable(Role.BOUND, name, sort) for name, sort in zip(names, sorts, strict=True))
+                    point = tuple(t.Variable(t.Role.BOUND, name, sort) for name, sort in zip(names, sorts, strict=True))
                     here = {**bound, **{v.name: symbol for v, symbol in zip(point, row, strict=True)}}
-                    sort = TupleSort(sorts)
-                    cases.append(self._case(TupleTerm(arguments, sort), TupleTerm(point, sort), free, here, holds))
-            case Compare(operator=operator, left=left, right=right) if left.sort != BOOL and operator == (
+                    sort = s.TupleSort(sorts)
+                    cases.append(self._case(t.TupleTerm(arguments, sort), t.TupleTerm(point, sort), free, here, holds))
+            case t.Compare(operator=operator, left=left, right=right) if left.sort != s.BOOL and operator == (
                 "==" if part.positive else "!="
             ):
                 cases = [self._case(left, right, free, bound)]
-            case In(item=item, collection=SetTerm(items=items) | SequenceTerm(items=items)) if part.positive:
+            case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)) if part.positive:
                 cases = [self._case(item, each, free, bound) for each in items]
             case _:  # fixes no variable
                 return None
@@ -306,10 +346,10 @@ class Eliminator:
         return found if len(found) == len(cases) else None
 
     def _case(
-        self, left: Term, right: Term, free: Mapping[str, Variable], bound: Bound, holds: Condition = TRUE
+        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: Condition = TRUE
     ) -> _Case | None:
         """That both sides are the same, where that fixes a variable."""
-        found = solved(Compare("==", left, right), free.values())
+        found = solved(t.Compare("==", left, right), free.values())
         if found is None:
             return None
         more = [Part(term, True, bound_names(term)) for term in found.rest]

@@ -12,26 +12,12 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.formulas.values import Data, Element, FunctionValue, Value
-from avow.language.sorts import (
-    BOOL,
-    BoolSort,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    IntegerSort,
-    NaturalSort,
-    OpaqueSort,
-    RealSort,
-    SequenceSort,
-    SetSort,
-    Sort,
-    StringSort,
-    TupleSort,
-)
+from avow.language import sorts as s
 from avow.ros import definitions as wires
 
 from ..rules import Constant, Fields, Hold, Previous, Rule
 from ..tuning import TRACKED_TUPLES
+from ..wires import parts_of
 from .syntax import TRUE, Comparison, Condition, Name, NotRml, Number, Numeric, compare, every, some
 
 
@@ -80,45 +66,67 @@ class Tracked:
         return compare("==", Name(name), Number(Fraction(1)))
 
 
-Symbol = Scalar | Variant | Points | Tracked
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A function with a result: its value at these arguments, and everywhere else."""
+
+    points: tuple[tuple[tuple[Symbol, ...], Symbol], ...]
+    elsewhere: Symbol
 
 
-def code(sort: EnumSort | DataSort, name: str) -> int:
+Symbol = Scalar | Variant | Points | Tracked | Table
+
+
+def code(sort: s.EnumSort | s.DataSort, name: str) -> int:
     """The number that stands for an element or a constructor; 0 stands for none."""
-    names = sort.members if isinstance(sort, EnumSort) else tuple(c.name for c in sort.constructors)
+    names = sort.members if isinstance(sort, s.EnumSort) else tuple(c.name for c in sort.constructors)
     return names.index(name) + 1
 
 
-def constant(value: Value, sort: Sort) -> Symbol:
+def constant(value: Value, sort: s.Sort) -> Symbol:
     """A known value. Raises NotRml."""
     match value:
         case bool() | int() | Fraction():
             return Scalar(Number(Fraction(value)))
-        case Element(name=name) if isinstance(sort, EnumSort):
+        case Element(name=name) if isinstance(sort, s.EnumSort):
             return Scalar(Number(Fraction(code(sort, name))))
-        case Data(constructor=name, arguments=arguments) if isinstance(sort, DataSort):
+        case Data(constructor=name, arguments=arguments) if isinstance(sort, s.DataSort):
             chosen = sort.constructor(name)
-            parts = tuple(constant(a, s) for a, s in zip(arguments, chosen.parameters, strict=True))
+            parts = tuple(constant(a, part) for a, part in zip(arguments, chosen.parameters, strict=True))
             others = tuple(
                 parts if c.name == name else tuple(blank(p) for p in c.parameters) for c in sort.constructors
             )
             return Variant(Number(Fraction(code(sort, name))), others)
-        case FunctionValue(table=table, default=False) if isinstance(sort, FunctionSort):
+        case FunctionValue(table=table, default=False) if isinstance(sort, s.FunctionSort):
             points = [k for k, v in table.items() if v is True]
             tuples = tuple(
-                (TRUE, tuple(constant(a, s) for a, s in zip(k, sort.parameters, strict=True))) for k in points
+                (TRUE, tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True))) for k in points
             )
             return Points(tuples)
+        case FunctionValue(table=table, default=default) if isinstance(sort, s.FunctionSort) and sort.result != s.BOOL:
+            known = tuple(
+                (tuple(constant(a, part) for a, part in zip(k, sort.parameters, strict=True)), constant(v, sort.result))
+                for k, v in table.items()
+            )
+            return Table(known, constant(default, sort.result))
         case _:
             raise NotRml("a value that RML's equations cannot carry")
 
 
-def blank(sort: Sort) -> Symbol:
+def blank(sort: s.Sort) -> Symbol:
     """What stands in the places of a value that is not there."""
     match sort:
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | EnumSort():
+        case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.EnumSort():
             return Scalar(Number(Fraction(0)))
-        case StringSort() | DataSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+        case (
+            s.StringSort()
+            | s.DataSort()
+            | s.OpaqueSort()
+            | s.FunctionSort()
+            | s.TupleSort()
+            | s.SequenceSort()
+            | s.SetSort()
+        ):
             raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
         case _:
             assert_never(sort)
@@ -131,23 +139,26 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
     source = rules.get(rule.source) if isinstance(rule, Previous) else rule
     name = rule.variable.qualified
     sort = rule.variable.sort
-    if isinstance(sort, FunctionSort):
-        if isinstance(rule, Fields) and rule.hold is Hold.SEEN and rule.each is None and sort.result == BOOL:
+    if isinstance(sort, s.FunctionSort):
+        if isinstance(rule, Fields) and rule.hold is Hold.SEEN and rule.each is None and sort.result == s.BOOL:
             return Tracked(prefix)
         if isinstance(source, Fields) and (source.hold is Hold.SEEN or getattr(source, "each", None)):
             raise NotRml(f"{name} holds of any number of tuples, and an RML equation carries a fixed number of values")
-        if sort.result != BOOL:
-            raise NotRml(f"{name} is a function with a result")
-        parts = tuple(_named(s, f"{prefix}_{k}", name) for k, s in enumerate(sort.parameters, start=1))
+        parts = tuple(_named(part, f"{prefix}_{k}", name) for k, part in enumerate(parts_of(sort), start=1))
+        if sort.result != s.BOOL:
+            elsewhere = source.elsewhere if isinstance(source, Fields) else None
+            if elsewhere is None:
+                raise NotRml(f"{name} is a function whose value elsewhere nothing says")
+            return Table(((parts[:-1], parts[-1]),), constant(elsewhere, sort.result))
         return Points(((compare("==", Name(f"{prefix}_p"), Number(Fraction(1))), parts),))
     return _named(sort, prefix, name)
 
 
-def _named(sort: Sort, prefix: str, name: str) -> Symbol:
+def _named(sort: s.Sort, prefix: str, name: str) -> Symbol:
     match sort:
-        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | EnumSort():
+        case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.EnumSort():
             return Scalar(Name(prefix))
-        case DataSort(constructors=constructors):
+        case s.DataSort(constructors=constructors):
             arguments = []
             for at, constructor in enumerate(constructors, start=1):
                 row: list[Symbol] = []
@@ -156,7 +167,7 @@ def _named(sort: Sort, prefix: str, name: str) -> Symbol:
                     row.append(Scalar(Name(f"{prefix}_{at}_{k}")))
                 arguments.append(tuple(row))
             return Variant(Name(f"{prefix}_t"), tuple(arguments))
-        case StringSort() | OpaqueSort() | FunctionSort() | TupleSort() | SequenceSort() | SetSort():
+        case s.StringSort() | s.OpaqueSort() | s.FunctionSort() | s.TupleSort() | s.SequenceSort() | s.SetSort():
             raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
         case _:
             assert_never(sort)
@@ -166,7 +177,7 @@ def no_pattern(rule: Fields) -> str:
     """Why no pattern of RML reads what the rule reads; empty where one does."""
     if rule.take is not None:
         return "calculated from the items of an array"
-    if rule.gaps or (rule.elsewhere is not None and not isinstance(rule.variable.sort, FunctionSort)):
+    if rule.gaps or (rule.elsewhere is not None and not isinstance(rule.variable.sort, s.FunctionSort)):
         return "no reading where the message holds NaN or an infinity"
     if any(isinstance(step, int) for path in rule.paths for step in path):
         return "an item of an array"
@@ -203,7 +214,9 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return tuple(flags.values())
         case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
-        case Scalar() | Variant() | Points():  # no flag of its own
+        case Table(points=((arguments, result),)):
+            return tuple(part for symbol in (*arguments, result) for part in components(symbol))
+        case Scalar() | Variant() | Points() | Table():  # known beforehand
             return ()
         case _:
             assert_never(symbol)

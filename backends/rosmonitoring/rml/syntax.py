@@ -45,6 +45,8 @@ class Calculation:
 
 
 Numeric = Name | Number | Calculation
+FUNCTIONS = ("max", "min")
+"""Operators of a `Calculation` that are written as functions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +86,27 @@ def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
 
 
 def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    return joined(items, Every, TRUE, FALSE, once=True)
+    """All of them; FALSE where a comparison contradicts what the others leave."""
+    found = joined(items, Every, TRUE, FALSE, once=True)
+    excluded = {opposite(item) for item in _parts(found, Every) if isinstance(item, Comparison)}
+    kept = [
+        some([i for i in item.items if i not in excluded]) if isinstance(item, Some) else item
+        for item in _parts(found, Every)
+    ]
+    if any(item in excluded for item in kept):
+        return FALSE
+    return found if kept == list(_parts(found, Every)) else every(kept)
 
 
 def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
-    return joined(items, Some, FALSE, TRUE, once=True)
+    """One of them; TRUE where one is another's opposite."""
+    found = joined(items, Some, FALSE, TRUE, once=True)
+    implied = {opposite(item) for item in _parts(found, Some) if isinstance(item, Comparison)}
+    return TRUE if any(item in implied for item in _parts(found, Some)) else found
+
+
+def _parts(condition: Condition, kind: type[Every | Some]) -> tuple[Condition, ...]:
+    return condition.items if isinstance(condition, kind) else (condition,)
 
 
 def opposite(condition: Condition) -> Condition:
@@ -127,6 +145,32 @@ def _put(number: Numeric, new: Mapping[str, Numeric]) -> Numeric:
             assert_never(number)
 
 
+def without_exclusions(condition: Condition, name: Name) -> Condition | None:
+    """That the condition holds for some of infinitely many numbers, if all that it says of them is that they are not
+    certain ones: finitely many are excluded then. None where it says more."""
+    match condition:
+        case Comparison(operator="!=", left=left, right=right) if _slope(left, name) != _slope(right, name):
+            return TRUE if None not in (_slope(left, name), _slope(right, name)) else None
+        case Comparison():
+            return condition if name.name not in names_in(condition) else None
+        case Every(items=items) | Some(items=items):
+            found = [part for item in items if (part := without_exclusions(item, name)) is not None]
+            joined_up = every if isinstance(condition, Every) else some
+            return joined_up(found) if len(found) == len(items) else None
+
+
+def _slope(number: Numeric, name: Name) -> int | None:
+    """How often the name is added in a sum; None for what is no sum."""
+    match number:
+        case Name() | Number():
+            return int(number == name)
+        case Calculation(operator="+" | "-" as operator, left=left, right=right):
+            one, other = _slope(left, name), _slope(right, name)
+            return None if one is None or other is None else one + other if operator == "+" else one - other
+        case Calculation():
+            return None if name.name in names_in(number) else 0
+
+
 def size(condition: Condition) -> int:
     return 1 if isinstance(condition, Comparison) else 1 + sum(map(size, condition.items))
 
@@ -157,14 +201,6 @@ class EventType:
 
 
 @dataclass(frozen=True, slots=True)
-class Derived:
-    """``name matches other | another;``"""
-
-    name: str
-    parents: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Step:
     """One side of an equation: an event of a type, then the equation again with these arguments."""
 
@@ -188,10 +224,10 @@ class Machine:
 @dataclass(frozen=True, slots=True)
 class Specification:
     comments: tuple[str, ...]
-    events: tuple[EventType | Derived, ...]
+    events: tuple[EventType, ...]
     machines: tuple[Machine, ...]
     notes: dict[str, str] = field(default_factory=dict)
-    """Machine or event type → a comment that goes before it."""
+    """Machine → a comment that goes before it."""
 
 
 def string(text: str) -> str:
@@ -238,6 +274,8 @@ def numeric(value: Numeric) -> str:
         case Number(value=amount):
             return number(amount) if amount >= 0 else f"(0 - {number(-amount)})"
         case Calculation(operator=operator, left=left, right=right):
+            if operator in FUNCTIONS:
+                return f"{operator}({numeric(left)}, {numeric(right)})"
             return f"({numeric(left)} {operator} {numeric(right)})"
 
 
@@ -255,24 +293,10 @@ def _condition_text(condition: Condition) -> str:
             return f"({' || '.join(map(_condition_text, items))})"
 
 
-TOLERANCE = (
-    "The official monitor compares by CLP(R), in floating point: to it, numbers less than 1e-10 apart are equal.",
-    "A value that near to a number of the contract, or to another value, may be judged otherwise than by Avow.",
-    "Of a message with a word where a number is compared the official monitor dies, in place of saying false.",
-)
-"""Compiled conditions are constraints of SWI-Prolog's library clpr, whose comparisons have this tolerance, and take
-numbers only."""
-
-
 def write(specification: Specification) -> str:
     """The file's text. Raises NotRml."""
     lines = [comment(text) if text else "" for text in specification.comments]
-    if any(isinstance(event, EventType) and event.condition != TRUE for event in specification.events):
-        lines += ["", *map(comment, TOLERANCE)]
-    for event in specification.events:
-        if event.name in specification.notes:
-            lines += ["", comment(specification.notes[event.name])]
-        lines.append(_event_text(event))
+    lines += map(_event_text, specification.events)
     lines.append("")
     for machine in specification.machines:
         if machine.name in specification.notes:
@@ -285,9 +309,7 @@ def write(specification: Specification) -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _event_text(event: EventType | Derived) -> str:
-    if isinstance(event, Derived):
-        return f"{event.name} matches {' | '.join(event.parents)};"
+def _event_text(event: EventType) -> str:
     head = event.name + (f"({', '.join(event.parameters)})" if event.parameters else "")
     guard = "" if event.condition == TRUE else f"\n  with {_condition_text(event.condition)}"
     return f"{head} matches {' | '.join(event.patterns)}{guard};"

@@ -1,7 +1,7 @@
 // The agent in Dafny: a second implementation, after the Gwendolen program, held against the same contract (the
 // paper's section "Compositionality enables Interchangeability"). Unlike the paper's listing it can be executed: the
-// mission map is a table, and the decision is proved for every table.
-include "agent_spec.dfy"
+// mission map is a table, and the decision is proved for every table. `doit export` writes the file that it includes.
+include "../../../artifacts/remote_inspection/agent/dafny/agent_spec.dfy"
 
 module {:options "--function-syntax:3"} AgentImpl refines AgentSpec {
   type Place = (real, real)

@@ -1,6 +1,6 @@
-// The radiation sensor in Dafny, held against its contract. Verify it with: avow verify, or, in an editor, beside the
-// generated files in artifacts/remote_inspection/radiationSensor/.
-include "radiationSensor_spec.dfy"
+// The radiation sensor in Dafny, held against its contract. `doit export` writes the file that it includes; then any
+// editor opens it, and `dafny verify` (Dafny 2: `dafny /compile:0`) verifies it, as Avow does.
+include "../../../artifacts/remote_inspection/radiationSensor/dafny/radiationSensor_spec.dfy"
 
 module {:options "--function-syntax:3"} RadiationSensorImpl refines RadiationSensorSpec {
   // Nothing is assumed beyond the contract.

@@ -1,4 +1,5 @@
-"""Builds the package for VS Code: `python build.py [FOLDER]` writes avow-rcl-VERSION.vsix there, and checks it.
+"""Builds the package for VS Code: `python build.py [FOLDER]` writes avow-rcl-VERSION.vsix there (by default into the
+system's folder for temporary files), and checks it.
 
 A .vsix is a zip with a manifest; nothing but Python is needed to make one. The library that talks with the language
 server comes from npm, as package-lock.json pins it; no script of it is run. Where npm is not there, the package is made
@@ -157,7 +158,7 @@ def has_library(made: Path) -> bool:
 
 
 def main() -> int:
-    made = build(Path(sys.argv[1]) if len(sys.argv) > 1 else Path.cwd())
+    made = build(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.gettempdir()))
     wrong = faults(made)
     for each in wrong:
         print(f"error: {each}")

@@ -122,7 +122,7 @@ def read(job: Job) -> Reading:
     if source.numbers is Numbers.FLOAT32:
         raise Rejected(Diagnostic("CROSS100", "Python's floats are float64, not float32", place))
     file = inside(job.root, source.python)
-    params, faults = parameters(job.root, source)
+    params, faults = parameters(job.root, source, job.system.plan.ros.names.placed(job.node.name).name)
     try:
         assert file is not None
         ast.parse(file.read_bytes())

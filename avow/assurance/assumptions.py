@@ -1,0 +1,289 @@
+"""What the case rests on without its being shown: each assumption once, in plain words, with owner and date.
+
+That is what a requirement needs, and what the evidence of any other guarantee supposes: a page that names the evidence
+names what that supposes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import date
+
+from avow.assurance.answers import MODELS, PLATFORM, SAMPLES, START, TOOLS, Assumption, Sort
+from avow.assurance.closure import Closed
+from avow.assurance.facts import Facts
+from avow.assurance.findings import takes
+from avow.assurance.model import ObligationView
+from avow.assurance.naming import short
+from avow.assurance.relied import Judged, Relied, looked_at, seen
+from avow.assurance.support import assumption_claim
+from avow.base.records import dataclass
+from avow.base.verdict import HypothesisKind, Object
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+from avow.system.plan import Requirement, Statement
+from avow.system.statements import GENERAL
+
+_SORTS = tuple(Sort)
+_SCENARIO = Statement("assumptions.compose.scenario", "Nothing occurs that the plan's finite scenario does not list")
+"""The bounds of a check within the scenario, each named by its record, are one assumption."""
+_WHOLE = ""
+"""Stands among the requirements for all guarantees together."""
+_MEANING = "Each requirement's formula, or the guarantees named, says what its sentence asks for"
+_PLATFORM = ("persistence", "one-output", "entered")
+
+
+@dataclass(frozen=True, slots=True)
+class Statements:
+    """The plan's plain words, found by the place that they are about or by what a method supposes."""
+
+    all: tuple[Statement, ...]
+    today: date
+
+    def at(self, place: str, because: str = "") -> Statement:
+        """What is said of a place; else what is said with the same reason; else nothing, in no words."""
+        found = next((s for s in self.all if s.place == place), None)
+        if found is None and because:
+            found = next((s for s in self.all if s.because == because), None)
+        return found or Statement(place)
+
+    def of_method(self, method: str, hypothesis: str) -> Statement:
+        """The statement ``assumptions.<method>.<word>`` whose word the hypothesis has."""
+        told = hypothesis.casefold()
+        for statement in self.all:
+            section, _, rest = statement.place.partition(".")
+            owner, _, name = rest.partition(".")
+            if section == "assumptions" and owner == method and any(_says(told, word) for word in _spelled(name)):
+                return statement
+        return Statement("")
+
+    def judge(self, method: str, hypothesis: str) -> Judged:
+        statement = self.of_method(method, hypothesis)
+        return Judged(self.is_past(statement.until), bool(statement.who and statement.until))
+
+    def is_past(self, until: str) -> bool:
+        try:
+            return bool(until) and date.fromisoformat(until) < self.today
+        except ValueError:
+            return True
+
+
+def _spelled(name: str) -> tuple[str, ...]:
+    """A key's word as it may stand in a hypothesis."""
+    return tuple({name.casefold(), name.replace("_", " ").casefold(), name.replace("-", " ").casefold()})
+
+
+def _says(told: str, word: str) -> bool:
+    """Whether a text has a word, whole: one of three letters at least, so that no key is about everything."""
+    return len(word) > 2 and re.search(rf"(?<!\w){re.escape(word)}(?!\w)", told) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class _Raw:
+    """One thing supposed at one place."""
+
+    sort: Sort
+    place: str
+    text: str
+    statement: Statement
+    where: str
+    needed: Callable[[str], bool]
+    """Whether a requirement (or `_WHOLE`) needs it."""
+
+
+def assumptions(
+    facts: Facts,
+    views: Sequence[ObligationView],
+    relied: Mapping[str, Relied],
+    required: Mapping[str, Closed],
+    whole: Closed,
+    statements: Statements,
+) -> tuple[Assumption, ...]:
+    """Those that some requirement needs (`required`: what each rests on), or some guarantee (`whole`: what they all
+    rest on), numbered: by what they are about, the most needed first."""
+    closed = {**required, _WHOLE: whole}
+    raw = [
+        *_reasons(views, closed, statements),
+        *_constants(facts, closed, statements),
+        *_of_methods(views, relied, closed, statements),
+        *_accepted(facts, views, closed),
+        *_assumptions(facts, closed),
+        *_of_evidence(views, relied, closed, statements),
+        *_first_values(views, closed, statements),
+        *_meaning(facts.requirements, statements),
+    ]
+    merged: dict[tuple[Sort, str], list[_Raw]] = {}
+    for item in raw:
+        merged.setdefault((item.sort, item.statement.says or item.statement.because or item.text), []).append(item)
+    needed = [
+        _one(items, tuple(required), statements)
+        for items in merged.values()
+        if any(item.needed(name) for item in items for name in closed)
+    ]
+    needed.sort(key=lambda s: (_SORTS.index(s.sort), -len(s.needed_by), s.key))
+    return tuple(replace(s, number=f"A{at}") for at, s in enumerate(needed, start=1))
+
+
+def _one(items: Sequence[_Raw], requirements: Sequence[str], statements: Statements) -> Assumption:
+    said = next((i.statement for i in items if i.statement.says), items[0].statement)
+    ends = sorted({i.statement.until for i in items if i.statement.until})
+    made = sorted({i.statement.date for i in items if i.statement.date})
+    owned = all(i.statement.who for i in items)
+    dated = all(i.statement.until for i in items)
+    return Assumption(
+        number="",
+        key=min(item.place for item in items),
+        sort=items[0].sort,
+        says=said.says,
+        text="\n".join(dict.fromkeys(item.text for item in items)),
+        because=said.because,
+        who=", ".join(dict.fromkeys(i.statement.who for i in items)) if owned else "",
+        until=ends[0] if dated and ends else "",
+        date=made[-1] if made and all(i.statement.date for i in items) else "",
+        expired=any(statements.is_past(end) for end in ends),
+        needed_by=tuple(r for r in requirements if any(item.needed(r) for item in items)),
+        where=tuple(dict.fromkeys(item.where for item in items)),
+    )
+
+
+def _in(closed: Mapping[str, Closed], claim: str) -> Callable[[str], bool]:
+    holders = {name for name, found in closed.items() if claim in found.claims}
+    return holders.__contains__
+
+
+def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
+    """Conditions of the composition, and guarantees, for which the plan gives a reason and nothing else."""
+    for view in views:
+        if view.status is not Status.JUSTIFIED:
+            continue
+        o = view.obligation
+        text = next((r.summary for r in reversed(view.records)), o.claim)
+        sort, place = Sort.MODELS, o.local_id
+        if o.kind is Kind.COMPOSITION and o.name.startswith("environment."):
+            sort, place = Sort.WORLD, o.name
+        elif o.kind is Kind.COMPOSITION:
+            goal, _, what = o.name.partition(".")
+            sort, place = Sort.PLATFORM, o.name if what in _PLATFORM else f"{goal}.entered"
+        yield _Raw(sort, place, text, statements.at(place, text), o.id, _in(closed, o.id))
+
+
+def _constants(facts: Facts, closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
+    """Inputs that the plan declares to be the same at every step: no claim says so, and the calculus uses it. What an
+    entry says is about its assumption, where it has one: that the input does not change needs a reason of its own."""
+    for entry in facts.environment:
+        if entry.constant:
+            place = f"environment.{entry.port}" + (".constant" if entry.assume else "")
+            reading = tuple(f"{facts.system}/{node}/{Kind.GUARANTEE}/" for node in entry.nodes)
+            holders = {
+                name for name, found in closed.items() if any(claim.startswith(reading) for claim in found.claims)
+            }
+            text = f"{entry.port} is the same at every step"
+            yield _Raw(Sort.WORLD, place, text, statements.at(place), place, holders.__contains__)
+
+
+def _of_methods(
+    views: Sequence[ObligationView],
+    relied: Mapping[str, Relied],
+    closed: Mapping[str, Closed],
+    statements: Statements,
+) -> Iterator[_Raw]:
+    """Hypotheses of the records relied upon."""
+    for view in views:
+        if view.id not in relied:
+            continue
+        found = relied[view.id]
+        # what is supposed of how a program is run, or of its likeness to a model, is not about the cases
+        sampled = found.status in (Status.TESTED, Status.MONITORED) and view.obligation.kind is not Kind.PROGRAM
+        for text in found.assumptions:
+            statement = statements.of_method(found.record.method, text)
+            if not statement.place and text in found.scenario:
+                statement = _SCENARIO
+            place = statement.place or f"assumptions.{found.record.method}: {text}"
+            sort = Sort.SAMPLING if sampled else Sort.MODELS
+            yield _Raw(sort, place, text, statement, view.id, _in(closed, view.id))
+
+
+def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str, Closed]) -> Iterator[_Raw]:
+    """What a record rests on and a person has accepted by name."""
+    supposed = {
+        assumption_claim(h): h
+        for view in views
+        for record in view.records
+        for h in record.rests_on
+        if h.kind is HypothesisKind.ASSUMPTION
+    }
+    for claim in dict.fromkeys(name for found in closed.values() for name in found.accepted):
+        hypothesis = supposed[claim]
+        given = next((f for f in facts.accepted if takes(f.obligation, f.matched, hypothesis.name)), None)
+        holders = {name for name, found in closed.items() if claim in found.accepted}
+        said = Statement(hypothesis.name)
+        if given is not None:
+            reason, who, until, made = (s or "" for s in (given.reason, given.who, given.expires, given.date))
+            said = Statement(hypothesis.name, "", reason, who, until, made)
+        text = hypothesis.text or hypothesis.name
+        yield _Raw(Sort.MODELS, hypothesis.name, text, said, claim, holders.__contains__)
+
+
+def _assumptions(facts: Facts, closed: Mapping[str, Closed]) -> Iterator[_Raw]:
+    """Assumptions of nodes that nothing in the case discharges."""
+    sentences = {f"{node.name}.{name}": said for node in facts.nodes for name, said in node.assumptions}
+    for about in dict.fromkeys(name for found in closed.values() for name in found.assumptions):
+        holders = {name for name, found in closed.items() if about in found.assumptions}
+        place = f"assumption.{about}"
+        yield _Raw(Sort.WORLD, place, sentences.get(about, about), Statement(place), about, holders.__contains__)
+
+
+def _of_evidence(
+    views: Sequence[ObligationView],
+    relied: Mapping[str, Relied],
+    closed: Mapping[str, Closed],
+    statements: Statements,
+) -> Iterator[_Raw]:
+    """What no record says of itself: that what runs does what its model does, that untried cases are like those tried,
+    that the platform does what is expected of it, and that the tools answer rightly."""
+    for view in views:
+        if view.id not in relied or view.obligation.kind is not Kind.GUARANTEE:
+            continue
+        found, name = relied[view.id], short(view.id)
+        record = found.record
+        if looked_at(found) is None:  # a person's word
+            continue
+        about = [(Sort.PLATFORM, PLATFORM, ""), (Sort.TOOLS, TOOLS, record.tool or record.backend)]
+        if record.of is Object.MODEL:
+            about.append((Sort.MODELS, MODELS, f"{name} by {record.method}"))
+        if found.status in (Status.TESTED, Status.MONITORED):
+            about.append((Sort.SAMPLING, SAMPLES, f"{name}: {seen(found)}"))
+        for sort, place, text in about:
+            said = statements.at(place)
+            said = said if said.says else replace(said, says=GENERAL[place])
+            yield _Raw(sort, place, text, said, view.id, _in(closed, view.id))
+
+
+def _first_values(
+    views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements
+) -> Iterator[_Raw]:
+    """The `initial` values that start a loop of delayed connections: the calculus takes them from the plan, and no
+    method looks at what a program begins with."""
+    for view in views:
+        o = view.obligation
+        if o.kind is Kind.COMPOSITION and o.name.startswith("start.") and view.status.supports:
+            text = next((r.summary for r in reversed(view.records)), o.claim)
+            said = statements.at(START)
+            said = said if said.says else replace(said, says=GENERAL[START])
+            if "initial " in text:  # a loop may start without any
+                yield _Raw(Sort.PLATFORM, START, text, said, o.id, _in(closed, o.id))
+
+
+def _meaning(requirements: Sequence[Requirement], statements: Statements) -> Iterator[_Raw]:
+    """That a requirement's formula, or the guarantees named under a sentence without one, say what the sentence asks
+    for: the word of the person who validated it."""
+    for r in requirements:
+        place = f"requirements.{r.id}.validation"
+        said = statements.at(place)
+        read = r.validation if r.validated else None
+        said = replace(said, who=read.who if read else "", date=read.date if read else "")
+        if not said.says:
+            said = replace(said, says=_MEANING)
+        yield _Raw(Sort.MEANING, place, said.because or r.id, said, place, {r.id}.__contains__)

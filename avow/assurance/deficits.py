@@ -1,0 +1,150 @@
+"""Why a case says less than it seems to: each kind counted once, with what a reader should make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from avow.assurance.answers import Assumption, Deficit, Level
+from avow.assurance.model import Handled, ObligationView, OpenItem, RequirementView
+from avow.assurance.relied import EXHAUSTIVE, Relied, looked_at
+from avow.base.plain import count
+from avow.base.verdict import Link, Object, Verdict
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status, weigh
+
+_WORDS = {
+    "argued": ("argued, not derived", "argued", "A person must agree that what is named amounts to the sentence."),
+    "unvalidated": (
+        "sentence{s} that nobody has validated",
+        "not validated",
+        "Nobody has read the sentence against the formula (`avow validate`).",
+    ),
+    "models": ("guarantee{s} shown of a model only", "of models", "What runs may differ from the model."),
+    "bounded": ("derived within bounds only", "bounded", "Nothing is said outside the finite scenario."),
+    "unowned": (
+        "assumption{s} without owner or date",
+        "without owner",
+        "Nobody is named to keep them true, or they never expire.",
+    ),
+    "sampled": ("guarantee{s} sampled, not proved", "sampled", "Other inputs and other runs may behave otherwise."),
+    "read": ("guarantee{s} on a person's reading only", "only read", "No tool has looked at them."),
+    "single": ("guarantee{s} with one method only", "by one method", "An error of that tool would not be noticed."),
+    "tied": (
+        "guarantee{s} translated by a person for the tool",
+        "translated by a person",
+        "Nothing shows that the person's table or measure is right.",
+    ),
+    "unrun": (
+        "planned method{s} without an answer",
+        "not answered",
+        "A tool is missing, gave up or failed; other methods support these claims.",
+    ),
+    "programs": (
+        "claim{s} about a node's program not run",
+        "programs not run",
+        "The tool that would run the program is missing: nothing is known of these claims.",
+    ),
+    "conditional": (
+        "review{s} with conditions",
+        "reviewed with conditions",
+        "The reviewer names further conditions.",
+    ),
+    "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
+    "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
+    "believed": (
+        "answer{s} from earlier runs",
+        "from earlier runs",
+        "Their inputs have not changed since; `avow verify --fresh` computes them again.",
+    ),
+}
+"""Of each kind what it is called, with its number before it; the same on the first screen; what to make of it."""
+
+
+def of_deficits(kinds: int) -> str:
+    """``6 kinds of assurance deficit``: the one way in which any text counts them."""
+    return f"{count(kinds, 'kind')} of assurance deficit"
+
+
+def briefly(found: Iterable[Deficit]) -> str:
+    """``2 argued, 19 by one method``."""
+    return ", ".join(f"{w.count} {_WORDS[w.key][1]}" for w in found)
+
+
+def deficits(
+    views: Sequence[ObligationView],
+    requirements: Sequence[RequirementView],
+    assumptions: Sequence[Assumption],
+    open_items: Sequence[OpenItem],
+    findings: Sequence[Handled],
+    relied: Mapping[str, Relied],
+    single: Sequence[str],
+    basis: Iterable[str],
+    run: str,
+    missing: Mapping[tuple[str, str], str],
+) -> tuple[Deficit, ...]:
+    """`basis`: the obligations that matter (all that requirements rest on); `single`: guarantees with one method;
+    `missing`: (node, method) → the command that installs the tool that the method lacks."""
+    within = set(basis)
+    guarantees = [v for v in views if v.id in within and v.obligation.kind is Kind.GUARANTEE]
+    unrun = [(v, method) for v in guarantees for method in _unanswered(v)]
+    programs = [v for v in views if v.obligation.kind is Kind.PROGRAM and v.status is Status.NOT_RUN]
+    found = {
+        "argued": [r.id for r in requirements if r.level is Level.ARGUED],
+        "unvalidated": [r.id for r in requirements if not r.validated],
+        "bounded": [r.id for r in requirements if r.bounded and r.level.holds],
+        "models": [v.id for v in guarantees if v.id in relied and looked_at(relied[v.id]) is Object.MODEL],
+        "unowned": [s.key for s in assumptions if not s.owned],
+        "sampled": [v.id for v in guarantees if _status(v, relied) in (Status.TESTED, Status.MONITORED)],
+        "read": [v.id for v in guarantees if _status(v, relied) is Status.REVIEWED],
+        "single": [name for name in single if name in within],
+        "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
+        "unrun": [f"{v.id}: {method}" for v, method in unrun],
+        "programs": [v.id for v in programs],
+        "conditional": [v.id for v in guarantees if _on_conditions(v)],
+        "advice": [item.claim for item in open_items if item.kind == "advice" and not item.handled],
+        "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],
+        "believed": [v.id for v in views if v.id in within and any(e.entry.evidence.run != run for e in v.counting)],
+    }
+    remedies = {
+        "unrun": _install(unrun, missing),
+        "programs": _install([(v, method) for v in programs for method, _ in v.planned], missing),
+    }
+    return tuple(
+        Deficit(key, len(claims), tuple(claims), words_of(key, len(claims)), _WORDS[key][2] + remedies.get(key, ""))
+        for key, claims in found.items()
+        if claims
+    )
+
+
+def _install(silent: Iterable[tuple[ObligationView, str]], missing: Mapping[tuple[str, str], str]) -> str:
+    """The commands that install what these methods lack."""
+    found = sorted({missing.get((v.obligation.node, method), "") for v, method in silent} - {""})
+    return f" Install: {'; '.join(found)}." if found else ""
+
+
+def words_of(key: str, number: int) -> str:
+    """What so many deficits of a kind are called, without the number; of a kind that there is no more, its key."""
+    return _WORDS[key][0].format(s="" if number == 1 else "s") if key in _WORDS else key
+
+
+def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None:
+    return relied[view.id].status if view.id in relied else None
+
+
+def _by_hand(view: ObligationView, relied: Relied) -> bool:
+    """Whether what gives the claim its status is tied to the formula by a person, in a table or by judgement."""
+    sure = relied.status in EXHAUSTIVE
+    alike = [r for r in view.records if weigh(r).support is relied.status or (sure and weigh(r).support in EXHAUSTIVE)]
+    return relied.status is not Status.REVIEWED and all(record.link is not Link.GENERATED for record in alike)
+
+
+def _unanswered(view: ObligationView) -> Iterator[str]:
+    silent = (Verdict.NOT_RUN, Verdict.ERROR, Verdict.UNKNOWN)
+    for method, _ in view.planned:
+        said = [r.verdict for r in view.records if r.method == method]
+        if all(verdict in silent for verdict in said):
+            yield method
+
+
+def _on_conditions(view: ObligationView) -> bool:
+    return any(weigh(r).support is Status.REVIEWED and r.hypotheses for r in view.records)

@@ -1,0 +1,56 @@
+"""What a reader has to trust for the case, each part with what was done about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.assurance.answers import Assumption, TrustLine
+from avow.assurance.certification import KernelRun, ProofGrade, ProofView, certifiable
+from avow.base.plain import count, listed
+
+
+def trust_lines(
+    proofs: Sequence[ProofView], kernel: KernelRun, assumptions: Sequence[Assumption], run: str
+) -> tuple[TrustLine, ...]:
+    """The kernel, the solvers, the front end, tools whose word is taken, and assumptions without an owner."""
+    wanted = certifiable(proofs)
+    certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
+    twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
+    lines = [
+        TrustLine(
+            "Avow's front end",
+            "parser, type checker and translators",
+            "tested against an evaluator that shares no code with them; a translator is not proved",
+        )
+    ]
+    if wanted and kernel.run == run:
+        lines.append(
+            TrustLine(
+                "the kernel",
+                "it re-establishes each proof of the composition",
+                f"{len(certified)} of {count(len(wanted), 'proof')} re-established in this run",
+            )
+        )
+    elif wanted:
+        lines.append(TrustLine("the calculus", count(len(wanted), "proof"), "the kernel did not run: nothing was done"))
+    if kernel.solvers:
+        names = " and ".join(f"{name} {version}" for name, version in sorted(kernel.solvers.items()))
+        second = (
+            f"{twice} of {len(certified)} answered by two solvers" if len(kernel.solvers) > 1 else "no second solver"
+        )
+        lines.append(TrustLine("solvers", names, second))
+    tools: dict[str, int] = {}
+    for proof in proofs:
+        for tool in proof.tools:
+            tools[tool] = tools.get(tool, 0) + 1
+    if tools:
+        names = listed([f"{tool} ({many})" for tool, many in sorted(tools.items())], 4)
+        lines.append(
+            TrustLine("tools whose proofs have no certificate", names, "their backends are tested with seeded faults")
+        )
+    bare = [a for a in assumptions if not a.owned]
+    if bare:
+        lines.append(
+            TrustLine("assumptions without an owner", listed([a.number for a in bare], 6), "nobody keeps them true")
+        )
+    return tuple(lines)

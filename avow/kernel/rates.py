@@ -1,0 +1,89 @@
+"""How often a claim may fail that rests on samples: each bound is checked against its sample, then bounds are added.
+
+A sample has one or more strata (conditions under which trials were made). In a stratum with `failures` in `trials`,
+"the probability of failure is at most p" holds at confidence c if so few failures have probability 1 - c or less where
+the true probability is p (C. J. Clopper and E. S. Pearson, 1934). Of several strata the greatest bound counts. A claim
+that rests on several sampled claims fails at most as often as these together (the union bound, whatever depends on
+what), and the doubts 1 - c add up as well (Bonferroni).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context, Decimal
+from fractions import Fraction
+
+from avow.kernel.check import Refused
+
+_UP = Context(prec=50, rounding=ROUND_CEILING, Emin=-(10**15), Emax=10**15)
+"""All numbers of `tail` are positive and rounded up, so its result is never too small."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stratum:
+    """Trials under one condition. `bound` and `confidence` are decimals, and exact."""
+
+    name: str
+    trials: int
+    failures: int
+    bound: str
+    confidence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A claim that was sampled, by its name, and its sample."""
+
+    claim: str
+    strata: tuple[Stratum, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """A claim fails with a probability of at most `bound`, at `confidence`."""
+
+    bound: Fraction
+    confidence: Fraction
+
+
+def tail(failures: int, trials: int, probability: Fraction) -> Fraction:
+    """P(X <= failures) for X binomial(trials, probability); never too small, and too large by 1 part in 10^40 at most.
+    `probability` lies between 0 and 1."""
+    if failures >= trials or probability <= 0:
+        return Fraction(1)
+    if probability >= 1:
+        return Fraction(0)
+    up = _UP
+    a, b = Decimal(probability.numerator), Decimal(probability.denominator - probability.numerator)
+    term, square, power = Decimal(1), up.divide(b, Decimal(probability.denominator)), trials
+    while power:  # (1 - p) ^ trials
+        if power % 2:
+            term = up.multiply(term, square)
+        square, power = up.multiply(square, square), power // 2
+    total = term
+    for k in range(failures):
+        term = up.divide(up.multiply(up.multiply(term, Decimal(trials - k)), a), up.multiply(b, Decimal(k + 1)))
+        total = up.add(total, term)
+    return Fraction(total)
+
+
+def shows(failures: int, trials: int, bound: Fraction, confidence: Fraction) -> bool:
+    """Whether so many failures show, at that confidence, that a trial fails with a probability of at most `bound`."""
+    sensible = 0 <= failures <= trials and 0 < confidence < 1
+    return sensible and (bound >= 1 or tail(failures, trials, bound) <= 1 - confidence)
+
+
+def composed(leaves: Iterable[Leaf]) -> Rate:
+    """The rate of a claim that fails only where one of the leaves does. Raises Refused where a sample does not show its
+    bound. Where the doubts add up to 1 or more, nothing is known: the bound is 1."""
+    bound = doubt = Fraction(0)
+    for leaf in leaves:
+        if not leaf.strata:
+            raise Refused(f"{leaf.claim} has no sample")
+        for each in leaf.strata:
+            if not shows(each.failures, each.trials, Fraction(each.bound), Fraction(each.confidence)):
+                raise Refused(f"{leaf.claim}: {each.failures} of {each.trials} do not show at most {each.bound}")
+            doubt += 1 - Fraction(each.confidence)
+        bound += max(Fraction(each.bound) for each in leaf.strata)
+    return Rate(min(bound, Fraction(1)), 1 - doubt) if doubt < 1 else Rate(Fraction(1), Fraction(0))

@@ -1,0 +1,381 @@
+"""The argument as a goal structure: what the GSN and SACM exports are made of.
+
+The elements and relations are those of the GSN Community Standard, version 3. A requirement, a node and each general
+question (validation, models, contracts, tools, hazards) is a module; a goal of another module is an away goal. Each
+solution carries an assurance claim point: why the evidence may be believed, and what would defeat it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
+from enum import StrEnum
+
+from avow.assurance.certification import ProofGrade
+from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
+from avow.assurance.modules import RequirementModule, node_modules, requirement_modules
+from avow.assurance.naming import derivation_claim, is_foundation
+from avow.base.plain import count, listed
+from avow.base.records import dataclass
+from avow.base.verdict import Link, Object
+from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.status import Status, weigh
+from avow.report import wording
+
+
+class Sort(StrEnum):
+    """GSN's elements, by the letters of their names."""
+
+    GOAL = "G"
+    STRATEGY = "S"
+    SOLUTION = "Sn"
+    CONTEXT = "C"
+    ASSUMPTION = "A"
+    JUSTIFICATION = "J"
+
+
+@dataclass(frozen=True, slots=True)
+class Defeater:
+    """What would make evidence worthless, and what was done about it; an empty answer: nothing was done."""
+
+    text: str
+    answer: str
+
+
+@dataclass(frozen=True, slots=True)
+class Artifact:
+    """The record behind a solution."""
+
+    record: str
+    """The hash of its entry in the ledger."""
+    date: str
+    tool: str
+    command: str
+    """The command that re-runs it."""
+    files: tuple[tuple[str, str], ...]
+    """(path, SHA-256) of what the tool left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """One element of the argument."""
+
+    name: str
+    """Unique in all modules: ``G1``, ``Sn12``."""
+    sort: Sort
+    text: str
+    """A proposition, of a goal; else what the element is."""
+    supported_by: tuple[str, ...] = ()
+    in_context_of: tuple[str, ...] = ()
+    undeveloped: bool = False
+    defeated: bool = False
+    """Of a goal: a counterexample is known."""
+    label: str = ""
+    """How it is known elsewhere and how it stands: ``REQ1 [shown]``."""
+    believed: str = ""
+    """Of a solution, the assurance claim point: why the evidence may be believed."""
+    defeaters: tuple[Defeater, ...] = ()
+    artifact: Artifact | None = None
+
+    def text_of_defeaters(self) -> tuple[str, ...]:
+        """A line for each defeater: what it is, and what was done about it."""
+        return tuple(f"defeater: {d.text}: {d.answer or 'open'}" for d in self.defeaters)
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    name: str
+    brief: str
+    elements: tuple[Element, ...] = field(default=())
+
+
+def argument(case: Case) -> tuple[Module, ...]:
+    """The whole argument: the system's module first, then requirements, nodes and general questions."""
+    return tuple(_Argument(case).modules())
+
+
+class _Argument:
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.last = dict.fromkeys(Sort, 0)
+        self.requirement_modules = requirement_modules(case)
+        self.views = {view.id: view for view in case.obligations}
+        self.grades = {proof.obligation: proof.grade for proof in case.proofs}
+        self.top = self.new(Sort.GOAL)
+        self.requirements = {r.id: self.new(Sort.GOAL) for r in case.requirements}
+        self.nodes = {node.name: self.new(Sort.GOAL) for node in case.nodes}
+        self.guarantees = {view.id: self.new(Sort.GOAL) for view in case.guarantees}
+
+    def new(self, sort: Sort) -> str:
+        self.last[sort] += 1
+        return f"{sort}{self.last[sort]}"
+
+    def modules(self) -> Iterator[Module]:
+        general = [module for module in (self.validation(), self.models(), self.contracts(), self.tools()) if module]
+        hazards = self.hazards()
+        yield self.whole([*general, *([hazards] if hazards else [])])
+        yield from map(self.requirement, self.requirement_modules)
+        for node in node_modules(self.case):
+            yield self.node(node.node.name, node.node.title, node.guarantees)
+        yield from general
+        if hazards:
+            yield hazards
+
+    def whole(self, others: Sequence[Module]) -> Module:
+        case = self.case
+        context = Element(self.new(Sort.CONTEXT), Sort.CONTEXT, f"Policy {case.policy.name}: {case.policy.title}")
+        assumptions = [
+            Element(a.number, Sort.ASSUMPTION, a.words, label=f"{a.number} ({a.sort})") for a in case.assumptions
+        ]
+        strategies = []
+        if self.requirements:
+            text, below = "Argument over each requirement", tuple(self.requirements.values())
+            strategies.append(Element(self.new(Sort.STRATEGY), Sort.STRATEGY, text, below))
+        if others:
+            text, below = "Argument over what the evidence takes for granted", tuple(m.elements[0].name for m in others)
+            strategies.append(Element(self.new(Sort.STRATEGY), Sort.STRATEGY, text, below))
+        proposition = f"Each requirement of {case.title} holds as far as its row says"
+        top = Element(
+            self.top,
+            Sort.GOAL,
+            proposition if self.requirements else f"The contracts of {case.title} hold",
+            tuple(s.name for s in strategies),
+            (context.name,),
+            not strategies,
+            label=case.answers.told,
+        )
+        return Module(f"system-{case.system}", case.title, (top, context, *strategies, *assumptions))
+
+    def requirement(self, module: RequirementModule) -> Module:
+        r = module.requirement
+        context = []
+        if r.formal:
+            context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.formal, label="Formula"))
+        if r.source:
+            context.append(Element(self.new(Sort.CONTEXT), Sort.CONTEXT, r.source, label="Source"))
+        if module.conditions:
+            text = f"Composition: {module.conditions}"
+            context.append(Element(self.new(Sort.JUSTIFICATION), Sort.JUSTIFICATION, text))
+        solutions = [s for name in r.obligations if name in self.views for s in self.solutions(self.views[name])]
+        below = tuple(self.nodes[node] for node, _, _ in module.away)
+        strategy = Element(self.new(Sort.STRATEGY), Sort.STRATEGY, self.rule(r, len(below)), below)
+        supported = (*([strategy.name] if below else []), *(s.name for s in solutions))
+        goal = Element(
+            self.requirements[r.id],
+            Sort.GOAL,
+            r.words,
+            supported,
+            (*module.supposes, *(c.name for c in context)),
+            not supported,
+            r.status is Status.REFUTED,
+            f"{r.id} [{r.stands}]",
+        )
+        return Module(f"requirement-{r.id}", r.words, (goal, *([strategy] if below else []), *context, *solutions))
+
+    def rule(self, r: RequirementView, nodes: int) -> str:
+        """The strategy in the words of the calculus, with the derivations that it uses."""
+        over = count(nodes, "node contract")
+        if not r.formal:
+            return f"A person's judgement over {over}"
+        used = [d.derivation for d in self.case.derivations if derivation_claim(d.derivation.name) in r.rests_on]
+        rules = listed([f"rule {d.rule} ({d.name})" for d in used], 4)
+        how = "model checking of the composition" if r.temporal else "entailment by the composed contracts"
+        return f"{rules}, then {how} of {over}" if rules else f"{how[:1].upper()}{how[1:]} of {over}"
+
+    def node(self, name: str, title: str, guarantees: Sequence[ObligationView]) -> Module:
+        goals, solutions = [], list[Element]()
+        for view in guarantees:
+            found = list(self.solutions(view))
+            solutions += found
+            goals.append(
+                Element(
+                    self.guarantees[view.id],
+                    Sort.GOAL,
+                    view.obligation.claim,
+                    tuple(s.name for s in found),
+                    undeveloped=not found,
+                    defeated=view.status is Status.REFUTED,
+                    label=f"{view.obligation.name} [{view.standing}]",
+                )
+            )
+        below = tuple(goal.name for goal in goals)
+        text = f"{title} keeps each of its guarantees"
+        root = Element(self.nodes[name], Sort.GOAL, text, below, undeveloped=not below)
+        return Module(f"node-{name}", title, (root, *goals, *solutions))
+
+    # -- general questions ---------------------------------------------------------------------------------------------
+
+    def validation(self) -> Module | None:
+        """Whether formulas say what sentences ask for: a person's word for each requirement."""
+        if not self.requirements:
+            return None
+        solutions = []
+        for r in self.case.requirements:
+            if r.validated and r.validation is not None:
+                said = f"{r.id}: {r.validation.who} read the sentence against its formula or support"
+                digest = r.validation.formula or r.validation.sentence
+                artifact = Artifact(digest, r.validation.date, r.validation.who, "", ())
+                open_doubt = Defeater("the reader misread the sentence", "")
+                solutions.append(
+                    Element(
+                        self.new(Sort.SOLUTION),
+                        Sort.SOLUTION,
+                        said,
+                        label=r.validation.date,
+                        believed="digests bind the word to the texts as they were read",
+                        defeaters=(open_doubt,),
+                        artifact=artifact,
+                    )
+                )
+        whole = len(solutions) == len(self.case.requirements)
+        text = "Each requirement's formula or support says what its sentence asks for"
+        return self.general("validation", text, solutions, whole)
+
+    def models(self) -> Module | None:
+        """Whether the models that were verified behave as the programs that run."""
+        of_models = {v.obligation.node for v in self.case.guarantees if any(r.of is Object.MODEL for r in v.records)}
+        if not of_models:
+            return None
+        linked = [
+            v
+            for v in self.case.obligations
+            if v.obligation.kind is Kind.PROGRAM
+            and v.obligation.name == ProgramClaim.LINKED
+            and v.obligation.node in of_models
+        ]
+        goals, solutions = self.claims(linked)
+        shown = {v.obligation.node for v in linked if v.standing.supports}
+        text = "Each model that was verified behaves as the program that runs"
+        return self.general("model-fidelity", text, [*goals, *solutions], of_models <= shown, goals)
+
+    def contracts(self) -> Module | None:
+        """Whether contracts are worth verifying: consistent, realizable, not vacuous."""
+        sanity = [v for v in self.case.obligations if is_foundation(v.obligation)]
+        if not sanity:
+            return None
+        goals, solutions = self.claims(sanity)
+        good = all(v.standing.supports for v in sanity)
+        text = "Each contract can be kept: it is consistent and realizable, and its assumptions can be met"
+        return self.general("contracts", text, [*goals, *solutions], good, goals)
+
+    def tools(self) -> Module:
+        """Whether the tools answer rightly: what was done about each part that has to be trusted."""
+        solutions = [
+            Element(self.new(Sort.SOLUTION), Sort.SOLUTION, f"{line.what} ({line.which}): {line.mitigation}")
+            for line in self.case.answers.trusted
+        ]
+        text = "The tools and the trusted base answer rightly"
+        return self.general("tools", text, solutions, False)
+
+    def hazards(self) -> Module | None:
+        if not self.case.hazards:
+            return None
+        goals = []
+        for view in self.case.hazards:
+            below = [goal for m in view.mitigations if (goal := self.mitigation(m.name, m.claims)) is not None]
+            hazard = view.hazard
+            goals.append(
+                Element(
+                    self.new(Sort.GOAL),
+                    Sort.GOAL,
+                    f"The hazard is mitigated: {hazard.text}",
+                    tuple(dict.fromkeys(below)),
+                    undeveloped=not below,
+                    label=f"{hazard.id} [{view.level}; {hazard.severity}]",
+                )
+            )
+        good = all(view.level.holds for view in self.case.hazards)
+        return self.general("hazards", "Each hazard that was identified is mitigated", goals, good, goals)
+
+    def mitigation(self, name: str, claims: Sequence[str]) -> str | None:
+        if name in self.requirements:
+            return self.requirements[name]
+        if name in self.nodes:
+            return self.nodes[name]
+        return next((self.guarantees[claim] for claim in claims if claim in self.guarantees), None)
+
+    def general(
+        self, name: str, text: str, elements: Sequence[Element], whole: bool, goals: Sequence[Element] | None = None
+    ) -> Module:
+        """`whole`: whether nothing is missing below the goal. `goals`: the elements directly below it, if not all."""
+        below = tuple(element.name for element in (elements if goals is None else goals))
+        root = Element(self.new(Sort.GOAL), Sort.GOAL, text, below, undeveloped=not below)
+        label = "" if whole else "partly shown" if below else "not shown"
+        return Module(name, text, (replace(root, label=label), *elements))
+
+    def claims(self, views: Iterable[ObligationView]) -> tuple[list[Element], list[Element]]:
+        """A goal for each claim, and the solutions below them."""
+        goals, solutions = list[Element](), list[Element]()
+        for view in views:
+            found = list(self.solutions(view))
+            solutions += found
+            goals.append(
+                Element(
+                    self.new(Sort.GOAL),
+                    Sort.GOAL,
+                    view.obligation.claim,
+                    tuple(s.name for s in found),
+                    undeveloped=not found,
+                    defeated=view.status is Status.REFUTED,
+                    label=f"{view.obligation.node}: {view.obligation.name} [{view.standing}]",
+                )
+            )
+        return goals, solutions
+
+    # -- evidence ------------------------------------------------------------------------------------------------------
+
+    def solutions(self, view: ObligationView) -> Iterator[Element]:
+        for item in view.counting:
+            record = item.entry.evidence
+            command = wording.rerun(view, record)
+            artifact = Artifact(
+                item.entry.hash, record.started, record.tool_told, command, tuple(sorted(record.outputs.items()))
+            )
+            yield Element(
+                self.new(Sort.SOLUTION),
+                Sort.SOLUTION,
+                record.summary,
+                label=f"{record.method} [{weigh(record).status.value}]",
+                believed=self.believed(view, item),
+                defeaters=tuple(self.defeaters(view, item)),
+                artifact=artifact,
+            )
+
+    def believed(self, view: ObligationView, item: EvidenceView) -> str:
+        record = item.entry.evidence
+        made = {
+            Link.GENERATED: "what the tool was given was generated from the contract",
+            Link.MAPPED: "a person's table says how the contract's words appear in it",
+            Link.GUIDED: "a person judges that it is about this claim",
+        }[record.link]
+        grade = self.grades.get(view.id)
+        return f"{made}; its proof is {grade}" if grade else made
+
+    def defeaters(self, view: ObligationView, item: EvidenceView) -> Iterator[Defeater]:
+        record = item.entry.evidence
+        status, promised = weigh(record).status, view.obligation.kind is Kind.GUARANTEE
+        mechanical = record.link is not Link.GUIDED
+        seeded = "the backend's conformance tests catch seeded faults" if mechanical else ""
+        yield Defeater("the translation or the reading of the tool's answer is wrong", seeded)
+        if promised:
+            yield Defeater("the method would accept a wrong node as well", wording.mutation(record))
+        if promised and status in (Status.PROVED, Status.CHECKED) and record.of is Object.MODEL:
+            yield Defeater("the model differs from the program that runs", self.linked(view.obligation.node))
+        if status in (Status.TESTED, Status.MONITORED):
+            bound = wording.bound_text(record.bound)
+            yield Defeater("a case that was not tried fails", f"bounded: {bound}" if bound else "")
+        if status is Status.PROVED:
+            twice = self.grades.get(view.id) is ProofGrade.CERTIFIED_2
+            yield Defeater("the solver is wrong", "two solvers answered each question" if twice else "")
+
+    def linked(self, node: str) -> str:
+        for view in self.case.obligations:
+            o = view.obligation
+            if o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED and o.node == node and view.standing.supports:
+                return f"the program agrees with it: {view.standing}"
+        return ""
+
+
+def by_name(modules: Iterable[Module]) -> Mapping[str, Element]:
+    """Every element of the argument by its name."""
+    return {element.name: element for module in modules for element in module.elements}

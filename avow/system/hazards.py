@@ -1,0 +1,163 @@
+"""Hazards of a system and what mitigates each: a YAML file of one entry per hazard, or a table of an STPA in CSV.
+
+Severity and exposure have the levels of MIL-STD-882E, tables I and II. A mitigation is a requirement (``REQ1``), a node
+(``agent``: all of its guarantees), a guarantee (``agent.stop``), or a method of a node (``agent/monitor``), such as a
+monitor that runs on the robot. A security goal is a hazard with ``kind: security``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import inside, read_regular
+from avow.base.plain import bare
+from avow.base.suggestions import suggest
+from avow.language.contract import Node
+from avow.system.plan import Hazard, Plan
+from avow.system.schema import violations
+from avow.system.strict_yaml import Piece, read_yaml
+
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "id": ("id", "uca", "uca id", "hazard id"),
+    "text": ("text", "hazard", "unsafe control action", "description"),
+    "severity": ("severity",),
+    "exposure": ("exposure", "probability", "likelihood"),
+    "source": ("source", "reference", "document"),
+    "kind": ("kind",),
+    "causes": ("causes", "causal scenarios", "causal scenario", "loss scenarios", "scenarios"),
+    "consequences": ("consequences", "losses", "loss", "effects"),
+    "mitigated_by": ("mitigated_by", "mitigated by", "mitigations", "constraints", "safety constraints"),
+}
+"""Field of a hazard → the headings that it may have in a CSV file, in any case."""
+_LISTS = ("causes", "consequences", "mitigated_by")
+
+
+def read_hazards(
+    plan: Path, pieces: Iterable[Piece]
+) -> tuple[tuple[tuple[Hazard, ...], tuple[Path, ...]], tuple[Diagnostic, ...]]:
+    """The hazards in the files that a plan names under `hazards`, and those files; what is wrong with them."""
+    found: list[Hazard] = []
+    files: list[Path] = []
+    faults: list[Diagnostic] = []
+    for piece in pieces:
+        path = inside(plan.parent, piece.text)
+        if path is None:
+            faults.append(
+                Diagnostic("PLAN108", f"the path {piece.text!r} leads out of the system's folder", piece.span)
+            )
+            continue
+        try:
+            data = read_regular(path)
+            hazards, wrong = (_table if path.suffix.lower() == ".csv" else _document)(data, str(path))
+        except OSError as error:
+            message = f"{piece.text!r} cannot be read: {error.strerror}"
+            faults.append(Diagnostic("PLAN107", message, piece.span))
+            continue
+        except Rejected as rejected:
+            hazards, wrong = (), rejected.diagnostics
+        files.append(path)
+        faults += wrong
+        for hazard in hazards:
+            first = next((other for other in found if other.id == hazard.id), None)
+            if first is not None:
+                notes = (("first declared here", first.span),)
+                faults.append(
+                    Diagnostic("PLAN110", f"hazard {hazard.id!r} is declared twice", hazard.span, notes=notes)
+                )
+            found.append(hazard)
+    return (tuple(found), tuple(files)), tuple(faults)
+
+
+def _document(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
+    root, faults = read_yaml(data, file)
+    faults += violations(root.located(), _schema(), "the hazards")
+    if faults:
+        return (), faults
+    found = []
+    for name, span, entry in root.keyed():
+        values = {key: entry.texts(key) if key in _LISTS else (entry.said(key) or "") for key in entry.entries or {}}
+        found.append(_hazard(name, values, span))
+    return tuple(found), ()
+
+
+def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
+    """Rows of a CSV file with a line of headings; several causes, consequences or mitigations are set apart by `;`."""
+    try:
+        reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
+    except (UnicodeDecodeError, csv.Error) as error:
+        return (), (Diagnostic("PLAN109", f"not a CSV file in UTF-8: {error}", Span(file, 1, 1, 1, 2)),)
+    if not rows:
+        return (), (Diagnostic("PLAN109", "the table is empty", Span(file, 1, 1, 1, 2)),)
+    (line, header), *entries = rows
+    fields = {bare(word): field for field, words in COLUMNS.items() for word in words}
+    at = {fields[bare(word)]: place for place, word in enumerate(header) if bare(word) in fields}
+    missing = [field for field in ("id", "text") if field not in at]
+    if missing:
+        message = f"the table has no column for {' and '.join(missing)}"
+        hint = "; ".join(f"{field}: {', '.join(COLUMNS[field])}" for field in missing)
+        return (), (Diagnostic("PLAN109", message, Span(file, line, 1, line, 2), hint=hint),)
+    found, faults = [], list[Diagnostic]()
+    for line, row in entries:
+        span = Span(file, line, 1, line, 2)
+        cells = {field: row[place] for field, place in at.items() if place < len(row) and row[place]}
+        values: dict[str, Any] = {
+            field: tuple(part.strip() for part in text.split(";") if part.strip()) if field in _LISTS else text
+            for field, text in cells.items()
+        }
+        for field in ("severity", "exposure", "kind"):
+            values |= {field: values[field].lower()} if field in values else {}
+        name = values.pop("id", "")
+        piece = _piece({name: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}}, span)
+        wrong = violations(piece.located(), _schema(), "the table")
+        faults += wrong
+        if not wrong:
+            found.append(_hazard(name, values, span))
+    return tuple(found), tuple(faults)
+
+
+def _piece(data: Any, span: Span) -> Piece:
+    """Plain data as if all of it had been read at one place."""
+    match data:
+        case dict():
+            return Piece(span, entries={key: _piece(value, span) for key, value in data.items()})
+        case list():
+            return Piece(span, items=[_piece(value, span) for value in data])
+        case _:  # a text
+            return Piece(span, data, str(data))
+
+
+def _hazard(name: str, values: Mapping[str, Any], span: Span) -> Hazard:
+    words: dict[str, Any] = {
+        key: " ".join(value.split()) if isinstance(value, str) else value for key, value in values.items()
+    }
+    return Hazard(name, span=span, **words)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    text = resources.files("avow.system").joinpath("hazards.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
+
+
+def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnostic]:
+    """A diagnostic for each mitigation that names no requirement, node, guarantee or method of the system."""
+    known = [r.id for r in plan.requirements] + list(nodes)
+    known += [f"{node.name}.{clause.name}" for node in nodes.values() for clause in node.guarantees]
+    known += [f"{entry.node}/{method.id}" for entry in plan.nodes for method in entry.methods]
+    for hazard in plan.hazards:
+        for name in hazard.mitigated_by:
+            if name not in known:
+                message = (
+                    f"hazard {hazard.id}: mitigated by {name!r}, which is no requirement, node, guarantee or method"
+                )
+                yield Diagnostic("PLAN106", message, hazard.span, hint=suggest(name, known))

@@ -1,0 +1,146 @@
+"""Trials judged by a guarantee's own formula, in exact arithmetic: a trial is a run of one step, or of several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from avow.backend_kit.programs.judging import Formula
+from avow.base.records import dataclass
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.evaluation.running import Keeper
+from avow.formulas.conditions import conditions
+from avow.formulas.formula import conjunction, negation, substitute
+from avow.formulas.temporal.cell import Cell
+from avow.formulas.temporal.cells import Records
+from avow.formulas.temporal.responses import due
+from avow.formulas.values import Value
+from avow.language.contract import Clause
+from avow.language.printer import show_term
+from avow.language.sorts import FunctionSort
+from avow.language.subterms import histories, ports_of
+from avow.language.terms import TRUE, Quantified, Quantifier, Role, Term, Variable
+
+from .binding import Interpretation, interpreted
+
+Step = Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A guarantee, ready to be judged. `conditions` are those under which it demands something, with their text; a
+    guarantee without any demands something of every trial. `unseen` are assumptions whose inputs are not in the data.
+    """
+
+    holds: Formula
+    conditions: tuple[Formula, ...]
+    demands: Evaluator | None
+    """Whether, of a step's inputs, some outputs would break it; None where that cannot be evaluated."""
+    assumptions: tuple[Formula, ...]
+    unseen: tuple[str, ...]
+    missing: tuple[str, ...]
+    """Ports that the guarantee speaks of, and that are bound to no column."""
+    reads: frozenset[str]
+    """What has values and is read: ports and columns."""
+    remembers: bool
+    cells: tuple[Cell, ...]
+    interpreted: tuple[str, ...]
+    """What the interpretations say that it, or an assumption, needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What became of a trial. `met`: the places of the conditions that came about; `asked`: the guarantee demanded
+    something; `broken`: the step that breaks it; `excused`: an assumption did not hold, before any breach; `undecided`:
+    what could not be told."""
+
+    met: frozenset[int] = frozenset()
+    asked: bool = False
+    broken: int | None = None
+    excused: bool = False
+    undecided: str = ""
+
+
+def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Interpretation], known: set[str]) -> Claim:
+    """`known`: the names of ports and columns that have values."""
+    known_meanings, records = tuple(meanings), Records()
+
+    def ready(name: str, formula: Term) -> Formula:
+        return Formula.made(name, records.clause(formula) if histories(formula) else formula)
+
+    assumptions = tuple(assumptions)
+    said = (clause.formula, *(each.formula for each in assumptions))
+    formula = interpreted(clause.formula, known_meanings)
+    assumed = {each.name: interpreted(each.formula, known_meanings) for each in assumptions}
+    unseen = [name for name, term in assumed.items() if not _ports(term) <= known]
+    judged_terms = (formula, *(term for name, term in assumed.items() if name not in unseen))
+    return Claim(
+        ready(clause.name, formula),
+        tuple(ready(_text(condition), condition) for condition in _conditions(formula)),
+        _demands(formula),
+        tuple(ready(name, term) for name, term in assumed.items() if name not in unseen),
+        tuple(unseen),
+        tuple(sorted(_ports(formula) - known)),
+        frozenset(name for term in judged_terms for name in _ports(term) & known),
+        any(histories(term) for term in judged_terms),
+        tuple(records.cells),
+        tuple(one.text for one in known_meanings if any(interpreted(each, [one]) != each for each in said)),
+    )
+
+
+def judged(claim: Claim, steps: Sequence[Step]) -> Judged:
+    """One trial, from its first step."""
+    keeper, met, asked, doubt, undecided = Keeper(claim.cells), set[int](), False, "", ""
+    for at, ports in enumerate(steps):
+        values = keeper.at(ports)
+        assumed = {formula.name: formula.holds(values) for formula in claim.assumptions}
+        if False in assumed.values():
+            return Judged(frozenset(met), excused=True)
+        doubt = doubt or next((f"assumption {name}" for name, holds in assumed.items() if holds is None), "")
+        if _demanded(claim, values):
+            asked = True
+            met |= {n for n, condition in enumerate(claim.conditions) if condition.holds(values) is True}
+        held = claim.holds.holds(values)
+        if held is False:
+            return Judged(frozenset(met), True, broken=at, undecided=doubt)
+        undecided = undecided or (claim.holds.name if held is None else "")
+        keeper.advance(ports)
+    return Judged(frozenset(met), asked, undecided=doubt or undecided)
+
+
+def _demands(formula: Term) -> Evaluator | None:
+    """A formula may demand nothing of some inputs though it has no condition that one can read off."""
+    outputs = [port for port in ports_of(formula) if port.role is Role.OUTPUT]
+    if histories(formula) or any(isinstance(port.sort, FunctionSort) for port in outputs):
+        return None
+    others = {port: Variable(Role.BOUND, f"other {port.name}", port.sort) for port in outputs}
+    broken = negation(substitute(formula, dict(others)))
+    try:
+        return compile_term(Quantified(Quantifier.EXISTS, tuple(others.values()), broken) if others else broken)
+    except NotEvaluable:
+        return None
+
+
+def _demanded(claim: Claim, values: Step) -> bool:
+    try:
+        return claim.demands is None or bool(claim.demands(values))
+    except NotEvaluable:
+        return True
+
+
+def _conditions(formula: Term) -> tuple[Term, ...]:
+    """Of a response, that all of what it demands has come due."""
+    response = due(formula)
+    if response is None:
+        return tuple(condition.formula for condition in conditions(formula))
+    if response.full == TRUE:
+        return ()
+    outer, full = response.outer, conjunction((response.full,))
+    return (Quantified(Quantifier.EXISTS, outer, full) if outer else full,)
+
+
+def _ports(formula: Term) -> set[str]:
+    return {variable.qualified for variable in ports_of(formula)}
+
+
+def _text(formula: Term) -> str:
+    return show_term(formula, "unicode").replace("\n", " ").replace("in.column ", "").replace("out.column ", "")

@@ -1,0 +1,256 @@
+"""From judged runs to a verdict and its words.
+
+Deleting the rows of failing runs would let a refutation be forgotten. So failing runs are kept in the ledger
+(`avow.evidence.record.CASE`), and a plan that leaves one out has to say why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from avow.base.plain import count, decimal, listed
+from avow.base.records import dataclass
+from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.evidence.record import CASE, RATE
+from avow.formulas.values import show
+from avow.kernel.rates import Stratum
+
+from .binding import Unfit
+from .judging import Claim, Judged, judged
+from .options import Experiment, Run
+from .statistics import runs_needed, upper_bound
+from .tuning import FAILURES_KEPT, FAILURES_SHOWN
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    """The runs that met the guarantee's condition, in strata: each condition under each value of the column `strata`.
+    A run that breaks an assumption is none of them."""
+
+    strata: tuple[Stratum, ...]
+    triggered: int
+    failed: tuple[tuple[Run, Judged], ...]
+    excused: int
+
+    @property
+    def worst(self) -> Stratum:
+        return max(self.strata, key=lambda stratum: Fraction(stratum.bound))
+
+    @property
+    def bound(self) -> Fraction:
+        return Fraction(self.worst.bound)
+
+
+def settle(name: str, experiment: Experiment, kept: Iterable[Sequence[Mapping[str, Any]]]) -> tuple[Outcome, str]:
+    """The outcome for a guarantee, without its obligation, and what became of each run, as tab-separated lines. `kept`:
+    runs that failed once."""
+    claim = experiment.claims[name]
+    found = [(run, judged(claim, run.steps)) for run in experiment.runs]
+    log = "".join(f"{run.name}\t{_word(claim, one)}\n" for run, one in found)
+    outcome = _outcome(claim, found, experiment)
+    return _held_against(outcome, claim, experiment, kept), f"run\tverdict\n{log}"
+
+
+def _outcome(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Experiment) -> Outcome:
+    sample = _sample(claim, found, experiment)
+    details: dict[str, object] = {"protocol": experiment.protocol} if experiment.protocol else {}
+    bound: dict[str, object] = {"runs": len(found), "confidence": float(experiment.confidence)}
+    if sample.excused:
+        bound["runs that break an assumption"] = sample.excused
+    outcome = Outcome("", Verdict.UNKNOWN, "", bound=bound, details=details)
+    details["strata"] = [_row(stratum) for stratum in sample.strata]
+    bound["triggered"], bound["failures"] = sample.triggered, len(sample.failed)
+    if len(sample.strata) > 1:
+        bound["worst stratum"] = f"{sample.worst.name}, {sample.worst.failures} of {sample.worst.trials} failed"
+    bound["failure probability at most"] = float(sample.bound)
+    seen = _seen(sample, len(found))
+    said = f"{seen}: {_most(sample, experiment)}"
+    claimed = experiment.at_least is not None and sample.bound <= 1 - experiment.at_least
+    if sample.failed and not claimed:
+        details[CASE] = [{"run": run.name, "rows": list(run.rows)} for run, _ in sample.failed[:FAILURES_KEPT]]
+        shown = _counterexample(claim, sample.failed)
+        return replace(outcome, verdict=Verdict.REFUTED, summary=seen, counterexample=shown)
+    if undecided := [(run, one) for run, one in found if one.undecided and not one.excused]:
+        run, one = undecided[0]
+        return replace(outcome, summary=f"run {run.name}: nobody can tell whether {one.undecided} holds")
+    if why := _unmet(claim, found):
+        return replace(outcome, verdict=Verdict.TESTED, vacuous=True, summary=why)
+    asked = experiment.at_least or experiment.floor
+    if sample.bound > 1 - asked:
+        return replace(outcome, summary=_too_few(said, sample, experiment, asked))
+    details[RATE] = [_row(stratum) for stratum in sample.strata]
+    rests = ["the runs are independent and drawn as the robot will be used", *claim.interpreted]
+    if claim.unseen:
+        rests.append(f"each run meets the assumptions {', '.join(claim.unseen)}: their inputs are not in the data")
+    if sample.failed:
+        details["failing runs"] = _counterexample(claim, sample.failed).explanation
+        rests.append(f"the guarantee is meant statistically: in at least {_percent(asked)} of runs")
+    return replace(outcome, verdict=Verdict.TESTED, summary=said, hypotheses=tuple(rests))
+
+
+def _sample(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Experiment) -> _Sample:
+    among = sorted({run.stratum for run, _ in found})
+    conditions = range(len(claim.conditions)) if claim.conditions else (None,)
+    counts = {(stratum, n): [0, 0] for stratum in among for n in conditions}
+    for run, one in found:
+        if not one.excused:
+            for n in conditions:
+                # a breach counts under every condition where none is known to be met
+                if (n is None and one.asked) or n in one.met or (one.broken is not None and not one.met):
+                    counts[run.stratum, n][0] += 1
+                    counts[run.stratum, n][1] += one.broken is not None
+    shared = 1 - (1 - experiment.confidence) / len(counts)
+    each = Fraction(-(-shared * 10**12 // 1), 10**12)  # a decimal, rounded up
+    strata = []
+    for (stratum, n), (trials, failures) in counts.items():
+        bound = upper_bound(failures, trials, each)
+        strata.append(Stratum(_name(claim, experiment, stratum, n), trials, failures, _decimal(bound), _decimal(each)))
+    counted = [(run, one) for run, one in found if not one.excused]
+    return _Sample(
+        tuple(strata),
+        sum(1 for _, one in counted if one.broken is not None or (one.met if claim.conditions else one.asked)),
+        tuple((run, one) for run, one in counted if one.broken is not None),
+        len(found) - len(counted),
+    )
+
+
+def _name(claim: Claim, experiment: Experiment, stratum: str, condition: int | None) -> str:
+    parts = [f"{experiment.strata} = {stratum}"] if experiment.strata else []
+    if condition is not None and len(claim.conditions) > 1:
+        parts.append(claim.conditions[condition].name)
+    return ", ".join(parts)
+
+
+def _unmet(claim: Claim, found: Sequence[tuple[Run, Judged]]) -> str:
+    """Why the runs tried nothing; empty where each condition came about in some of them."""
+    runs, counted = count(len(found), "run"), [one for _, one in found if not one.excused]
+    if not counted:
+        return f"no run counts: {runs}, and each breaks an assumption"
+    if not claim.conditions and not any(one.asked for one in counted):
+        return f"the guarantee demands nothing in any of {runs}"
+    met = {n for one in counted for n in one.met}
+    unmet = [formula.name for n, formula in enumerate(claim.conditions) if n not in met]
+    return f"in none of {runs} was its condition met: {unmet[0]}" if unmet else ""
+
+
+def _seen(sample: _Sample, runs: int) -> str:
+    """``17 triggered runs of 105, 0 failed``."""
+    triggered = count(sample.triggered, "triggered run")
+    of = count(runs, "run") if sample.triggered == runs else f"{triggered} of {runs:,}".replace(",", " ")
+    excused = f" ({sample.excused} broke an assumption)" if sample.excused else ""
+    return f"{of}{excused}, {len(sample.failed)} failed"
+
+
+def _most(sample: _Sample, experiment: Experiment) -> str:
+    """``at most 16.2 % fail at 95 % confidence``."""
+    most = f"at most {_percent_up(sample.bound)} fail at {_percent(experiment.confidence)} confidence"
+    if len(sample.strata) == 1:
+        return most
+    worst = sample.worst
+    which = f"worst of {len(sample.strata)} strata, which share the confidence: {worst.name}"
+    return f"{most} ({which}, {worst.failures} of {worst.trials} failed)"
+
+
+def _too_few(said: str, sample: _Sample, experiment: Experiment, asked: Fraction) -> str:
+    needed = runs_needed(1 - asked, Fraction(sample.worst.confidence))
+    what = "the claim" if experiment.at_least is not None else "the least that this criticality asks for"
+    where = " in each stratum" if len(sample.strata) > 1 else ""
+    enough = f"{needed} runs without a failure{where} would" if needed is not None else "very many runs would"
+    return f"{said}; success in {_percent(asked)} of runs, {what}, is not shown: {enough}"
+
+
+def _counterexample(claim: Claim, failed: Sequence[tuple[Run, Judged]]) -> Counterexample:
+    run, one = failed[0]
+    steps = [tuple((_port(name), show(value)) for name, value in step.items()) for step in run.steps]
+    at = one.broken or 0
+    names = listed([run.name for run, _ in failed], FAILURES_SHOWN)
+    explanation = f"guarantee {claim.holds.name} does not hold in run {names}"
+    return Counterexample((("run", run.name), *steps[at]), explanation, tuple(steps[: at + 1]) if at else ())
+
+
+def _port(name: str) -> str:
+    return name.removeprefix("in.column ").removeprefix("out.column ")
+
+
+def _word(claim: Claim, one: Judged) -> str:
+    if one.excused:
+        return "breaks an assumption"
+    if one.broken is not None:
+        return "failed"
+    if one.undecided:
+        return "undecided"
+    return "ok" if (one.met if claim.conditions else one.asked) else "not triggered"
+
+
+def _row(stratum: Stratum) -> dict[str, Any]:
+    return {
+        "name": stratum.name,
+        "trials": stratum.trials,
+        "failures": stratum.failures,
+        "bound": stratum.bound,
+        "confidence": stratum.confidence,
+    }
+
+
+# -- runs that failed once --------------------------------------------------------------------------------------------
+
+
+def _held_against(
+    outcome: Outcome, claim: Claim, experiment: Experiment, kept: Iterable[Sequence[Mapping[str, Any]]]
+) -> Outcome:
+    """The outcome, but `unknown` where runs that failed before are missing, unless the plan says of each why it is left
+    out. That is then an assumption."""
+    if outcome.verdict in (Verdict.REFUTED, Verdict.ERROR):
+        return outcome
+    missing = dict.fromkeys(
+        run["run"] for case in kept for run in case if _fails(run, claim, experiment) and not _is_there(run, experiment)
+    )
+    if not missing:
+        return outcome
+    if left := [name for name in missing if name not in experiment.left_out]:
+        shown = listed(left, FAILURES_SHOWN)
+        why = f"runs that failed before are missing in the data: {shown}; put them back, or name them under 'left_out'"
+        return replace(outcome, verdict=Verdict.UNKNOWN, summary=why, hypotheses=(), vacuous=False)
+    said = f"that run {listed(list(missing), FAILURES_SHOWN)} failed does not count: {experiment.because}"
+    return replace(outcome, hypotheses=(*outcome.hypotheses, said))
+
+
+def _fails(run: Mapping[str, Any], claim: Claim, experiment: Experiment) -> bool:
+    """Whether a kept run fails by the guarantee as it is read today; one whose cells give no values does."""
+    try:
+        return judged(claim, experiment.values(run["rows"])).broken is not None
+    except (Unfit, KeyError):
+        return True
+
+
+def _is_there(kept: Mapping[str, Any], experiment: Experiment) -> bool:
+    """Whether a kept run is among the data, under its name and with what was measured."""
+    return any(run.name == kept["run"] and _same(kept.get("rows", ()), run.rows) for run in experiment.runs)
+
+
+def _same(before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]]) -> bool:
+    return len(before) == len(now) and all(
+        all(one[column] == other[column] for column in one.keys() & other.keys())
+        for one, other in zip(before, now, strict=True)
+    )
+
+
+# -- numbers for people -----------------------------------------------------------------------------------------------
+
+
+def _decimal(value: Fraction) -> str:
+    text = decimal(value)
+    assert text is not None  # bounds and confidences are decimals
+    return text
+
+
+def _percent(value: Fraction) -> str:
+    return f"{float(value * 100):.6g} %"
+
+
+def _percent_up(value: Fraction) -> str:
+    """One decimal, never rounded down."""
+    return f"{float(Fraction(-(-value * 1000 // 1), 10)):g} %"

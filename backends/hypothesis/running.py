@@ -1,0 +1,499 @@
+"""Runs a generated test as Avow does: under Hypothesis, with the unit under test in a process of its own.
+
+The test's import finds a stand-in, which asks that process; the test's own strategies, assumptions and steps decide
+what it is asked. Each case is judged by exact evaluation (and Z3 where that cannot answer), for every guarantee and
+condition at once; what the test's assertions say of the same case has to agree. Where a guarantee fails, Hypothesis
+runs the test again to find the simplest case.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import itertools
+import json
+import os
+import pickle
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, given, reject, seed, settings, target
+from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable, UnsatisfiedAssumption
+from hypothesis.internal.conjecture import providers
+from hypothesis.stateful import get_state_machine_test
+
+from avow.base.process import adopt_orphans
+from avow.base.tuning.running import SUBJECT_PATIENCE
+from avow.evaluation.running import Keeper
+from avow.formulas.temporal.cells import Records
+from avow.formulas.values import Value
+from avow.isolation import judge
+from avow.isolation.subject import SubjectFailed
+from avow.language.sorts import FunctionSort, RealSort, Sort
+
+from . import tuning
+from .convention import (
+    EXACT,
+    SPECIAL,
+    Case,
+    Inputs,
+    Malformed,
+    as_plain,
+    as_value,
+    asked_with,
+    from_step,
+    pairs,
+    received,
+    sent_inputs,
+    told,
+    valuation,
+)
+from .exchange import QUESTION, Answer, Met, Pairs, Question, Tried
+from .export import ADVANCE, MACHINE
+from .judging import guarantee, judged
+from .tuning import APART, BATCH, REJECTED_CASES, SHRINKING_SECONDS
+from .unit import Unit
+
+# Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
+# and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
+setattr(providers, "is_local_module_file", lambda path: False)  # noqa: B010 - it is not exported
+
+Trace = list[Case]
+
+
+class _Stop(BaseException):
+    """The cases end early; its text is why. Hypothesis passes it through, or says `Flaky` in its place."""
+
+
+class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
+    """What is being made simpler fails here."""
+
+
+def main() -> None:
+    """``run.py CHANNEL SECONDS SEED``, in a folder with the test and the pickled question."""
+    channel, seconds, start = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
+    os.set_inheritable(channel, False)
+    adopt_orphans()
+    asked = pickle.loads(Path(QUESTION).read_bytes())
+    judge.say(channel, Bench(asked, seconds, start).answer())
+
+
+class Bench:
+    """One node's contract, a unit under test, and the counts of what was tried."""
+
+    def __init__(self, asked: Question, seconds: float, start: int) -> None:
+        self.asked, self.seed = asked, start
+        self.end = time.monotonic() + seconds
+        self.inputs = {p.name: p.sort for p in asked.inputs}
+        self.outputs = {p.name: p.sort for p in asked.outputs}
+        self.doubles = asked.numbers != EXACT
+        records = Records()
+        self.assumptions = tuple(judged(c.name, c.formula, records) for c in asked.assumptions)
+        self.guarantees = {c.name: guarantee(c.name, c.formula, records) for c in asked.guarantees}
+        self.keeper = Keeper(records.cells)
+        self.runs_counted = bool(records.cells)
+        patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
+        self.unit = Unit(asked, patience)
+        self.valid = self.rejected = self.undecided = self.replayed = self.runs = 0
+        self.traces: dict[str, Trace] = {}
+        """Guarantee → a run up to the step that breaks it; of a function, its one step."""
+        self.trace: Trace = []
+        self.crash: str = ""
+        self.crash_trace: Trace = []
+        self.silent = self.differs = ""
+        self.unsteady: Inputs | None = None
+        self.shrinking: str | None = None
+        """The guarantee that is being made to fail more simply; empty: the crash; None where cases are counted."""
+        self._why: str | None = None
+        """Why the cases ended early, if they did."""
+        self._over = False
+        """Whether the run is: a state machine does not go on after an assertion that failed."""
+        self._memory: dict[str, Value] = {}
+        self._drawn: Inputs = {}
+        self._found: dict[str, Value] | None = None
+        self._starts: list[Inputs] = []
+        self._hits: dict[str, list[int]] = {}
+        self._tables: dict[int, tuple[Any, Value]] = {}
+        self._module = self._loaded()
+        self._runs = hasattr(self._module, MACHINE)
+
+    # -- the generated test ------------------------------------------------------------------------------
+
+    def _loaded(self) -> ModuleType:
+        """The generated test, whose import finds the stand-in."""
+        stem = self.asked.path.stem
+        stand_in = ModuleType(stem)
+        made = _stand_in(self) if self.asked.driven else lambda **_: self._outputs_here(self._ask_here())
+        called = json.loads(self.asked.function)["class"] if self.asked.driven else self.asked.function
+        setattr(stand_in, called, made)
+        spec = importlib.util.spec_from_file_location("generated", Path(self.asked.test).resolve())
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        before = sys.modules.get(stem)
+        sys.modules[stem] = stand_in
+        spec.loader.exec_module(module)
+        if before is None:
+            del sys.modules[stem]
+        else:
+            sys.modules[stem] = before
+        return module
+
+    def _outputs_here(self, found: Mapping[str, Value]) -> dict[str, Any]:
+        """Outputs as the generated test has them."""
+        table = getattr(self._module, "Table", None)
+        return {name: as_plain(value, table) for name, value in found.items()}
+
+    def _ask_here(self) -> dict[str, Value]:
+        """The unit's outputs for the drawn inputs, if the assumptions certainly hold of these."""
+        if not self._assumed(self._drawn):
+            reject()
+        self._found = self.unit.advance(self._drawn)
+        return self._found
+
+    def _run_test(self, phases: tuple[Phase, ...]) -> None:
+        """The generated test's cases, each judged by `_case`."""
+        chosen = settings(
+            max_examples=tuning.MORE_CASES * self.asked.cases,
+            stateful_step_count=self.asked.length,
+            phases=phases,
+            database=None,  # Avow's ledger keeps what refuted
+            deadline=None,
+            print_blob=False,
+            report_multiple_bugs=False,
+            suppress_health_check=list(HealthCheck),
+        )
+        machine = getattr(self._module, MACHINE, None)
+        if machine is not None:
+            seed(self.seed)(get_state_machine_test(_observed(machine, self), settings=chosen))()
+            return
+        (test,) = (made for name, made in vars(self._module).items() if name.startswith("test_"))
+
+        def one(*nothing: Any, **drawn: Any) -> None:
+            self.begin()
+            self._case(drawn, lambda: test.hypothesis.inner_test(*nothing, **drawn))
+            if self._found is None:
+                reject()
+
+        strategies = test.hypothesis._given_kwargs
+        seed(self.seed)(chosen(given(**strategies)(one)))()
+
+    def begin(self) -> None:
+        """A run begins."""
+        self._end_run()
+        self.trace, self._over = [], False
+        self.keeper.restart()
+        self._hits = {name: list(g.hits) for name, g in self.guarantees.items()}
+        if self.asked.driven:
+            try:
+                self._memory = self.unit.begin()
+            except SubjectFailed as error:
+                self._crashed(str(error), [])
+
+    def _end_run(self) -> None:
+        if self.trace and self.shrinking is None:
+            self.runs += 1
+            for name, each in self.guarantees.items():
+                before = self._hits.get(name, each.hits)
+                each.run_hits = [n + (now > was) for n, now, was in zip(each.run_hits, each.hits, before, strict=True)]
+
+    def _case(self, drawn: Mapping[str, Any], test: Callable[[], None]) -> None:
+        """One case, or one step of a run: the test is called, and what came of it is judged."""
+        if self._over:
+            return
+        if time.monotonic() > self.end:
+            raise self._stop("time")
+        if self.shrinking is None and self.valid >= self.asked.cases and self._all_met():
+            raise self._stop()
+        self._found = None
+        complaint = ""
+        try:
+            names = self.asked.names
+            self._drawn = self._memory | {
+                port: self._value(drawn[names[port]], sort)
+                for port, sort in self.inputs.items()
+                if names[port] in drawn
+            }
+            test()
+        except UnsatisfiedAssumption:
+            pass
+        except SubjectFailed as error:
+            self._crashed(str(error), [*self.trace, (self._drawn, {})])
+        except Exception as error:  # whatever the test's own lines raise, it is no agreement
+            complaint = str(error) or type(error).__name__
+        if self._found is None:
+            self.rejected += self.shrinking is None
+            if self.rejected > REJECTED_CASES * max(self.valid, 50):
+                raise self._stop("assumptions")
+            return
+        self._judge(self._drawn, self._found, complaint)
+
+    def _stop(self, why: str = "") -> _Stop:
+        self._why = why
+        return _Stop(why)
+
+    def _value(self, given: Any, sort: Sort) -> Value:
+        """The contract's value; a large table of the scenario comes in half of the cases."""
+        if not isinstance(sort, FunctionSort):
+            return as_value(given, sort)
+        if id(given) not in self._tables:
+            self._tables[id(given)] = (given, as_value(given, sort))
+        return self._tables[id(given)][1]
+
+    def _all_met(self) -> bool:
+        """Whether each condition was met, as far as there is hope."""
+        unmet = any(0 in each.hits for each in self.guarantees.values())
+        return not unmet or self.valid >= tuning.MORE_CASES * self.asked.cases
+
+    def _judge(self, inputs: Inputs, found: dict[str, Value], complaint: str) -> None:
+        values = self.keeper.at(valuation(inputs, found))
+        self.trace.append((inputs, found))
+        self.keeper.advance(valuation(inputs, found))
+        self._memory = self.unit.memory(found)
+        if self.shrinking is not None:
+            if self.shrinking and self.guarantees[self.shrinking].judged.holds(values) is False:
+                self.traces[self.shrinking] = list(self.trace)
+                raise _Broken
+            return
+        self.valid += 1
+        self._over = self._runs and bool(complaint)
+        if len(self.trace) == 1 and len(self._starts) < APART:
+            self._starts.append(inputs)
+        held = {name: g.judged.holds(values) for name, g in self.guarantees.items()}
+        for name, each in self.guarantees.items():
+            for k, trigger in enumerate(each.triggers):
+                each.hits[k] += trigger.holds(values) is True
+                if not each.hits[k] and each.parts[k] and not self._runs:
+                    target(sum(part.holds(values) is True for part in each.parts[k]), label=f"{name} {k}")
+            each.undecided += held[name] is None
+            if held[name] is False:
+                self.traces.setdefault(name, list(self.trace))
+        asserted = [held[name] for name in held if name not in self.asked.untranslated]
+        if None not in asserted and bool(complaint) is not (False in asserted):
+            self.differs = self.differs or f"{told(inputs, found)}: {complaint or 'it asserts nothing against it'}"
+        if len(self.traces) == len(self.guarantees):
+            raise self._stop()
+
+    def _crashed(self, why: str, trace: Trace) -> None:
+        if self.shrinking:
+            reject()
+        self.crash, self.crash_trace = why, trace
+        raise _Broken if self.shrinking == "" else self._stop("crash")
+
+    # -- judging -----------------------------------------------------------------------------------------
+
+    def _assumed(self, inputs: Inputs) -> bool:
+        values = self.keeper.at(valuation(inputs, {}))
+        held = [assumption.holds(values) for assumption in self.assumptions]
+        self.undecided += None in held and False not in held
+        return all(one is True for one in held)
+
+    # -- what came of it ---------------------------------------------------------------------------------
+
+    def answer(self) -> Answer:
+        stopped, apart = "", list[tuple[Pairs, str]]()
+        try:
+            self._replay_kept()
+            stopped = self._sweep()
+            for name in list(self.traces):
+                self._simplify(name)
+            if self.crash and not self.unit.process.silent and not self.unit.process.fault:
+                self._simplify("")
+            if not self.crash and not self.unit.process.fault:
+                with contextlib.suppress(_Stop):
+                    self.unsteady = self.unsteady or self._asked_again()
+                    apart = self._asked_apart() if self.doubles else []
+                stopped = stopped or ("again" if time.monotonic() > self.end else "")
+        finally:
+            fault = self.unit.process.close()
+        if self.differs and not fault:
+            fault = f"the generated test and Avow judge a case differently, which is a fault of Avow ({self.differs})"
+        trace = tuple(pairs(*step) for step in self.crash_trace)
+        return Answer(
+            self.valid, self.replayed, self.rejected, self.undecided, stopped, self.asked.left_out,
+            self.unit.process.observed(), self.unit.process.isolation, tuple(apart),
+            pairs(self.unsteady, {}) if self.unsteady is not None else None, self.silent or self.unit.process.silent,
+            (trace[-1] if trace else (), self.crash) if self.crash else None, trace if self.asked.source else None,
+            self.runs if self.runs_counted else None, {name: self._tried(name) for name in self.guarantees}, fault,
+        )  # fmt: skip
+
+    def _sweep(self) -> str:
+        """The cases that count; why they ended early, if they did."""
+        self._why = None
+        try:
+            self._run_test((Phase.generate, Phase.target))
+        except (_Stop, Flaky):
+            if self._why is None:
+                raise
+            return self._why
+        except (Unsatisfiable, FailedHealthCheck):
+            return "assumptions"
+        finally:
+            self._end_run()
+            self.trace = []
+        return ""
+
+    def _simplify(self, name: str) -> None:
+        """The simplest run that breaks a guarantee (or in which the unit fails), as far as Hypothesis finds it in time,
+        and as it comes about in a process of its own."""
+        first, end = self.traces.get(name, []), self.end
+        self.shrinking, self.end = name, min(end, time.monotonic() + SHRINKING_SECONDS)
+        with contextlib.suppress(_Broken, _Stop, Flaky, Unsatisfiable, FailedHealthCheck):
+            self._run_test((Phase.generate, Phase.shrink))
+        self.shrinking, self.end = None, end
+        if not name:
+            return
+        for trace in (self.traces[name], first):
+            with self._twin():
+                again = self._replayed([inputs for inputs, _ in trace], name)
+            if again is not None:
+                self.traces[name] = again
+                return
+        self.unsteady = self.traces.pop(name)[-1][0]
+
+    @contextlib.contextmanager
+    def _twin(self) -> Iterator[Unit]:
+        """Another process of the unit, which takes its place."""
+        first, self.unit = self.unit, Unit(self.asked, self.unit.patience)
+        try:
+            yield self.unit
+        finally:
+            twin, self.unit = self.unit.process, first
+            twin.close()
+            first.process.fault = first.process.fault or twin.fault
+            self.silent = self.silent or twin.silent
+
+    def _replayed(self, steps: Sequence[Inputs], name: str) -> Trace | None:
+        """The run of these steps up to one that breaks the guarantee, if one does and all before it are allowed."""
+        trace: Trace = []
+        self.keeper.restart()
+        try:
+            memory = self.unit.begin()
+            for step in steps:
+                inputs = {**step, **memory}
+                if inputs.keys() != self.inputs.keys() or not self._assumed(inputs):
+                    return None
+                found = self.unit.advance(inputs)
+                trace.append((inputs, found))
+                if self.guarantees[name].judged.holds(self.keeper.at(valuation(inputs, found))) is False:
+                    return trace
+                self.keeper.advance(valuation(inputs, found))
+                memory = self.unit.memory(found)
+        except SubjectFailed:
+            return None
+        return None
+
+    def _replay_kept(self) -> None:
+        """First of all, whatever the seed, what refuted a guarantee before; as far as it is still a case."""
+        for run in self.asked.kept:
+            steps: list[Inputs] = []
+            with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
+                for step in run:
+                    plain = {n: from_step(step[n]) if self.asked.driven else step[n] for n in self.inputs if n in step}
+                    steps.append({n: received(v, self.inputs[n], n) for n, v in plain.items()})
+            if len(steps) == len(run):
+                self.replayed += 1
+                for name in self.guarantees:
+                    trace = self._replayed(steps, name) if name not in self.traces else None
+                    if trace is not None:
+                        self.traces[name] = trace
+
+    def _asked_again(self) -> Inputs | None:
+        """Inputs to which another process, asked the same from its start, gives another answer: what comes of clock,
+        chance or place in memory is no function of what was recorded."""
+        requests = self.unit.requests
+        with self._twin() as twin:
+            for at in range(0, len(requests), BATCH):
+                if time.monotonic() > self.end:
+                    raise _Stop("again")
+                before = requests[at : at + BATCH]
+                again = twin.process.ask_all([request for request, _ in before])
+                for (request, reply), other in itertools.zip_longest(before, again):
+                    if twin.differ(reply, str(other) if isinstance(other, SubjectFailed) else other):
+                        return twin.inputs_of(request)
+        return None
+
+    def _asked_apart(self) -> list[tuple[Pairs, str]]:
+        """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
+        found: dict[str, tuple[Pairs, str]] = {}
+        reals = [n for n, s in self.inputs.items() if n not in self.asked.held and isinstance(s, RealSort)]
+        with self._twin():
+            for inputs in self._starts:
+                for name, (word, text) in itertools.product(reals, SPECIAL.items()):
+                    if time.monotonic() > self.end:
+                        raise _Stop("again")
+                    zero = {**inputs, name: Fraction(0)}
+                    self.keeper.restart()
+                    why = self._wrong_apart(zero, name, text) if self._assumed(zero) else ""
+                    if why:
+                        found.setdefault(why, (asked_with(zero, name, word), why))
+        return list(found.values())
+
+    def _wrong_apart(self, inputs: Inputs, name: str, text: str) -> str:
+        """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
+        try:
+            self.unit.begin()
+            found = self.unit.advance(inputs, {name: text})
+        except SubjectFailed as error:
+            return str(error)
+        values = self.keeper.at(valuation(inputs, found))
+        about = [g for g in self.guarantees.values() if text == SPECIAL["-0"] or name not in g.judged.ports]
+        return "; ".join(f"{g.judged.name} is broken" for g in about if g.judged.holds(values) is False)
+
+    def _tried(self, name: str) -> Tried:
+        each = self.guarantees[name]
+        counts = zip(each.triggers, each.hits, each.run_hits, strict=True)
+        found = Tried(tuple(Met(t.text, *met) for t, *met in counts), each.undecided)
+        trace = self.traces.get(name)
+        if trace is None:
+            return found
+        if self.asked.driven:
+            case: Any = [self.unit.step_of(inputs) for inputs, _ in trace]
+        else:
+            steps = [sent_inputs(inputs) for inputs, _ in trace]
+            case = steps if self.runs_counted else steps[0]
+        shown = tuple(pairs(*step) for step in trace)
+        return replace(found, failure=shown[-1], trace=shown if len(shown) > 1 else (), case=case)
+
+
+def _stand_in(bench: Bench) -> type:
+    """A class in place of the one under test, which lives in its own process."""
+
+    class StandIn:
+        def __init__(self, *_: Any) -> None:
+            bench.begin()
+
+        def step(self, **_: Any) -> dict[str, Any]:
+            return bench._outputs_here(bench._ask_here())
+
+        def __getattr__(self, attribute: str) -> Any:
+            ports = [port for port, held in bench.asked.held.items() if held == attribute]
+            known = bench._found or bench._memory
+            values = [known[port] for port in ports if port in known]
+            if not values:
+                raise AttributeError(attribute)
+            return bench._outputs_here({"": values[0]})[""]
+
+    return StandIn
+
+
+def _observed(machine: Any, bench: Bench) -> Any:
+    """The generated state machine, each of whose steps the bench judges."""
+
+    class Observed(machine):  # type: ignore[misc]
+        def __init__(self) -> None:
+            if not bench.asked.driven:
+                bench.begin()
+            super().__init__()
+
+    def advance(self: Any, **drawn: Any) -> None:
+        bench._case(drawn, lambda: getattr(super(Observed, self), ADVANCE)(**drawn))
+
+    setattr(Observed, ADVANCE, advance)
+    return Observed

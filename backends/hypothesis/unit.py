@@ -1,0 +1,115 @@
+"""The unit under test, in a process of its own: what it is given, and what it answers, in the contract's values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from avow.formulas.values import Value
+from avow.isolation.subject import SubjectFailed, SubjectProcess
+
+from .convention import EXACT, Inputs, Malformed, as_step, from_step, outputs, received, sent_inputs
+from .exchange import Question
+from .tuning import ASKED_AGAIN
+
+
+class Unit:
+    """A function, or an object of a driven class."""
+
+    def __init__(self, asked: Question, patience: float) -> None:
+        self.asked, self.patience = asked, patience
+        self.process = SubjectProcess(asked.path, asked.function, patience, asked.root)
+        self.inputs = {p.name: p.sort for p in asked.inputs}
+        self.outputs = {p.name: p.sort for p in asked.outputs}
+        self.doubles = asked.numbers != EXACT
+        self.requests: list[tuple[Any, Any]] = []
+        """The first requests, with the replies."""
+
+    def begin(self) -> dict[str, Value]:
+        """A new run of a new object; its memory. Raises SubjectFailed."""
+        return self._held(self._drive({"steps": []})["held"]) if self.asked.driven else {}
+
+    def advance(self, inputs: Inputs, instead: Mapping[str, str] | None = None) -> dict[str, Value]:
+        """One step's outputs, with memory among them; `instead`: floats for some inputs. Raises SubjectFailed."""
+        if not self.asked.driven:
+            taken = {n: v for n, v in inputs.items() if self.asked.accepted is None or n in self.asked.accepted}
+            given = sent_inputs(taken, doubles=self.doubles)
+            return self.read(self.request(given | {n: {"r": text} for n, text in (instead or {}).items()}))
+        step = self.step_of(inputs) | {n: {"f": text} for n, text in (instead or {}).items()}
+        (answer,) = self._drive({"on": True, "steps": [step]})["steps"]
+        if "error" in answer:
+            raise SubjectFailed(f"the step raises {answer['why']}")
+        returned = {n: s for n, s in self.outputs.items() if n not in self.asked.held}
+        unread = [name.removeprefix("out.") for name in self.asked.left_out if name.startswith("out.")]
+        try:
+            found = outputs(from_step(answer["value"], unread), returned) if returned else {}
+            held = {n: v for n, v in answer["memory"].items() if n in self.outputs}
+            return found | {n: received(from_step(v), self.outputs[n], f"out.{n}") for n, v in held.items()}
+        except (Malformed, ValueError, TypeError, KeyError) as error:
+            raise SubjectFailed(str(error)) from error
+
+    def memory(self, found: Mapping[str, Value]) -> dict[str, Value]:
+        """What it holds after a step with these outputs."""
+        names = [n for n in self.asked.held if n in self.inputs]
+        if all(n in found for n in names):
+            return {n: found[n] for n in names}
+        return self._held(self._drive({"on": True, "steps": []})["held"])
+
+    def step_of(self, inputs: Inputs) -> dict[str, Any]:
+        """Inputs as a driven class is given them."""
+        return {n: as_step(v, doubles=self.doubles) for n, v in inputs.items() if n not in self.asked.held}
+
+    def request(self, request: Any) -> Any:
+        """The reply to a request. Raises SubjectFailed."""
+        reply: Any = self.process.ask_all([request])[0]
+        if len(self.requests) < ASKED_AGAIN:
+            self.requests.append((request, str(reply) if isinstance(reply, SubjectFailed) else reply))
+        if isinstance(reply, SubjectFailed):
+            raise reply
+        return reply
+
+    def read(self, reply: Any) -> dict[str, Value]:
+        """A function's outputs. Raises SubjectFailed."""
+        if isinstance(reply, SubjectFailed):
+            raise reply
+        try:
+            return outputs(reply, self.outputs)
+        except Malformed as error:
+            raise SubjectFailed(str(error)) from error
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise SubjectFailed("the unit's answer cannot be read") from error
+
+    def inputs_of(self, request: Mapping[str, Any]) -> Inputs:
+        """What a request gave, as far as it can be read."""
+        plain = request if not self.asked.driven else (json.loads(request["case"])["steps"] or [{}])[0]
+        found: Inputs = {}
+        for name, data in plain.items():
+            try:
+                found[name] = received(from_step(data) if self.asked.driven else data, self.inputs[name], name)
+            except (Malformed, ValueError):
+                continue
+        return found
+
+    def differ(self, one: Any, other: Any) -> bool:
+        """Whether two replies mean different outputs."""
+        if self.asked.driven or isinstance(one, str) or isinstance(other, str):
+            return bool(one != other)
+        try:
+            return self.read(one) != self.read(other)
+        except SubjectFailed:
+            return True
+
+    def _drive(self, case: Mapping[str, Any]) -> Any:
+        """What the driver of a class answers."""
+        reply = self.request({"case": json.dumps(case)})
+        if not isinstance(reply, str):
+            raise SubjectFailed("the class cannot be driven")
+        return json.loads(reply)
+
+    def _held(self, data: Mapping[str, Any]) -> dict[str, Value]:
+        names = [n for n in self.asked.held if n in self.inputs]
+        try:
+            return {n: received(from_step(data[n]), self.inputs[n], f"in.{n}") for n in names}
+        except Malformed as error:
+            raise SubjectFailed(f"in memory, {error}") from error

@@ -1,0 +1,137 @@
+"""Rates of failure of requirements that rest on samples: composed, shown, gated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from assurance.sample import case, evidence, guarantee, node_plan, system
+from avow.assurance.case import conclude_again
+from avow.assurance.model import Case
+from avow.base.codec import from_json, to_json
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
+from avow.evidence.record import RATE, Evidence
+from avow.report import formats
+from avow.report.explained import explained
+from avow.report.short import terminal_lines
+from avow.system.plan import Requirement
+
+
+def sampled(of: str, bound: str = "0.086", trials: int = 34, **more: Any) -> Evidence:
+    strata = [{"name": "", "trials": trials, "failures": 0, "bound": bound, "confidence": "0.95"}]
+    return evidence(of, Verdict.TESTED, "experiment", details={RATE: strata, **more})
+
+
+def three(*records: Evidence, policy: Any = None, criticality: str = "medium") -> Case:
+    """A requirement that rests on one guarantee of each of three nodes."""
+    names = ("a", "b", "c")
+    subject = system(
+        {name: ["g"] for name in names},
+        plans=[node_plan(name, criticality, "experiment", "hypothesis", "hoare") for name in names],
+        requirements=[Requirement("R", "All is well.", None, None, tuple(f"{name}.g" for name in names))],
+        policy=policy,
+    )
+    return case(subject, [guarantee(name, "g") for name in names], records)
+
+
+ALL = (sampled("a.g"), sampled("b.g"), sampled("c.g"))
+
+
+def test_three_nodes_at_8_6_percent_give_25_8_percent_at_joint_confidence() -> None:
+    requirement = three(*ALL).requirements[0]
+    assert requirement.rate is not None
+    assert (requirement.rate.bound, requirement.rate.confidence) == ("0.258", "0.85")
+    assert "at most 25.8 % of trials fail, at 85 % confidence" in requirement.answer
+    assert len(requirement.rate.leaves) == 3
+    assert not requirement.rate.unrated
+
+
+def test_a_leaf_that_is_proved_takes_no_part() -> None:
+    requirement = three(sampled("a.g"), evidence("b.g"), evidence("c.g")).requirements[0]
+    assert requirement.rate is not None
+    assert requirement.rate.bound == "0.086"
+    assert three(evidence("a.g"), evidence("b.g"), evidence("c.g")).requirements[0].rate is None
+
+
+def test_of_two_samples_of_a_claim_the_worse_counts() -> None:
+    twice = replace(sampled("a.g", "0.2"), method="experiment-2", key="k")
+    requirement = three(*ALL, twice).requirements[0]
+    assert requirement.rate is not None
+    assert requirement.rate.bound == "0.372"
+
+
+@pytest.mark.parametrize("method", ["hypothesis", "rosmonitoring"])
+def test_a_leaf_that_is_sampled_without_a_rate_leaves_none(method: str) -> None:
+    other = evidence("c.g", Verdict.TESTED if method == "hypothesis" else Verdict.MONITORED, method)
+    requirement = three(sampled("a.g"), sampled("b.g"), other).requirements[0]
+    assert requirement.rate is not None
+    assert not requirement.rate.bound
+    assert "none can be given; shown by tests without a rate: c.g" in requirement.answer
+
+
+@pytest.mark.parametrize("wrong", [{"bound": "0.08"}, {"trials": 33}, {"bound": "-1"}, {"bound": "x"}])
+def test_a_record_that_says_more_than_its_sample_shows_gives_no_rate(wrong: dict[str, Any]) -> None:
+    requirement = three(sampled("a.g", **wrong), *ALL[1:]).requirements[0]
+    assert requirement.rate is not None
+    assert not requirement.rate.bound
+
+
+def gate(found: Case) -> tuple[bool, str]:
+    return next((g.passed, g.reason) for g in found.gates if g.id == "rates")
+
+
+def test_the_policy_limits_the_rate_by_criticality() -> None:
+    assert not any(g.id == "rates" for g in three(*ALL).gates)
+    sure = [sampled(f"{n}.g", "0.13", 40) for n in "abc"]
+    for record in sure:  # at 98 % each, 94 % together
+        record.details[RATE][0]["confidence"] = "0.98"
+    assert gate(three(*sure, policy={"max_failure_rate": {"medium": 0.4}}))[0]
+    for limit in ({"medium": 0.3}, {"low": 0.3}, {"medium": 0.4, "low": 0.3}):
+        passed, why = gate(three(*sure, policy={"max_failure_rate": limit}))
+        assert not passed
+        assert "at most 39 % of trials fail" in why
+        assert "at most 30 % is allowed" in why
+    assert gate(three(*sure, policy={"max_failure_rate": {"high": 0.3}}))[0]  # nothing is as critical
+
+
+def test_a_limit_asks_for_joint_confidence_and_for_a_rate() -> None:
+    limit = {"max_failure_rate": {"medium": 0.3}}
+    passed, why = gate(three(*ALL, policy=limit))
+    assert not passed
+    assert "a confidence of 90 % is asked" in why
+    passed, why = gate(three(*ALL[:2], evidence("c.g", Verdict.TESTED, "hypothesis"), policy=limit))
+    assert not passed
+    assert "none can be given" in why
+
+
+@pytest.mark.parametrize("data", [0.1, {"medium": 0}, {"medium": 1}, {"medium": "much"}, {"grave": 0.1}])
+def test_a_limit_is_a_number_by_criticality(data: Any) -> None:
+    with pytest.raises(Rejected):
+        three(*ALL, policy={"max_failure_rate": data})
+
+
+SAYS_NO_STANDING = {
+    *("report.sarif", "findings.sarif", "junit.xml", "attestation.jsonl"),  # of claims and gates, not of requirements
+    *("traceability.html", "traceability.csv"),  # of what requirements lead to
+    "gsn.svg",  # boxes with a word each
+}
+
+
+def test_every_format_that_says_how_a_requirement_stands_says_its_rate() -> None:
+    found = three(*ALL)
+    for name, content in formats(found):
+        if isinstance(content, str) and name not in SAYS_NO_STANDING:
+            rate = '"bound": "0.258"' if name == "report.json" else "at most 25.8 % of trials fail, at 85 % confidence"
+            plain = " ".join(content.replace("\\%", "%").replace("\\", "").replace("&nbsp;", " ").split())
+            assert rate in plain, name
+    assert any("at most 25.8 % of trials fail" in line for line in terminal_lines(found))
+    assert any("at most 25.8 % of trials fail" in line for _, lines in explained(found, "R") for line in lines)
+
+
+def test_the_samples_in_a_report_are_the_certificate() -> None:
+    found = three(*ALL)
+    read = from_json(Case, to_json(found))
+    assert read.requirements == found.requirements == conclude_again(read).requirements

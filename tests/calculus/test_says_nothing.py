@@ -1,0 +1,79 @@
+"""A formula that every design meets shows nothing, whoever proves it; one that says something is not called empty."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.base.verdict import Outcome, Verdict
+from calculus.make import make, outcomes
+
+RCL = """
+node sensor { inputs( r : REAL ) outputs( level : NATURAL ) topics()
+  assume counts ( 0 <= in.r )
+  guarantee low ( in.r < 10 -> out.level == 0 )
+  guarantee high ( in.r >= 10 -> out.level == 1 ) }
+node brake { inputs( level : NATURAL ) outputs( on : BOOL ) topics()
+  guarantee pulls ( in.level == 1 -> out.on )
+  guarantee idle ( in.level == 0 -> not out.on ) }
+"""
+PLAN = """
+environment: {{sensor.r: {{assume: "0 <= in.r", because: it counts}}}}
+scenario: {{domains: {{sensor.r: [0, 10, 20]}}, steps: 3}}
+requirements:
+  R: {{text: The robot brakes, {0}}}
+"""
+
+
+def asked(folder: Path, what: str) -> Outcome:
+    return outcomes(make(folder, RCL, PLAN.format(what)))["R"]
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        ('formula: "TRUE"', "tautology"),
+        ('formula: "brake.on or not brake.on"', "tautology"),
+        ('formula: "sensor.r >= 10 -> sensor.r >= 5"', "tautology"),
+        ('formula: "0 <= sensor.r"', "follows from the assumptions alone"),
+        ('formula: "sensor.r < 0 -> brake.on"', "follows from the assumptions alone"),
+        ('formula: "previous(0 <= sensor.r, TRUE) and 0 <= sensor.r"', "follows from the assumptions alone"),
+        ('formula: "sensor.level == 2 and sensor.r < 10 -> brake.on"', "its condition never comes about"),
+        ('formula: "(sensor.r >= 10 -> brake.on) and (sensor.level > 3 -> brake.on)"', "condition never comes about"),
+        ('formula: "not (sensor.level > 1) or brake.on"', "its condition never comes about"),
+        ('formula: "sensor.r >= 10 -> brake.on", supported_by: [brake.idle]', "needs none of the guarantees"),
+        ('temporal: "always (brake.on or not brake.on)"', "holds of every run, whatever the nodes do"),
+        ('temporal: "eventually (0 <= sensor.r)"', "holds of every run, whatever the nodes do"),
+        ('temporal: "(eventually brake.on) or always not brake.on"', "holds of every run, whatever the nodes do"),
+        ('temporal: "always (sensor.level == 2 -> eventually brake.on)"', "never comes about on any run"),
+        ('temporal: "always (sensor.level == 2 -> brake.on)"', "never comes about on any run"),
+    ],
+)  # fmt: skip
+def test_what_every_design_meets_is_no_requirement(tmp_path: Path, what: str, why: str) -> None:
+    outcome = asked(tmp_path, what)
+    assert outcome.vacuous
+    assert outcome.summary.startswith("says nothing: ")
+    assert why in outcome.summary
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        'formula: "sensor.r >= 10 -> brake.on"',
+        'formula: "sensor.r >= 10 <=> brake.on"',
+        'formula: "not (brake.on and sensor.r < 10)"',
+        'formula: "sensor.level <= 1"',
+        'formula: "sensor.level == brake.in.level"',
+        'formula: "sensor.r >= 10 -> brake.on", supported_by: [sensor.high, brake.pulls]',
+        'formula: "sensor.r >= 10 -> brake.on", supported_by: [brake]',
+        'formula: "previous(sensor.r >= 10, FALSE) -> sensor.r >= 10 or not brake.on"',
+        'temporal: "always (sensor.r >= 10 -> brake.on)"',
+        'temporal: "always not (brake.on and sensor.r < 10)"',
+        'temporal: "always (sensor.level == 1 -> brake.on)"',
+    ],
+)
+def test_what_some_design_would_break_is_one(tmp_path: Path, what: str) -> None:
+    outcome = asked(tmp_path, what)
+    assert outcome.verdict in (Verdict.PROVED, Verdict.CHECKED), outcome.summary
+    assert not outcome.vacuous, outcome.summary

@@ -1,0 +1,110 @@
+"""What is assumed of the environment can go on for ever, and leaves room for what guarantees are about."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.base.verdict import Outcome, Verdict
+from avow.language.load import check_text
+from avow.sanity.analysis import analyse
+from calculus.make import make, node, outcomes
+
+COUNTS = "in.x == previous(in.x, 0) + 1"
+DYING = {
+    "counts up to a limit": (f"{COUNTS} and in.x <= 3", "x : INTEGER"),
+    "never the same twice, of two": ("in.x != previous(in.x, FALSE) and not once(rose(in.x))", "x : BOOL"),
+    "held for ever, and not for long": ("in.x and not held[5 steps](in.x)", "x : BOOL"),
+    "contradicts itself": ("in.x > 3 and in.x < 2", "x : REAL"),
+}
+LIVING = {
+    "counts": (COUNTS, "x : INTEGER"),
+    "comes back": ("abs(in.x - previous(in.x, in.x)) <= 1 and in.x <= 3", "x : REAL"),
+    "not for long": ("not held[5 steps](in.x)", "x : BOOL"),
+}
+
+
+def found(folder: Path, assumed: str, port: str, more: str = "") -> dict[str, Outcome]:
+    plan = f"environment: {{in.x: {{assume: '{assumed}', because: it is so}}}}\n"
+    plan += "requirements: {R: {text: never, formula: 'not n.y'}}\n"
+    return outcomes(make(folder, node("n", port, "y : BOOL", f"G: out.y or not out.y{more}"), plan))
+
+
+@pytest.mark.parametrize("name", DYING)
+def test_an_environment_that_comes_to_an_end_supports_nothing(name: str, tmp_path: Path) -> None:
+    outcome = found(tmp_path, *DYING[name])["environment.in.x"]
+    assert outcome.vacuous
+    assert "for ever" in outcome.summary
+
+
+@pytest.mark.parametrize("name", LIVING)
+def test_one_that_goes_on_is_supposed(name: str, tmp_path: Path) -> None:
+    outcome = found(tmp_path, *LIVING[name])["environment.in.x"]
+    assert (outcome.verdict, outcome.vacuous) == (Verdict.JUSTIFIED, False)
+
+
+def test_what_nodes_assume_of_the_environment_counts_too(tmp_path: Path) -> None:
+    nodes = [
+        node(n, "x : INTEGER", f"{n}y : BOOL", f"A: {a}", "G: TRUE") for n, a in (("n", COUNTS), ("m", "in.x <= 3"))
+    ]
+    for name, text, ends in (("both", "\n".join(nodes), True), ("one", nodes[0], False)):
+        answers = outcomes(make(tmp_path / name, text, "environment: {in.x: {because: one wire}}\n"))
+        assert answers["environment.n.A1"].vacuous is ends
+
+
+@pytest.mark.parametrize("name", [*DYING, *LIVING])
+def test_a_nodes_own_assumptions_are_asked_the_same(name: str) -> None:
+    assumed, port = (DYING | LIVING)[name]
+    contract, faults = check_text(node("n", port, "y : BOOL", f"A: {assumed}", "G: out.y"), "n.rcl")
+    assert contract is not None, faults
+    results = {result.name: result.verdict for result in analyse(contract.nodes[0])}
+    assert results["assumptions-satisfiable"] is (Verdict.REFUTED if name in DYING else Verdict.PROVED)
+
+
+@pytest.mark.parametrize(("assumed", "excluded"), [("in.r < 120", True), ("in.r < 130", False)])
+def test_an_environment_in_which_a_guarantee_is_about_nothing_supports_nothing(
+    assumed: str, excluded: bool, tmp_path: Path
+) -> None:
+    text = node("n", "r : REAL", "y : BOOL", "A: in.r >= 0", "G high: in.r >= 120 -> out.y")
+    plan = f"environment: {{in.r: {{assume: '0 <= in.r and {assumed}', because: it is so}}}}\n"
+    outcome = outcomes(make(tmp_path, text, plan))["environment.in.r"]
+    assert outcome.vacuous is excluded
+    assert ("n.high" in outcome.summary) is excluded
+
+
+OVER_RUNS = {
+    "a response": ("p : BOOL", "in.p -> next(out.y)", {"p": "not in.p"}),
+    "a response until": ("p, q : BOOL", "in.p -> out.y until in.q", {"p": "not in.p"}),
+    "once": ("x : REAL", "once(in.x > 5) -> out.y", {"x": "in.x < 3"}),
+    "held": ("p : BOOL", "held[2 steps](in.p) -> out.y", {"p": "in.p -> next(not in.p)"}),
+    "two that alternate": (
+        "p, q : BOOL",
+        "(in.p and in.q) -> out.y",
+        {"p": "in.p == previous(not in.p, TRUE)", "q": "in.q == previous(not in.q, FALSE)"},
+    ),
+    "a constant": (
+        "x, k : INTEGER",
+        "in.x != previous(in.x, in.x) -> out.y",
+        {"x": "", "k": "in.k > previous(in.k, 0)"},
+    ),
+}
+"""Ports, a guarantee, and what is assumed of each input; nothing: that it is constant."""
+
+
+@pytest.mark.parametrize("name", OVER_RUNS)
+def test_a_condition_that_no_run_of_the_environment_meets_is_found(name: str, tmp_path: Path) -> None:
+    ports, guarantee, assumed = OVER_RUNS[name]
+    text = node("n", ports, "y : BOOL", f"G g: {guarantee}")
+
+    def asked(said: dict[str, str], folder: Path) -> list[Outcome]:
+        keys = {p: f"assume: '{a}'" if a else "constant: true" for p, a in said.items()}
+        rows = [f"in.{p}: {{{key}, because: so}}" for p, key in keys.items()]
+        answers = outcomes(make(folder, text, f"environment: {{{', '.join(rows)}}}\n"))
+        return [outcome for key, outcome in answers.items() if key.startswith("environment.")]
+
+    found = asked(assumed, tmp_path / "never")
+    assert found
+    assert all(outcome.vacuous and "n.g" in outcome.summary for outcome in found)
+    free = asked({p: f"in.{p} == in.{p}" for p in assumed}, tmp_path / "free")
+    assert not any(outcome.vacuous for outcome in free)

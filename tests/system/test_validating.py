@@ -1,0 +1,65 @@
+"""`avow validate` writes a validation into plan.yaml, whatever style the entry has, and nothing else changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.cli import main
+from avow.system.load import load_system
+
+RCL = "node a { inputs( r : REAL ) outputs( x : REAL ) topics() guarantee g ( out.x <= 5 ) }\n"
+OLD = "confirmed: {who: B. Person, on: 2020-01-01, sentence: x}"
+STYLES = {
+    "block": "requirements:\n  R:\n    text: It is low.  # said so\n    formula: a.x <= 5\n\n# the end\n",
+    "block, at the end": "requirements:\n  R:\n    text: >-\n      It is\n      low.\n    formula: a.x <= 5",
+    "flow": 'requirements: {R: {text: It is low., formula: "a.x <= 5"}}\n',
+    "validated before": "requirements:\n  R:\n    text: It is low.\n    formula: a.x <= 5\n"
+    "    validation:\n      because: it is so\n      who: B. Person\n      date: 2020-01-01\n",
+    "validated before, flow": 'requirements: {R: {text: Low., formula: "a.x <= 5", '
+    "validation: {who: B. P., date: 2020-01-01}}}\n",
+    "of the last release": f"requirements:\n  R:\n    text: It is low.\n    {OLD}\n    formula: a.x <= 5\n"
+    "    amounts:\n      says: It is low enough\n      because: it is so\n      who: B. Person\n"
+    "      date: 2020-01-01\n      until: 2030-01-01\n\npolicy: default\n",
+}  # fmt: skip
+
+
+def cli(*words: str | Path) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(list(map(str, words)))
+    return int(ended.value.code or 0)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_validation_is_written_and_counts(tmp_path: Path, style: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "system.rcl").write_text(RCL)
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(STYLES[style])
+    assert not load_system(tmp_path).plan.requirements[0].validated
+    assert cli("validate", tmp_path) == 0
+    assert "formula: a.x <= 5" in capsys.readouterr().out
+    assert cli("validate", tmp_path, "R", "--as", "A. Person") == 0
+    found = load_system(tmp_path).plan
+    assert found.requirements[0].validated
+    assert found.old_names == ()
+    assert found.requirements[0].validation is not None
+    assert found.requirements[0].validation.who == "A. Person"
+    assert ("because" in STYLES[style]) == any(s.because == "it is so" for s in found.statements)
+    kept = [line for line in STYLES[style].splitlines() if line.strip().startswith(("#", "text", "policy"))]
+    assert set(kept) <= set(plan.read_text().splitlines()) or "flow" in style
+    again = plan.read_text()
+    assert cli("validate", tmp_path, "R", "--as", "A. Person") == 0
+    assert plan.read_text() == again
+    plan.write_text(again.replace("<= 5", "<= 7"))
+    assert load_system(tmp_path).plan.requirements[0].outdated
+
+
+@pytest.mark.parametrize(("more", "code"), [(["Q", "--as", "A. B."], "CLI022"), (["R", "--as", "?"], "SIGN005")])
+def test_nobody_validates_what_is_not_there(
+    tmp_path: Path, more: list[str], code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "system.rcl").write_text(RCL)
+    (tmp_path / "plan.yaml").write_text(STYLES["flow"])
+    assert cli("validate", tmp_path, *more) == 2
+    assert code in capsys.readouterr().err
