@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.backends.fuzz import BACKEND, building
+from avow.backends.fuzz import BACKEND, building, clang_tool
 from avow.backends.fuzz.runner import Question, Show, _ended
 from avow.base.tools import Tool, find_tool
 from avow.base.verdict import Verdict
@@ -33,6 +33,7 @@ def test_clang_without_libfuzzer_is_not_run(monkeypatch: pytest.MonkeyPatch, tmp
     fake.write_text(f"#!/bin/sh\n[ $1 = --version ] && echo 'clang version 14.0.6' || echo {tmp_path}\n")
     fake.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(clang_tool, "zig", lambda: None)
     find_tool.cache_clear()
     try:
         outcomes = LIMITER.report(tmp_path / "robot").outcomes
