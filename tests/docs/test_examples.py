@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from golden.recorded import same, verdicts
 from helpers import some
 from report.first_screen import departures
 
@@ -17,6 +18,8 @@ from avow.assurance.codec import read_case
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs/examples"
+TOOLS = ("clang", "strace", "dafny")
+"""The recorded verdicts of the examples are those of a machine that has these."""
 VERDICTS = {
     "warehouse": "Shown by tests (with no bound on failures)",
     "ventilator": "Shown of models",
@@ -60,6 +63,11 @@ def test_the_examples_verify(tmp_path: Path) -> None:
         if shutil.which("chromium"):
             report = place / "reports" / name
             assert departures(read_case(report), (report / "index.html").read_text(), tmp_path) == [], name
+    if all(map(shutil.which, TOOLS)):
+        same(
+            "examples",
+            (line for name in sorted(VERDICTS) for line in verdicts(place / "reports" / name / "report.json")),
+        )
 
 
 def test_examples_and_what_init_makes_are_in_the_layout_that_the_hook_asks_for() -> None:

@@ -47,6 +47,7 @@ def _overflowing(body: str) -> Cpp:
     return replace(LIMITER, adapter=adapter("Limiter", 'node.vmax = given.real("vmax");', step))
 
 
+@pytest.mark.nightly
 def test_undefined_behaviour_ends_the_program(tmp_path: Path) -> None:
     cpp = _overflowing("volatile int big = 2147483647; volatile int more = big + 1; (void)more;")
     assert set(cpp.verdicts(tmp_path).values()) == {Verdict.REFUTED}

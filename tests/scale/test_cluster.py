@@ -148,7 +148,7 @@ def test_verify_on_a_cluster_says_what_verify_says(place: Workspace, machines: M
     assert said()[:2] == (code, there)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_nobody_can_do_any_more_is_not_waited_for(
     place: Workspace, machines: Machines, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
