@@ -10,7 +10,7 @@ from typing import Any
 from avow.backend_kit.given import existing_file, file, schema, text
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.plain import exact
+from avow.base.plain import alike, exact
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.language.sorts import BOOL, REAL, Sort
@@ -278,10 +278,15 @@ class _Reader:
 
     def _grouped(self, table: Table, column: str) -> dict[str, list[Row]]:
         grouped, last = dict[str, list[Row]](), None
+        names = dict[str | Fraction, str]()
         for row in table.rows:
             name = row.cells[column]
             if not name:
                 self.found.append(table.fault(row.line, "EXP113", "the run has no name"))
+            if (other := names.setdefault(_identity(name), name)) != name:
+                message = f"'{name}' may be the run '{other}' of line {grouped[other][0].line}"
+                hint = "write the name of one run in one way, and give different runs names that differ by more"
+                self.found.append(table.fault(row.line, "EXP113", message, hint))
             if name in grouped and not (self.options.get("steps") and name == last):
                 first = grouped[name][0].line
                 message = f"a second run named '{name}'; the first is in line {first}"
@@ -308,6 +313,14 @@ class _Reader:
             message = f"run '{name}' has several conditions in column '{strata}': {', '.join(sorted(among))}"
             self.found.append(table.fault(rows[0].line, "EXP113", message))
         return Run(name, min(among), tuple({c: row.cells[c] for c in read} for row in rows), tuple(steps))
+
+
+def _identity(name: str) -> str | Fraction:
+    """Equal for names that a person reads as one: `1` and `01`, `Run 1` and `run 1`."""
+    try:
+        return exact(name)
+    except ValueError:
+        return re.sub(r"\d+", lambda number: str(int(number[0])), alike(name))
 
 
 def _sort(table: Table, column: str) -> Sort:

@@ -290,6 +290,8 @@ _FIELD_KEYS = (
     "topic", "type", "field", "fields", "each", "hold", "values", "elsewhere", "initial", "take", "nan", "inf",
 )  # fmt: skip
 _FUNCTION_KEYS = ("each", "hold")
+_NAMED = (s.EnumSort, s.DataSort, s.StringSort)
+"""The types of which a value may have a name of its own in a message."""
 
 
 def check_keys(entry: Mapping[str, Any], sort: s.Sort) -> None:
@@ -305,6 +307,8 @@ def check_keys(entry: Mapping[str, Any], sort: s.Sort) -> None:
     if "elsewhere" in entry and not isinstance(sort, s.FunctionSort) and not gaps and "take" not in entry:
         raise Wrong("'elsewhere' is for functions, and for what may have no reading (`nan: none`, `take`)", "elsewhere")
     parts = tuple(s.components(sort))
+    if "values" in entry and not any(isinstance(part, _NAMED) for part in parts):
+        raise Wrong(f"'values' gives names to values, and {_said(sort)} has none", "values")
     members = sorted({m for part in parts if isinstance(part, s.EnumSort) for m in part.members})
     if members and not any(isinstance(part, s.StringSort | s.DataSort) for part in parts):
         for name, word in entry.get("values", {}).items():
