@@ -1,40 +1,56 @@
-"""A plan with what it leaves to the contract: the guarantees of its methods, and what the names under a requirement's
-`supported_by` say there, which a confirmation covers."""
+"""A plan with what it leaves to the contract: the guarantees of its methods, and what the names in a requirement mean
+there, which a validation covers."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
 from avow.base.files import sha256
 from avow.language.contract import Contract, Node
-from avow.language.printer import show_sort, show_term
+from avow.language.printer import show_sort, show_term, show_type
 from avow.system.folding import leaves
-from avow.system.plan import Method, NodePlan, Plan, System
+from avow.system.plan import Method, NodePlan, Plan, Requirement, System
+
+_WORD = re.compile(r"\w+")
 
 
 def completed(plan: Plan, contract: Contract) -> System:
     """The system of a plan and its contract: each method that names no guarantee takes on all of its node's, and each
-    requirement knows what its links say: sentences, formulas (constants by their values) and the types of the ports
-    that they may speak of. White space, comments and the order of clauses say nothing."""
+    requirement knows what its words rest on.
+
+    For each node under `supported_by` these are its guarantees (or the one named) and assumptions, for each node that
+    the formula names its ports; for both the connections to the node and the types of ports; and the constants,
+    definitions and types that the formula names. White space, comments and the order of clauses make no difference.
+    """
     known = {node.name: node for node in contract.nodes}
     inside = leaves(plan)
     derived = {goal.name: goal.select for goal in plan.compose}
 
-    def said(name: str) -> Iterator[str]:
+    def supporting(name: str) -> Iterator[str]:
         owner, dot, clause = name.partition(".")
         if dot and owner in known:
-            yield from _said(known[owner], clause)
+            yield from _promised(known[owner], clause)
+            yield from _placed(known[owner], plan)
             return
         for part in derived.get(name, (name,)):
             for node in inside.get(part, (part,)):
                 if node in known:
-                    yield from _said(known[node])
+                    yield from _promised(known[node])
+                    yield from _placed(known[node], plan)
 
-    requirements = tuple(
-        replace(r, linked=sha256(repr(sorted({text for name in r.supported_by for text in said(name)}))))
-        for r in plan.requirements
-    )
+    def meant(requirement: Requirement) -> Iterator[str]:
+        for name in requirement.supported_by:
+            yield from supporting(name)
+        words = set(_WORD.findall(f"{requirement.formula or ''} {requirement.temporal or ''}"))
+        for node in words & known.keys():
+            yield from _placed(known[node], plan)
+        yield from (repr((name, show_term(value))) for name, value in contract.constants if name in words)
+        yield from (repr((name, show_type(sort))) for name, sort in contract.types if name in words)
+        yield from (repr((d.name, show_term(d.body))) for d in contract.definitions if d.name in words)
+
+    requirements = tuple(replace(r, linked=sha256(repr(sorted({*meant(r)})))) for r in plan.requirements)
 
     def taken_on(entry: NodePlan, method: Method) -> Method:
         own = known[entry.node].guarantees if entry.node in known else ()
@@ -46,9 +62,19 @@ def completed(plan: Plan, contract: Contract) -> System:
     return System(replace(plan, nodes=nodes, requirements=requirements), contract)
 
 
-def _said(node: Node, name: str | None = None) -> Iterator[str]:
-    clauses = [g for g in node.guarantees if name in (None, g.name)]
-    for clause in clauses:
+def _promised(node: Node, name: str | None = None) -> Iterator[str]:
+    """What a node guarantees, all of it or one clause, and under which assumptions."""
+    guarantees = [g for g in node.guarantees if name in (None, g.name)]
+    for clause in (*guarantees, *(node.assumptions if guarantees else ())):
         yield repr((node.name, clause.name, " ".join((clause.sentence or "").split()), show_term(clause.formula)))
-    for port in (*node.inputs, *node.outputs) if clauses else ():
+
+
+def _placed(node: Node, plan: Plan) -> Iterator[str]:
+    """What a node's ports are, and what is connected to its inputs."""
+    for port in (*node.inputs, *node.outputs):
         yield repr((node.name, port.role.name, port.name, show_sort(port.sort)))
+    for topic in node.topics:
+        yield repr((node.name, topic.name, topic.port.variable.qualified if topic.port else ""))
+    for edge in plan.connections:
+        if edge.target.node == node.name:
+            yield repr((str(edge), edge.initial))

@@ -63,3 +63,40 @@ def test_nobody_validates_what_is_not_there(
     (tmp_path / "plan.yaml").write_text(STYLES["flow"])
     assert cli("validate", tmp_path, *more) == 2
     assert code in capsys.readouterr().err
+
+
+GRAPH = """context { Most = 5; }
+node a { inputs() outputs( x : REAL ) topics() guarantee low ( out.x <= Most ) }
+node c { inputs() outputs( x : REAL ) topics() guarantee any ( out.x <= 9 ) }
+node b { inputs( r : REAL ) outputs( x : REAL ) topics()
+  assume small "The reading is small" ( in.r <= 5 ) guarantee g ( out.x <= in.r ) }
+"""
+PLAN = """connections: [{from: a.x, to: b.r}]
+requirements: {R: {text: It is low., %s}}
+"""
+
+
+@pytest.mark.parametrize("what", ["supported_by: [b.g]", "formula: b.x <= Most"])
+@pytest.mark.parametrize(
+    ("edit", "counts"),
+    [
+        (("in.r <= 5 )", "in.r <= 4 )"), {"supported_by: [b.g]"}),
+        (("The reading is small", "The reading is big"), {"supported_by: [b.g]"}),
+        (("from: a.x", "from: c.x"), {"supported_by: [b.g]", "formula: b.x <= Most"}),
+        (("Most = 5", "Most = 6"), {"formula: b.x <= Most"}),
+        (("outputs( x : REAL ) topics()\n  assume", "outputs( x : INTEGER ) topics()\n  assume"),
+         {"supported_by: [b.g]", "formula: b.x <= Most"}),
+        (("guarantee any ( out.x <= 9 )", "guarantee any ( out.x <= 8 )"), set()),
+        (("node c", "// another node\nnode c"), set()),
+    ],
+)  # fmt: skip
+def test_an_edit_of_what_the_sentence_rests_on_ends_the_validation(
+    tmp_path: Path, what: str, edit: tuple[str, str], counts: set[str]
+) -> None:
+    contract, plan = tmp_path / "system.rcl", tmp_path / "plan.yaml"
+    contract.write_text(GRAPH)
+    plan.write_text(PLAN % what)
+    assert cli("validate", tmp_path, "R", "--as", "A. Person") == 0
+    for path in (contract, plan):
+        path.write_text(path.read_text().replace(*edit))
+    assert load_system(tmp_path).plan.requirements[0].outdated is (what in counts)
