@@ -7,7 +7,7 @@ runs off: which outputs that its contract allows were not looked at (`first_cut`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from avow.base.records import dataclass
@@ -437,11 +437,12 @@ def first_cut(node: Answerer, deadline: float) -> str:
     ports = [port for port in node.others.values() if is_restricted(node, port)]
     if not ports:
         return ""
+    written = _Written(node.node)
     for index, inputs in node.asked.items():
         if spent() > deadline:
             return f"too many inputs to see whether {node.node.name} may answer otherwise than the scenario has it"
         free = bool(node.broken(inputs))
-        found = _other(node, ports, inputs, node.found(index), free)
+        found = _other(written, ports, inputs, node.found(index), free)
         if found is not None:
             given = ", ".join(f"{name} = {show(value)}" for name, value in inputs.items() if name in node.read)
             where = f" at the step with {given}" if given else ""
@@ -449,15 +450,50 @@ def first_cut(node: Answerer, deadline: float) -> str:
     return ""
 
 
-def _other(node: Answerer, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
+class _Written:
+    """A node's guarantees in Z3, of many inputs. Each is translated once for equal values of the inputs that it
+    mentions, and each value once: translation takes most of the time of these questions."""
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.translator = Translator()
+        self._mentions = [
+            sorted(v.qualified for v in ports_of(c.formula) if v.role is Role.INPUT) for c in node.guarantees
+        ]
+        self._values: dict[object, Meaning] = {}
+        self._clauses: dict[object, object] = {}
+
+    def given(self, solver: z3.Solver, inputs: Values) -> dict[Variable, Meaning]:
+        """As `_given`."""
+        meanings: dict[Variable, Meaning] = {}
+        for variable, value in by_variable(self.node, inputs).items():
+            if is_open(value):
+                solver.add(*_known_of(self.translator, variable, value))
+                continue
+            place = variable, key(value)
+            if place not in self._values:
+                self._values[place] = self.translator.value(value, variable.sort)
+            meanings[variable] = self._values[place]
+        return meanings
+
+    def guarantees(self, inputs: Values, meanings: Mapping[Variable, Meaning]) -> Iterator[object]:
+        keys = {name: key(value) for name, value in inputs.items()}
+        for clause, mentions in zip(self.node.guarantees, self._mentions, strict=True):
+            place = clause.name, *(keys.get(name) for name in mentions)
+            if place not in self._clauses:
+                self._clauses[place] = self.translator.term(clause.formula, meanings)
+            yield self._clauses[place]
+
+
+def _other(written: _Written, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
     """An output beside the ones found, as far as it is known; None if there is none."""
-    translator = Translator()
+    translator = written.translator
     solver = z3.Solver(ctx=translator.context)
     try:
-        meanings = _given(translator, solver, node.node, inputs)
-        solver.add(*translator.background([p.variable for p in node.node.outputs]))
+        meanings = written.given(solver, inputs)
+        solver.add(*translator.background([p.variable for p in written.node.outputs]))
         if not free:
-            solver.add(*(translator.term(clause.formula, meanings) for clause in node.node.guarantees))
+            solver.add(*written.guarantees(inputs, meanings))
         return _beside(translator, solver, ports, found)
     except (Unsupported, z3.Z3Exception):
         return _UNDECIDED

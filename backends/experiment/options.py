@@ -277,8 +277,8 @@ class _Reader:
         return tuple(self._run(table, name, rows, strata, read, bindings) for name, rows in grouped)
 
     def _grouped(self, table: Table, column: str) -> dict[str, list[Row]]:
-        grouped, last = dict[str, list[Row]](), None
-        names = dict[str | Fraction, str]()
+        grouped, names = dict[str, list[Row]](), dict[str | Fraction, str]()
+        last: str | None = None
         for row in table.rows:
             name = row.cells[column]
             if not name:
