@@ -96,7 +96,7 @@ ABOUT = {
 """What an assumption of each sort is about, after its number: ``2 about the world``."""
 
 
-PLATFORM, MODELS, SAMPLES, START, TOOLS = GENERAL
+PLATFORM, MODELS, SAMPLES, RECORDINGS, START, TOOLS = GENERAL
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.answers import MODELS, PLATFORM, SAMPLES, START, TOOLS, Assumption, Sort
+from avow.assurance.answers import MODELS, PLATFORM, RECORDINGS, SAMPLES, START, TOOLS, Assumption, Sort
 from avow.assurance.closure import Closed
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
@@ -255,6 +255,8 @@ def _of_evidence(
             about.append((Sort.MODELS, MODELS, f"{name} by {record.method}"))
         if found.status in (Status.TESTED, Status.MONITORED):
             about.append((Sort.SAMPLING, SAMPLES, f"{name}: {seen(found)}"))
+        if record.of is Object.RECORDING:  # a monitor or an experiment does not look at the program
+            about.append((Sort.SAMPLING, RECORDINGS, f"{name} by {record.method}"))
         for sort, place, text in about:
             said = statements.at(place)
             said = said if said.says else replace(said, says=GENERAL[place])

@@ -18,6 +18,7 @@ GENERAL = {
     "assumptions.platform.execution": "Hardware, operating system, compilers and transport do what is expected of them",
     "assumptions.models.fidelity": "What runs does what its model does",
     "assumptions.samples.representative": "Cases that were not tried are like those that were",
+    "assumptions.samples.recordings": "What is recorded is what the programs and settings of today do",
     "assumptions.platform.start": "Each delayed input begins with the first value that the plan gives",
     "assumptions.tools.trusted": "The tools that answered, and the trusted base, answer rightly",
 }

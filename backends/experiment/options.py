@@ -285,8 +285,8 @@ class _Reader:
                 self.found.append(table.fault(row.line, "EXP113", "the run has no name"))
             if (other := names.setdefault(_identity(name), name)) != name:
                 message = f"'{name}' may be the run '{other}' of line {grouped[other][0].line}"
-                hint = "write the name of one run in one way, and give different runs names that differ by more"
-                self.found.append(table.fault(row.line, "EXP113", message, hint))
+                different = "write the name of one run in one way, and give different runs names that differ by more"
+                self.found.append(table.fault(row.line, "EXP113", message, different))
             if name in grouped and not (self.options.get("steps") and name == last):
                 first = grouped[name][0].line
                 message = f"a second run named '{name}'; the first is in line {first}"
