@@ -38,6 +38,19 @@ def test_a_test_of_the_source_is_no_proof() -> None:
     assert words(SOURCE, TESTED) == "1 proved (source in float64)"
 
 
+@pytest.mark.parametrize(
+    ("record", "named"),
+    [
+        (evidence(G, Verdict.MONITORED, "rosmonitoring", of=Object.RECORDING), True),
+        (evidence(G, Verdict.TESTED, "experiment", of=Object.RECORDING), True),
+        (TESTED, False),
+    ],
+)
+def test_a_recording_rests_on_the_programs_being_those_of_today(record: Evidence, named: bool) -> None:
+    about = [a.words for a in made(record).assumptions]
+    assert ("What is recorded is what the programs and settings of today do" in about) is named
+
+
 def gate(*records: Evidence, policy: object = None) -> Gate:
     return next(g for g in made(*records, policy=policy).gates if g.id == "program")
 
