@@ -12,7 +12,7 @@ from dataclasses import replace
 from datetime import date
 
 from avow.assurance.answers import MODELS, PLATFORM, RECORDINGS, SAMPLES, START, TOOLS, Assumption, Sort
-from avow.assurance.closure import Closed
+from avow.assurance.closure import Closed, used
 from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
 from avow.assurance.model import ObligationView
@@ -23,6 +23,7 @@ from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Object
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
+from avow.formulas.temporal.cell import CELL
 from avow.system.plan import Requirement, Statement
 from avow.system.statements import GENERAL
 
@@ -266,16 +267,20 @@ def _of_evidence(
 def _first_values(
     views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements
 ) -> Iterator[_Raw]:
-    """The `initial` values that start a loop of delayed connections: the calculus takes them from the plan, and no
+    """The `initial` values of delayed connections that a proof uses: the calculus takes them from the plan, and no
     method looks at what a program begins with."""
     for view in views:
-        o = view.obligation
-        if o.kind is Kind.COMPOSITION and o.name.startswith("start.") and view.status.supports:
-            text = next((r.summary for r in reversed(view.records)), o.claim)
+        labels = [label for record in view.records for label in used(record.details) if _is_first_value(label)]
+        if labels and view.status.supports:
             said = statements.at(START)
             said = said if said.says else replace(said, says=GENERAL[START])
-            if "initial " in text:  # a loop may start without any
-                yield _Raw(Sort.PLATFORM, START, text, said, o.id, _in(closed, o.id))
+            text = ", ".join(dict.fromkeys(labels))
+            yield _Raw(Sort.PLATFORM, START, text, said, view.id, _in(closed, view.id))
+
+
+def _is_first_value(label: str) -> bool:
+    """Whether a hypothesis is the plan's `initial`, and not what a clause remembers before the first step."""
+    return label.startswith("initial ") and CELL not in label
 
 
 def _meaning(requirements: Sequence[Requirement], statements: Statements) -> Iterator[_Raw]:

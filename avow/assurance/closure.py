@@ -99,7 +99,7 @@ class Closure:
             assumed = [f"{node}.{clause}" for clause in self.assumptions.get(node, ())]
             return self._discharged(assumed, list(self.joint.get(about, ())))
         if view.obligation.kind in (Kind.COMPOSITION, Kind.REQUIREMENT):
-            labels = [label for r in view.records for label in _needed(r.details)]
+            labels = [label for r in view.records for label in used(r.details)]
             found = [self.known[label] for label in labels if label in self.known]
             found += [name for label in labels if (name := self._environment(label)) is not None]
             assumed = [label for label in labels if label not in self.known and self._is_assumption(label)]
@@ -155,8 +155,8 @@ def _guarantees(view: ObligationView) -> bool:
     return view.obligation.kind is Kind.GUARANTEE
 
 
-def _needed(details: Mapping[str, object]) -> Iterator[str]:
+def used(details: Mapping[str, object]) -> Iterator[str]:
     """Labels of the hypotheses that a proof used, without the step that they are about."""
-    listed = details.get("needed")
+    listed = details.get("needed", details.get("initial"))
     for label in listed if isinstance(listed, list) else ():
         yield str(label).removesuffix(" one step before")

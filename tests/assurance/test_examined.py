@@ -9,6 +9,7 @@ from avow.assurance.model import Case, Gate
 from avow.base.verdict import Object, Verdict
 from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import Evidence
+from avow.system.plan import Requirement
 
 G = guarantee("n", "g")
 FAULTLESS, LINKED = (obligation("n", Kind.PROGRAM, name) for name in (ProgramClaim.FAULTLESS, ProgramClaim.LINKED))
@@ -78,3 +79,21 @@ def test_what_is_claimed_of_programs_has_a_gate(records: list[Evidence], passed:
 def test_a_system_without_programs_has_no_such_gate() -> None:
     found = case(system({"n": ["g"]}), [G], [MODEL])
     assert not [g for g in found.gates if g.id == "program"]
+
+
+@pytest.mark.parametrize(
+    ("needed", "named"),
+    [(["n.g", "initial n.o"], True), (["n.g", "initial n.#0"], False), (["n.g"], False)],
+)
+def test_a_proof_from_first_values_rests_on_the_plans_words_for_them(needed: list[str], named: bool) -> None:
+    """A delayed connection of a node to itself has no obligation of its own that names them."""
+    asked = obligation("system", Kind.REQUIREMENT, "R")
+    proof = evidence(asked, Verdict.PROVED, "compose", details={"needed": needed})
+    requirement = Requirement("R", "It holds", "n.o", None, ("n",))
+    whole = system({"n": ["g"]}, plans=[node_plan("n", "medium", "hoare")], requirements=[requirement])
+    found = case(whole, [G, asked], [MODEL, proof])
+    assert ("Each delayed input begins with the first value that the plan gives" in _words(found)) is named
+
+
+def _words(found: Case) -> list[str]:
+    return [a.words for a in found.assumptions]
