@@ -175,16 +175,3 @@ def test_the_exported_properties(rover, case):
 def test_the_page_shows_what_is_tested(root, method):
     page = (root / "docs" / "backends" / "ajpf.md").read_text()
     assert textwrap.dedent((root / "tests" / "ajpf" / "fixtures" / method).read_text()).strip() in page
-
-
-def test_every_code_is_on_the_page(root):
-    page = (root / "docs" / "backends" / "ajpf.md").read_text().partition("## Diagnostics")[2]
-    listed = set()
-    for row in page.splitlines()[3:]:
-        listed |= {f"AJPF{number}" for number in re.findall(r"\d{3}", row.split("|")[1])}
-    used = {
-        code
-        for path in (root / "backends" / "ajpf").glob("*.py")
-        for code in re.findall(r"AJPF\d{3}", path.read_text())
-    }
-    assert used == listed
