@@ -288,7 +288,7 @@ class Changes:
     against: str
     entries: tuple[ChangeLine, ...] = ()
     again: int = 0
-    """So many guarantees were asked again with the same answer."""
+    """So many guarantees were re-run with the same answer."""
 
 
 @dataclass(frozen=True, slots=True)

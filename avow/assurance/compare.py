@@ -55,7 +55,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One difference. `kind` is one of `ORDER`; ``rerun``: asked again, and the answer is the same."""
+    """One difference. `kind` is one of `ORDER`; ``rerun``: re-run, and the answer is the same."""
 
     kind: str
     subject: str
@@ -90,7 +90,7 @@ class Change:
             case "gate":
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
-                return f"asked again: {self.subject} (still {self.after})"
+                return f"re-run: {self.subject} (still {self.after})"
             case _:  # worse, better, gate: all are told the same way
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
@@ -251,7 +251,7 @@ def _of_method(method: str, old: Answer | None, new: Answer | None) -> Iterator[
         reason = f"since {changed}" if changed else "with nothing changed that it depends on"
         same = effective(was.record) is effective(now.record)
         answer = f"{effective(now.record)} as before" if same else f"{effective(was.record)} → {_said(now)}"
-        yield f"{method} was asked again, {reason}: {answer}"
+        yield f"{method} was re-run, {reason}: {answer}"
 
 
 def _said(answer: Answer) -> str:

@@ -15,7 +15,7 @@ from avow.evidence.status import Status, weigh
 _WORDS = {
     "argued": ("argued, not derived", "argued", "A person must agree that what is named amounts to the sentence."),
     "unvalidated": (
-        "sentence{s} that nobody has validated",
+        "sentence{s} without a validation",
         "not validated",
         "Nobody has read the sentence against the formula (`avow validate`).",
     ),

@@ -299,9 +299,7 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
     if not shown:
         shown = [("=", "Nothing.")]
     return (
-        (*shown, ("⟲", f"asked again: {count(changes.again, 'guarantee')}, same answer"))
-        if changes.again
-        else tuple(shown)
+        (*shown, ("⟲", f"re-run: {count(changes.again, 'guarantee')}, same answer")) if changes.again else tuple(shown)
     )
 
 

@@ -59,7 +59,7 @@ def command(
     compare generated files with what is generated today.
 
     Exit code 1 if the ledger, a file behind today's evidence or a generated file was edited, or a ledger is not the
-    one that the index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence
+    one that the index of ledgers, the reports here or --against know; changed inputs are listed, but only make evidence
     stale.
     A ledger that was cut, rolled back, rewritten or begun anew fails the gate *integrity* until a person, by name,
     says with --acknowledge that it was seen and why it happened.

@@ -157,7 +157,7 @@ def _of_plan(folder: Path, shelf: Shelf) -> Iterator[Diagnostic]:
     try:
         found = of_plan(load_system(folder, shelf), shelf=shelf)
     except Rejected as rejected:
-        # what is wrong in contract files is told already; a formula of the plan has faults of the same codes
+        # what is wrong in contract files is reported already; a formula of the plan has faults of the same codes
         every = (*rejected.diagnostics, *of_rest(folder))
         found = tuple(d for d in every if not (d.code.startswith("RCL") and d.span and d.span.file.endswith(".rcl")))
     yield from (_as_told(d, folder) for d in found)

@@ -40,7 +40,7 @@ from avow.pipeline.workload import survey
     help="Exit code 1 where less is shown or more assumed than before, or never.",
 )
 def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on: str) -> int:
-    """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.
+    """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was re-run.
 
     Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
     contracts and plans of that revision are held against today's ledger. NEW is the workspace as it is, if left out.
@@ -72,7 +72,7 @@ def _tell(changes: list[Change]) -> None:
                 click.echo(f"      {line}")
     again = [change for change in changes if change.kind == "rerun"]
     if again:
-        click.echo(f"  asked again, with the same verdict: {count(len(again), 'claim')}")
+        click.echo(f"  re-run, with the same verdict: {count(len(again), 'claim')}")
 
 
 def _write(page: Path, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:

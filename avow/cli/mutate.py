@@ -24,17 +24,17 @@ from avow.pipeline.workload import survey
 @click.argument("system")
 @click.option("--method", help="Only methods of this id.")
 @node_option()
-@json_option("every score; what is told on the way goes to standard error")
+@json_option("every score; progress goes to standard error")
 @seconds_option()
 @click.option("--limit", type=click.IntRange(1), default=4, show_default=True, help="Mutants for each guarantee.")
 @click.option("-n", "jobs", type=click.IntRange(1), default=2, show_default=True, help="How many at once.")
 def command(
     system: str, method: str | None, nodes: tuple[str, ...], as_json: bool, seconds: float | None, limit: int, jobs: int
 ) -> int:
-    """Put near misses of each guarantee in its place and see whether the methods that support it notice.
+    """Replace each guarantee by mutants and report whether the methods that support it kill them.
 
-    Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
-    supports nothing from then on, and the exit code is 1.
+    Scores go into the ledger and the report. Evidence that kills no mutant supports nothing from then on, and the exit
+    code is 1.
     """
     trust_plugins()
     place = workspace()

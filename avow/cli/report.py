@@ -77,5 +77,5 @@ def _check(folder: Path, as_json: bool) -> int:
         told += f"; {case.answers.warned}" if case.answers.warned else ""
         click.echo(f"{folder}: agrees with the ledger: {told}{', of an earlier state' if old else ''}")
     for name in old if not as_json else ():
-        click.echo(f"  · {name} has changed since: `avow verify` asks again what was asked of it")
+        click.echo(f"  · {name} has changed since: run `avow verify` to update its evidence")
     return 1 if found else 0

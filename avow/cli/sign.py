@@ -46,7 +46,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     if last < today:
         raise Rejected(Diagnostic("SIGN005", f"--until: {until} is past"))
     if why := unreadable(" ".join(who.split())):
-        raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is nobody's name: {why}"))
+        raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is no person's name: {why}"))
     ledger = place.ledger(case.system)
     wrong = check(folder, Ledger(ledger) if ledger.exists() else None, place.root)
     wrong += tuple(f"{path} has changed since the evidence was made" for path in stale(case, place.root))

@@ -27,7 +27,7 @@ from avow.system.validating import with_validation
 def command(system: str, requirements: tuple[str, ...], who: str, as_json: bool) -> int:
     """Say that requirements' formulas say what their sentences ask for.
 
-    Without --as, each of the REQUIREMENTS (by default, those that nobody has validated) is shown: its sentence, and
+    Without --as, each of the REQUIREMENTS (by default, those without a validation) is shown: its sentence, and
     its formula or the guarantees that it names. With --as, your name, the day and the digests of both are written
     under `validation` in plan.yaml. When either text changes, the requirement is not validated any more. A formula that
     says less than its sentence needs a reason there (`because`), or a sentence that says no more.
@@ -46,7 +46,7 @@ def command(system: str, requirements: tuple[str, ...], who: str, as_json: bool)
         return 0
     name = " ".join(who.split())
     if why := unreadable(name):
-        raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is nobody's name: {why}"))
+        raise Rejected(Diagnostic("SIGN005", f"--as: {who!r} is no person's name: {why}"))
     if not requirements:
         hint = "name each requirement that you have read"
         raise Rejected(Diagnostic("CLI022", "no requirement is named", hint=hint))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
-@json_option("what came of each system; what is told on the way goes to standard error")
+@json_option("what came of each system; progress goes to standard error")
 @seconds_option()
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
 @click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")

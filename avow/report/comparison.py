@@ -1,4 +1,4 @@
-"""Two states of a case side by side, as a page: what was lost, gained, asked again, and why. Looks like the report."""
+"""Two states of a case side by side, as a page: what was lost, gained, re-run, and why. Looks like the report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _KINDS = {
     "meaning": ("Changed meaning: another claim under the same name", "changed meaning", "open"),
     "added": ("New claims", "new", "fair"),
     "better": ("Gained: claims that stand better", "better", "good"),
-    "rerun": ("Asked again, with the same verdict", "asked again", "plain"),
+    "rerun": ("Re-run, with the same verdict", "re-run", "plain"),
 }
 """Of each kind its heading, the word after its number, and its colour (a gate's is that of what it says now)."""
 

@@ -146,7 +146,7 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
         "old_formula": "",
         "new_formula": "",
     }
-    assert why == ["hoare was asked again, with nothing changed that it depends on: proved → refuted, refuted by hoare"]
+    assert why == ["hoare was re-run, with nothing changed that it depends on: proved → refuted, refuted by hoare"]
     with pytest.raises(Rejected):
         run(diff, "no-such-revision", "reports/rover")
     with pytest.raises(Rejected):

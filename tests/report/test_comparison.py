@@ -1,4 +1,4 @@
-"""`avow diff`: what was gained, lost, asked again, and why; as a page that no name can break out of."""
+"""`avow diff`: what was gained, lost, re-run, and why; as a page that no name can break out of."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def test_asked_again_because_a_file_changed() -> None:
     change = only(made(first), made(first, again))
     assert change.kind == "worse"
     files = "m/a.imp changed, m/b.imp is gone, m/c.imp is new"
-    assert change.why == (f"hoare was asked again, since {files}: proved → refuted, refuted by hoare",)
+    assert change.why == (f"hoare was re-run, since {files}: proved → refuted, refuted by hoare",)
 
 
 def test_asked_again_with_the_same_verdict_by_another_version() -> None:
     first, again = evidence(TARGET), evidence(TARGET, key="k2", tool_version="2.0")
     change = only(made(first), made(first, again))
     assert change.kind == "rerun"
-    assert change.text == "asked again: rover/n/guarantee/g (still proved)"
+    assert change.text == "re-run: rover/n/guarantee/g (still proved)"
     assert "the tool is another (z3 1.0 → z3 2.0)" in change.why[0]
     assert change.why[0].endswith("proved as before")
 
