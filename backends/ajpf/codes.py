@@ -27,15 +27,14 @@ CODES = register(
     declare(
         "AJPF104",
         "name of the agent",
-        "AJPF's property language cannot speak of an agent of this name.",
-        "Choose a name that starts with a small letter and is none of its words.",
+        "AJPF's property language does not accept this name of an agent.",
+        "Choose a name that starts with a small letter and is no keyword of PSL.",
     ),
     declare(
         "AJPF105",
         "not run",
-        "The program is Gwendolen, and has something that the checker does not run: a plan for any goal or belief "
-        "at all.",
-        "Leave it out, or check that agent by other means.",
+        "The program contains Gwendolen that the checker does not support: a plan for any goal or belief.",
+        "Remove it, or check that agent by other means.",
     ),
     declare(
         "AJPF106",
@@ -58,8 +57,8 @@ CODES = register(
     declare(
         "AJPF119",
         "wrong option",
-        "An option has a type or a name that is none of the backend's.",
-        "Write what the message wants.",
+        "An option has an unknown name or a wrong type.",
+        "Write what the message names.",
     ),
     declare(
         "AJPF120",
@@ -100,14 +99,14 @@ CODES = register(
     declare(
         "AJPF126",
         "options that AJPF cannot take",
-        "The engine `ajpf` is asked for a semantics other than its own.",
+        "The engine `ajpf` supports its own semantics only.",
         "Leave out `semantics`, or `engine: ajpf`.",
     ),
     declare(
         "AJPF130",
         "guarantee not covered",
-        "No rows of the table say what a part of the guarantee is for the agent: this method cannot check it.",
-        "Add a row, or leave the guarantee to other methods.",
+        "No row of the table covers a part of the guarantee, so this method cannot check it.",
+        "Add a row, or use another method for the guarantee.",
         warning=True,
     ),
     declare(
@@ -120,22 +119,21 @@ CODES = register(
     declare(
         "AJPF132",
         "row that says nothing",
-        "The row's formula is true (or false) of every agent, so that what it covers is taken for granted.",
-        "Correct the formula. What you want to give up, map to `T`, in the open.",
+        "The row's formula is true (or false) for every agent, so the part that it covers is assumed.",
+        "Correct the formula. To leave out a part deliberately, map it to `T`.",
         warning=True,
     ),
     declare(
         "AJPF133",
         "instances left out",
-        "The plan's `instances` lack values of the scenario's domain: the guarantee is not checked for these.",
-        "Leave the variable out of `instances`, or say in the plan why the rest does not matter.",
+        "The plan's `instances` lack values of the scenario's domain, so the guarantee is not checked for these.",
+        "Leave the variable out of `instances`, or give the reason in the plan.",
         warning=True,
     ),
     declare(
         "AJPF134",
         "word that the agent lacks",
-        "A row, a property or the environment file speaks of a belief, goal, action or percept that there never is. "
-        "What is forbidden in such a word is forbidden for nothing.",
+        "A row, a property or the environment file names a belief, goal, action or percept that never occurs.",
         "Correct its spelling, or the number of its arguments.",
         warning=True,
     ),

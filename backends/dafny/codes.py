@@ -8,7 +8,7 @@ CODES = register(
     declare(
         "DFY101",
         "wrong option",
-        "The option is none of the backend's, or names no file of the system's folder.",
+        "The option is unknown, or names no file of the system's folder.",
         "Give `implementation`, relative to the system's folder.",
     ),
     declare(
@@ -34,7 +34,7 @@ CODES = register(
     declare(
         "DFY105",
         "no translation",
-        "A skeleton or a translation was asked for, and a clause or a type has no counterpart in Dafny.",
-        "Rewrite what the message names, or do without it.",
+        "A clause or a type has no counterpart in Dafny.",
+        "Rewrite what the message names, or leave it out.",
     ),
 )

@@ -15,14 +15,14 @@ CODES = register(
     declare(
         "EXP103",
         "wrong mapping",
-        "An entry of `mapping` names no port of the node, or gives no value of its type; or a port has no column.",
-        "Name the column of each port that the guarantee speaks of.",
+        "An entry of `mapping` names no port of the node or has a wrong type, or a port has no column.",
+        "Name the column of each port that the guarantee refers to.",
     ),
     declare(
         "EXP105",
         "claimed rate too low",
-        "The success rate that is claimed is below the least one of the node's criticality.",
-        "Claim what the criticality asks for: 0.9 at high, 0.8 at medium, 0.5 at low.",
+        "The claimed success rate is below the minimum for the node's criticality.",
+        "Claim at least 0.9 at high, 0.8 at medium, 0.5 at low.",
     ),
     declare(
         "EXP106",
@@ -46,6 +46,6 @@ CODES = register(
         "EXP113",
         "wrong run",
         "A row has too few or too many cells, a cell that is no value of its port, or the name of another run.",
-        "Correct the line; a run is never left out silently.",
+        "Correct the line. Runs are never left out silently.",
     ),
 )

@@ -20,7 +20,7 @@ CODES = register(
     declare(
         "FUZZ102",
         "no machine value",
-        "A port is of a type that no compiled step is given, or `numbers: exact` is asked of one.",
-        "REAL, INTEGER, NATURAL, BOOL, enumerations and sequences of these can be given; REAL is float64 or float32.",
+        "A compiled step cannot take a port of this type, or `numbers: exact` is given for it.",
+        "Use REAL (float64 or float32), INTEGER, NATURAL, BOOL, enumerations and sequences of these.",
     ),
 )

@@ -26,15 +26,14 @@ CODES = register(
     declare(
         "HOARE400",
         "program and contract do not fit",
-        "The program's file is not there, or an input, output or relation of the contract has nothing in the program.",
+        "The program's file is missing, or a port of the contract has no variable in the program.",
         "Map it under `variables`, or use a variable of that name.",
     ),
     declare(
         "HOARE410",
         "other numbers",
-        "The program compares with numbers that the contract does not have, and lacks those with which the contract "
-        "compares. Where the guarantee is weaker than it looks, no proof would notice.",
-        "Write the contract's numbers in the program; or, where units differ, switch the warning off in the plan.",
+        "The program compares with other numbers than the contract.",
+        "Use the contract's numbers in the program. If the units differ, switch the warning off in the plan.",
         warning=True,
     ),
 )

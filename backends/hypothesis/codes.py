@@ -39,8 +39,8 @@ CODES = register(
     declare(
         "HYPO107",
         "callbacks cannot be judged",
-        "No installed method judges runs of messages, or the class hears no topic on which others speak to it.",
-        "Install Avow whole (`rosmonitoring` judges them), or let the class subscribe to the inputs.",
+        "No installed method judges runs of messages, or the class subscribes to no topic of another node.",
+        "Install `rosmonitoring`, or let the class subscribe to the inputs.",
     ),
     declare(
         "HYPO105",

@@ -21,7 +21,7 @@ CODES = register(
     declare(
         "REV104",
         "signature does not count",
-        "The record's signature is of another text, by a key that the plan does not name, or is not there.",
+        "The record's signature is missing, belongs to another text, or is by a key that the plan does not name.",
         "The reviewer reads the record and signs it: `avow review sign`.",
         warning=True,
     ),
@@ -60,7 +60,7 @@ CODES = register(
         "REV116", "answer without a note", "This answer needs a note that explains it.", "The reviewer adds the `note`."
     ),
     declare("REV117", "something missing", "The record lacks a part, or it is empty.", "Add it."),
-    declare("REV118", "wrong word", "The value is none of those allowed.", "Use one of those that the message names."),
+    declare("REV118", "wrong word", "The value is not allowed.", "Use one of those that the message names."),
     declare(
         "REV119",
         "no digest",
@@ -82,7 +82,7 @@ CODES = register(
     declare(
         "REV122",
         "stamp does not read back",
-        "With its digests filled in, the record would say something else besides; the file stays as it was.",
+        "With its digests filled in, the record would have another meaning. The file is unchanged.",
         "Write the entry that the message names in the plain form of `docs/backends/review.md`, then stamp again.",
     ),
     declare(

@@ -20,8 +20,9 @@ CODES = register(
     declare(
         "MON103",
         "cannot be monitored",
-        "The guarantee speaks of something that no topic shows, or of other steps as monitors cannot follow.",
-        "Do what the message says (map it to a topic), or verify the guarantee with another method.",
+        "The guarantee refers to something that no topic shows, or to other steps in a way that monitors do "
+        "not support.",
+        "Map it to a topic as the message says, or use another method.",
         warning=True,
     ),
     declare(
@@ -33,15 +34,16 @@ CODES = register(
     declare(
         "MON106",
         "number that the wire cannot hold",
-        "A clause asks whether a message's number equals one that its type has no room for: it never does.",
-        "Ask for a range, or for a number that the type can hold.",
+        "A clause compares a message's number for equality with a number that its type cannot hold, so they "
+        "are never equal.",
+        "Compare with a range, or with a number that the type can hold.",
         warning=True,
     ),
     declare(
         "MON107",
         "what is read",
-        "From which field of the topic's messages a variable is read, as the definition or the plan decides.",
-        "Nothing is to be done where it is the field that is meant; otherwise name another under `mapping`.",
+        "This remark shows the message field from which a variable is read.",
+        "If another field is meant, name it under `mapping`.",
     ),
     declare(
         "MON108",
@@ -63,20 +65,20 @@ CODES = register(
     declare(
         "MON205",
         "other messages",
-        "A bag's topic is of another type than the contract says, or its type is made otherwise than it is known.",
+        "A bag's topic has another type than in the contract, or another definition of that type.",
         "Correct the topic's type in the contract, or the definition that the plan names.",
     ),
     declare(
         "MON206",
         "calls not recorded",
-        "A clause speaks of a service's calls, and a ROS 1 bag holds topics alone.",
-        "Judge a ROS 2 bag with service events, or a JSON trace; or let the node publish its calls.",
+        "A clause refers to calls of a service, but a ROS 1 bag contains topics only.",
+        "Use a ROS 2 bag with service events, a JSON trace, or a node that publishes its calls.",
     ),
     declare(
         "MON207",
         "unknown publisher",
-        "A bag has messages of others on a topic than the nodes of the contract that publish it.",
-        "Add the others to the contract, say how its nodes are called (`ros: {nodes: …}`), or record without them.",
+        "Nodes outside the contract publish on one of its topics in the bag.",
+        "Add them to the contract, give the node's name at run time (`ros: {nodes: …}`), or record without them.",
     ),
     declare(
         "MON301",
@@ -105,7 +107,7 @@ CODES = register(
     declare(
         "MON306",
         "unknown type on DDS",
-        "DDS says what a topic's type is called, not what its messages are made of, and nothing else does.",
+        "DDS gives a topic's type name, but nothing defines its messages.",
         "Name its `.msg` files under `messages`, or the distribution: `ros: {distro: humble}`.",
     ),
     declare(
