@@ -41,6 +41,8 @@ class OverRuns:
     _viable: Viability | None = None
     _empty: bool | None = None
     _ends: dict[int, bool] = field(default_factory=dict)
+    _written: list[Mapping[str, Term]] = field(default_factory=list)
+    """What holds before the first step of a run, then what each step adds: the contract is kept, memories move on."""
 
     def __post_init__(self) -> None:
         asked = tuple(
@@ -308,16 +310,19 @@ class OverRuns:
         return answer.status == "unsat" and not doubted(answer, facts)
 
     def _run(self, length: int) -> Mapping[str, Term]:
-        """That a run of so many steps keeps the contract, and what it leaves."""
+        """That a run of so many steps keeps the contract, and what it leaves. Each step is written once, so that it is
+        translated once for all questions."""
+        if not self._written:
+            self._written.append({f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells})
         kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))
-        facts = {f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells}
-        for step in range(length):
-            facts[f"step {step}"] = self._at(kept, step)
+        for step in range(len(self._written) - 1, length):
+            facts = {f"step {step}": self._at(kept, step)}
             for cell in self.remembering.cells:
                 after = Variable(Role.INPUT, f"{cell.name} after", cell.sort)
                 moved = substitute(self._at(cell.leaves(after), step), {after: self._named(cell.before, step + 1)})
                 facts[f"{cell.name} {step}"] = moved
-        return facts
+            self._written.append(facts)
+        return {label: fact for facts in self._written[: length + 1] for label, fact in facts.items()}
 
     def _over(self, length: int) -> bool:
         """Whether no run of so many steps keeps the contract."""
