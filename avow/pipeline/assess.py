@@ -64,7 +64,7 @@ def _stamp(state: State, surveyed: Survey) -> Path:
 
 
 def is_settled(state: State) -> bool:
-    """Whether a later run would ask nothing again: no answer is one that it must not be content with."""
+    """Whether a later run re-runs nothing: every answer may be reused."""
     for surveyed in state.surveyed:
         with (ledger := _ledger(state, surveyed)).still():
             found = (ledger.current(o.id, w.keys[o.id]) for w in surveyed.catalogue.works for o in w.obligations)
@@ -74,7 +74,7 @@ def is_settled(state: State) -> bool:
 
 
 def render(state: State, surveyed: Survey) -> Result:
-    """Build the case and write every format, unless what stands in reports/ already says the same."""
+    """Build the case and write every format, unless the files in reports/ already say the same."""
     system, ledger = surveyed.system, _ledger(state, surveyed)
     acknowledge(state.workspace, ledger)
     key = _key(state, surveyed)
@@ -98,7 +98,7 @@ def render(state: State, surveyed: Survey) -> Result:
 
 
 def certify(state: State, surveyed: Survey) -> KernelRun:
-    """Let the kernel establish again, in this run, what the calculus told that it proved: the report's grades."""
+    """Let the kernel re-establish, in this run, what the calculus reported as proved: the report's grades."""
     workspace, system = state.workspace, surveyed.system
     ledger = ledger_of(workspace.ledger(system.name))
     entries = counting_now(ledger, workspace.root, system, state.run)
@@ -125,7 +125,7 @@ def gate(state: State, surveyed: Survey) -> TaskError | bool:
 
 
 def case_of(state: State, surveyed: Survey) -> Case:
-    """The case as it was made for the report, if that is of what stands now; else made anew. Raises Rejected."""
+    """The case that the report was made from, if it is current; otherwise a new one. Raises Rejected."""
     made = state.cases.get(surveyed.system.name)
     return made[1] if made is not None and made[0] == _key(state, surveyed) else build(state, surveyed)
 
@@ -176,8 +176,8 @@ def build(state: State, surveyed: Survey) -> Case:
 
 
 def _given_up(state: State, surveyed: Survey, ledger: Ledger) -> dict[tuple[str, str], str]:
-    """Refutations by a counterexample, of claim and files as they are now, by methods that the plan no longer has: a
-    method that leaves the plan does not take its refutation with it; a repaired program does."""
+    """Refutations by a counterexample, of claims and files as they are now, by methods that the plan no longer has.
+    Removing a method from the plan does not remove its refutation; repairing the program does."""
     found: dict[tuple[str, str], str] = {}
     root = state.workspace.root
     planned, now = surveyed.keys, {o.id: o.digest for o in surveyed.catalogue.obligations}
@@ -217,7 +217,7 @@ def _today() -> date:
 
 def _key(state: State, surveyed: Survey) -> str:
     """The report depends on the texts, the plan, all evidence, the day (reviews and accepted risks expire), and what is
-    installed: a format that was left out is made once its tool is there."""
+    installed: a format that was left out is written once its tool is installed."""
     ledger = _ledger(state, surveyed)
     asked = {**surveyed.keys, **_given_up(state, surveyed, ledger)}
     keys = sorted((*pair, key) for pair, key in asked.items())
@@ -270,7 +270,7 @@ def _summarise(state: State, surveyed: Survey, case: Case) -> Result:
 
 @dataclass(frozen=True, slots=True)
 class Rendering:
-    """What was rendered last: of what, which files with which digests, and what the terminal shows of it."""
+    """What was rendered last: from which inputs, which files with which digests, and what the terminal shows of it."""
 
     key: str
     files: Mapping[str, str]
@@ -278,7 +278,7 @@ class Rendering:
 
 
 def edited_pages(workspace: Workspace, system: str) -> tuple[Path, ...]:
-    """The nodes' pages that are not as they were written with the last report, where this user wrote it."""
+    """The nodes' pages that differ from those written with the last report, if this user wrote it."""
     known = read_note(Rendering, workspace.artifacts / system / "report.json")
     files = known.files if known is not None else {}
     pages = {workspace.root / name: sha for name, sha in files.items() if Path(name).name == INDEX}
@@ -286,12 +286,13 @@ def edited_pages(workspace: Workspace, system: str) -> tuple[Path, ...]:
 
 
 _OVERVIEW = ".overview.json"
-"""Beside the artifacts: the digest of the page over all systems, as it was written, and whose reports are old."""
+"""Kept beside the artifacts: the digest of the page over all systems as written, and the systems whose reports are old.
+"""
 
 
 def earlier(state: State) -> tuple[str, ...]:
-    """The systems that have a report and could not be read in this run: what their reports say is of an earlier state.
-    Of a run that read nothing, none is known."""
+    """The systems that have a report and could not be read in this run: their reports show an earlier state. Empty for
+    a run that read nothing."""
     if not state.read:
         return ()
     reports, read = state.workspace.reports, {s.system.name for s in state.surveyed}
@@ -300,7 +301,7 @@ def earlier(state: State) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Overview:
-    """Of the page as it was written: its digest, and the systems that it says are of an earlier state."""
+    """The digest of the page as it was written, and the systems that it marks as of an earlier state."""
 
     sha256: str
     earlier: tuple[str, ...]
@@ -326,8 +327,8 @@ def write_overview(state: State) -> None:
 
 
 def mark_earlier(state: State) -> None:
-    """Say in reports of an earlier state, in every format, that they are. Once the system can be read again they are
-    not as they were written, and therefore written anew. Raises OSError."""
+    """Mark reports of an earlier state as such, in every format. Once the system can be read again, they differ from
+    what was written and are therefore written again. Raises OSError."""
     for name in earlier(state):
         place = state.workspace.reports / name
         try:
@@ -339,7 +340,7 @@ def mark_earlier(state: State) -> None:
 
 
 def _mark_pages(folder: Path) -> None:
-    """Where report.json was damaged: what a person opens is marked, as it stands."""
+    """If report.json is damaged, the pages that a person opens are marked as they are."""
     mark = environment().get_template("earlier.html.j2").render()
     for page in sorted(folder.glob("*.html")):
         before, body, after = read_text(page, "utf-8", errors="replace").partition("<body>")
@@ -348,12 +349,12 @@ def _mark_pages(folder: Path) -> None:
 
 
 def _derivation_views(system: System) -> tuple[Derivation, ...]:
-    """One for each goal of the plan, the whole system's last; with the rule instances that they are made of."""
+    """One for each goal of the plan, the whole system's last, with the rule instances that make it up."""
     return tuple(_view(system, write_goal(goal)) for goal in composed(system).goals)
 
 
 def _discharging(system: System) -> dict[str, tuple[str, ...]]:
-    """Of each node the obligations (without the system) that settle its assumptions."""
+    """For each node the obligations (without the system) that discharge its assumptions."""
     found = discharged_by(composed(system))
     return {node: tuple(hypothesis.name for hypothesis in behind) for node, behind in found.items()}
 
@@ -364,7 +365,7 @@ def _picture(system: System) -> str:
 
 
 def _view(system: System, written: Written) -> Derivation:
-    wiring = {node.name for node in system.contract.nodes if node.relay}  # nothing of it has to be shown
+    wiring = {node.name for node in system.contract.nodes if node.relay}  # it has no claims
     return Derivation(
         written.name,
         written.rule,

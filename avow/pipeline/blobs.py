@@ -1,10 +1,10 @@
-"""Typed data as canonical JSON, and back: what a work is sent as.
+"""Typed data as canonical JSON, and back: the form in which a job is sent.
 
-Each part stands once in a table and is referred to by its place there, so that equal data has equal bytes, however its
-parts are shared in memory, and depth costs nothing. Places in files are left out, and paths are relative to the
-system's folder: neither is anything that an answer may depend on. Only the classes that a slice is made of, by the
-types that its fields declare, are written and made again. (`avow.base.codec` writes trees for people and other
-programs to read: a part that is shared would stand there once for each use, as deep as it is nested.)
+A table holds each part once and refers to it by its index, so that equal data has equal bytes however its parts are
+shared in memory, and depth costs nothing. Source positions are left out, and paths are relative to the system's folder:
+no answer may depend on either. Only the classes that a slice is made of, by the types that its fields declare, are
+written and read. (`avow.base.codec` writes trees for people and other programs: it would repeat a shared part at each
+use.)
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ class Garbled(ValueError):  # noqa: N818 - it says what they are
 
 _PLAINLY = {None: "null", True: "true", False: "false"}
 _PLAIN_KINDS = frozenset((str, bool, type(None)))
-"""Of what stands where it is used, and not in the table."""
+"""The types that are written in place, and not in the table."""
 
 
 def encode(value: object, root: Path) -> bytes:
-    """Raises TypeError for what is no data of Avow's. `root` is the system's folder."""
+    """Raises TypeError for other data than a slice's. `root` is the system's folder."""
     table: dict[str, int] = {}
     known: dict[int, str] = {}
     kept: list[object] = []
-    """Of the parts that `known` knows by their number: alive, so that no other part gets it."""
+    """Keeps the parts alive that `known` names by their id, so that no other part gets that id."""
     stack: list[tuple[Any, Sequence[object] | None]] = [] if type(value) in _PLAIN_KINDS else [(value, None)]
     while stack:
         current, parts = stack.pop()
@@ -94,7 +94,7 @@ def _is_place(name: str) -> bool:
 
 @functools.cache
 def _children(kind: Any) -> Callable[[Any], Sequence[object]]:
-    """What gives the parts of a value of that class."""
+    """A function that returns the parts of a value of that class."""
     known = kind is _classes().get(kind.__name__)
     if known and not issubclass(kind, enum.Enum):
         names = _fields(kind)

@@ -27,7 +27,7 @@ from avow.pipeline.workload import Survey
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What the last check was of, its warnings, and the keys of the methods of which there was nothing to say."""
+    """The input of the last check, its warnings, and the keys of the methods without a finding."""
 
     key: str
     warnings: tuple[str, ...]
@@ -40,8 +40,8 @@ def is_current(workspace: Workspace, surveyed: Survey) -> bool:
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
-    """Raises Rejected with all errors; warnings go into the report, the first few also to the terminal. A method of
-    which there was nothing to say is not asked about again while its slice is the same."""
+    """Raises Rejected with all errors; warnings go into the report, the first few also to the terminal. A method
+    without a finding is not checked again while its slice is the same."""
     keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
     before = read_note(Checked, _stamp(workspace, surveyed))
     known = set(before.clean) if before is not None else set()
@@ -59,7 +59,7 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
 
 
 def _depends_on_slice(work: Work) -> bool:
-    """Whether what its check says depends on nothing else."""
+    """Whether the result of its check depends on nothing else."""
     return not work.is_engine and is_portable(method_backend(work.system, planned_method(work)))
 
 
@@ -97,6 +97,6 @@ def _key(surveyed: Survey) -> str:
     keys = sorted(key for work in surveyed.catalogue.works for key in work.keys.values())
     plan = surveyed.system.plan
     graph = plan.model.data.get("graph") if isinstance(plan.model.data, dict) else None
-    # No obligation depends on the ROS graph, or on plans that are not taken in: only this stage reads them.
+    # No obligation depends on the ROS graph, or on plans that are not included: only this stage reads them.
     beside = [str(found.span) for found in left_out(surveyed.system)]
     return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys, beside])

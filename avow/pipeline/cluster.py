@@ -1,8 +1,8 @@
 """Jobs on other machines, by Dask.distributed (the extra ``avow[cluster]``).
 
 Dask has the scheduler and the connections; what travels is a request's bytes and a response's bytes. A worker is in
-`avow.pipeline.cluster_worker`. Whoever reaches a scheduler can run code on its workers, so that connections to other
-machines are by TLS with certificates on both sides.
+`avow.pipeline.cluster_worker`. Anyone who can connect to a scheduler can run code on its workers, so connections to
+other machines use TLS with certificates on both sides.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Address:
 
     def security(self) -> Any:
         """Raises Rejected: ``CLUSTER002`` where a certificate is missing, ``CLUSTER005`` where one, of either side, is
-        not accepted (Dask would try again and again, and not say why)."""
+        not accepted (Dask would retry without a reason given)."""
         from distributed.security import Security  # an extra
 
         if not self.secure:
@@ -84,14 +84,14 @@ class Address:
                 socket.create_connection((host.strip("[]"), int(port)), timeout=CLUSTER_CONNECT) as plain,
                 context.wrap_socket(plain) as secure,
             ):
-                secure.recv(1)  # with TLS 1.3 the other side says only now that it does not accept us
+                secure.recv(1)  # with TLS 1.3 the other side rejects us only now
         except ssl.SSLError as error:
             why = getattr(error, "verify_message", "") or error.reason or str(error)
             whose = "the cluster's" if isinstance(error, ssl.SSLCertVerificationError) else "this side's"
             told = f"{whose} certificate is not accepted at {self.url}: {why.replace('_', ' ').lower()}"
             raise Rejected(Diagnostic("CLUSTER005", told)) from error
         except OSError:
-            return  # that nobody is there yet is no matter of certificates
+            return  # a scheduler that is not up yet has no fault of certificates
 
 
 def _is_loopback(host: str) -> bool:
@@ -105,7 +105,7 @@ class Cluster:
     """A remote executor (`avow.pipeline.dispatch.Executor`)."""
 
     def __init__(self, address: Address) -> None:
-        """Raises Rejected (``CLUSTER003``) where there is no such cluster, or it does not know us."""
+        """Raises Rejected (``CLUSTER003``) if there is no such cluster, or it rejects us."""
         try:
             from distributed import Client  # an extra
         except ImportError as error:
@@ -124,7 +124,7 @@ class Cluster:
         self._warned = ""
 
     def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
-        """Raises Rejected (``CLUSTER004``) where there are workers, but none that could answer us."""
+        """Raises Rejected (``CLUSTER004``) if there are workers, but none of them fits."""
         workers = self._workers()
         fit = {name: offered for name, offered in workers.items() if own_code() in offered}
         if workers and not fit:
@@ -167,8 +167,8 @@ class Cluster:
             self._client.close(timeout=5)
 
     def _awaited(self, future: Any, request: Request, digest: str) -> Response:
-        """Dask waits for ever for a worker that could execute the job, and so must not be waited for itself. Raises
-        CancelledError where the connection was lost."""
+        """Dask waits without limit for a worker that can execute the job, so this wait has a limit of its own. Raises
+        CancelledError if the connection was lost."""
         lacking_since: float | None = None
         while True:
             try:
@@ -177,7 +177,7 @@ class Cluster:
                 why = self._unable(request)
             except CancelledError:
                 raise
-            except Exception as error:  # KilledWorker, or whatever kept a worker from beginning
+            except Exception as error:  # KilledWorker, or anything that kept a worker from starting
                 why = "worker after worker was lost over it, or could not begin it"
                 return Response(digest, failure=f"{why} ({type(error).__name__})")
             lacking_since = (lacking_since or time.monotonic()) if why else None
@@ -189,13 +189,13 @@ class Cluster:
                 return Response(digest, failure=why)
 
     def _unable(self, request: Request) -> str:
-        """Why nobody can execute the job now; empty where somebody can. The scheduler is asked once for all threads."""
+        """Why no worker can execute the job now; empty if one can. The scheduler is asked once for all threads."""
         with self._looking:
             when, workers = self._looked
             if time.monotonic() - when > CLUSTER_LOOK:
                 try:
                     workers = self._workers(CLUSTER_ANSWER)
-                except Exception:  # of whatever kind: there is no answer
+                except Exception:  # of any kind: there is no answer
                     workers = None
                 self._looked = time.monotonic(), workers
         if workers is None:
@@ -204,14 +204,14 @@ class Cluster:
         return "" if any(wanted <= offered.keys() for offered in workers.values()) else _NOBODY
 
     def _workers(self, seconds: float = CLUSTER_CONNECT) -> Mapping[str, Mapping[str, int]]:
-        """What each worker offers. Raises whatever a client raises that has no cluster any more."""
+        """The resources of each worker. Raises whatever a client raises that has lost its cluster."""
         found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=seconds)
         return {str(name): info["resources"] for name, info in found["workers"].items() if info["status"] == "running"}
 
 
 def serve(address: Address, slots: int) -> None:
     """Be a worker of that cluster, until it ends or this process is told to end. Raises Rejected (``CLUSTER003``), and
-    ``CLUSTER006`` where this machine can do no works any more."""
+    ``CLUSTER006`` if this machine can execute no more jobs."""
     own = Own(code_mark())
     own.processes.prepare(Path(tempfile.gettempdir()))  # Dask starts threads
     try:

@@ -1,8 +1,8 @@
-"""What ``avow worker`` is: a worker of Dask's that executes each job in a process of its own.
+"""``avow worker``: a Dask worker that executes each job in a process of its own.
 
 That process (`avow.pipeline.processes`) ends with its tools when it is done, out of time, cancelled, or when the worker
-dies. A worker offers, as Dask's resources, its own code, its backends' code, and its tools, so that a job only comes to
-a worker whose answer would fit its key.
+dies. A worker offers, as Dask's resources, its own code, its backends' code, and its tools, so that a job only goes to
+a worker whose answer fits its key.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def own_code() -> str:
 
 
 def needs(request: Request) -> tuple[str, ...]:
-    """The resources that a worker must have for a work."""
+    """The resources that a worker must have for a job."""
     own = () if request.engine in ENGINES else (_backend(request.engine),)
     return (own_code(), *own, *map(_tool, request.wanted))
 
@@ -52,7 +52,7 @@ def tools_of(resources: Iterable[str]) -> frozenset[tuple[str, ...]]:
     """The tools among a worker's resources, as `tool_identities` has them."""
     found = set()
     for text in (resource[5:] for resource in resources if resource.startswith("tool:")):
-        with contextlib.suppress(Unreadable):  # whatever it offers, nobody asks for it
+        with contextlib.suppress(Unreadable):  # no job asks for such a resource
             found.add(from_text(tuple[str, str, str], text))
     return frozenset(found)
 
@@ -67,13 +67,13 @@ def _tool(tool: Sequence[str]) -> str:
 
 @dataclass(slots=True)
 class Own:
-    """What a worker knows of itself."""
+    """A worker's state."""
 
     began: str
     """The code that it has in memory; the keys that it computes name the code on disk."""
     processes: Processes = field(default_factory=Processes)
     unfit: str = ""
-    """Why it leaves the cluster."""
+    """The reason why it leaves the cluster."""
 
 
 OWN = "avow"
@@ -81,7 +81,7 @@ OWN = "avow"
 
 def perform(data: bytes) -> bytes:
     """Execute the request on this worker; the response. A worker that cannot execute jobs any more leaves the cluster:
-    it would take all jobs, and fail faster than others finish."""
+    otherwise it would take all jobs, as it fails faster than others finish."""
     from distributed import get_worker  # an extra
 
     worker = get_worker()
@@ -107,7 +107,7 @@ def _leave(worker: Any, own: Own, why: str) -> NoReturn:
 
 
 def _cancelled(worker: Any) -> Callable[[], bool]:
-    """Whether nobody waits for the task any more that this thread is running."""
+    """Whether the task that this thread runs was cancelled."""
     task = worker.get_current_task()
 
     def cancelled() -> bool:

@@ -1,4 +1,4 @@
-"""The discharge stage: run what is not settled yet, and record every answer. The only stage that runs a tool."""
+"""The discharge stage: run what has no current evidence, and record every answer. The only stage that runs a tool."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ Intact = Callable[[str, str], bool]
 
 
 def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obligation, ...]:
-    """Those without a current record that still can be believed; in a fresh run, those without one of this run. What a
-    method of the plan takes on it settles together, so that an answer does not depend on what else was open."""
+    """The obligations without a current and intact record; in a fresh run, those without a record of this run. A method
+    discharges all its obligations together, so that an answer does not depend on which others were open."""
     ledger = ledger_of(workspace.ledger(work.system.name))
     intact = functools.cache(lambda path, sha: is_intact(workspace.root / path, sha))
     with ledger.still():
@@ -65,16 +65,16 @@ def _is_settled(
 
 
 def prepare(state: State) -> None:
-    """Where works are open: fork the server of their processes now, while the run has one thread."""
+    """If jobs are open, fork the server of their processes now, while the run has one thread."""
     works = [w for s in state.surveyed for w in s.catalogue.works if w.engine != LANGUAGE]
-    with contextlib.suppress(OSError):  # the stage says so
+    with contextlib.suppress(OSError):  # the stage reports it
         if any(open_obligations(state.workspace, work, state.run) for work in works):
             methods = {work.name: work for work in works if not work.is_engine}
             state.run.processes.prepare(state.workspace.root, lambda name: generated(methods[name]))
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:
-    """Settle what is open, append the evidence, and say what was found."""
+    """Discharge what is open, append the evidence, and report the result."""
     todo = open_obligations(workspace, work, run)
     if not todo:
         return ()
@@ -129,7 +129,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
 
 
 def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...]) -> dict[str, tuple[Any, ...]]:
-    """Obligation → the cases that refuted it once, newest first, whatever the subject and the options were."""
+    """Obligation → the cases that refuted it once, newest first, for any program and options."""
     ledger, found = ledger_of(workspace.ledger(work.system.name)), dict[str, tuple[Any, ...]]()
     for o in obligations:
         cases = [e.evidence.details[CASE] for e in reversed(ledger.refutations(o.id, o.digest, work.engine))]
@@ -139,7 +139,8 @@ def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...])
 
 
 def _circumstances(workspace: Workspace, report: Report) -> dict[str, object]:
-    """What the subject looked at, with paths relative to the workspace where they lie within, and how it was kept."""
+    """What the program under test read, with paths relative to the workspace where they lie within, and how it was
+    isolated."""
     root = str(workspace.root.resolve()) + os.sep
     seen = to_json(tuple(o._replace(path=o.path.removeprefix(root)) for o in report.observed))
     if report.isolation is Isolation.NONE:
@@ -161,7 +162,7 @@ def _promise(work: Work) -> tuple[Verdict, Link, Object]:
 
 
 def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:
-    """The files that a person wrote and the answer rests on. The contract itself enters by the obligation's digest."""
+    """The files written by a person that the answer rests on. The contract itself enters by the obligation's digest."""
     if work.is_engine:
         return {}
     system = work.system
@@ -171,7 +172,7 @@ def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:
 
 
 def _keep_logs(workspace: Workspace, work: Work, todo: tuple[Obligation, ...], report: Report) -> dict[str, str]:
-    """Logs stand under a name of their own for every attempt, so that later attempts leave older evidence intact."""
+    """Logs have a name of their own for every attempt, so that later attempts leave older evidence intact."""
     if not report.logs:
         return {}
     stamp = sha256("".join(sorted(work.keys[o.id] for o in todo)) + "".join(report.logs.values()))[:12]

@@ -1,7 +1,7 @@
-"""A work becomes a request, which a process here or a remote executor answers, and the response is judged.
+"""Makes a request from a job, has a process here or a remote executor answer it, and judges the response.
 
-A worker that crashes, hangs, or answers too little becomes a verdict. What the calculus proved before goes with the
-request, from run to run.
+A worker that crashes, hangs, or omits answers yields a verdict. The request carries what the calculus proved in earlier
+runs.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def settle(
     altered: Altered | None = None,
     kept: Mapping[str, tuple[Any, ...]] | None = None,
 ) -> Report:
-    """Settle the obligations in a process of their own, here or remotely; `kept` are cases that refuted them earlier.
-    Never raises for what that process does."""
+    """Discharge the obligations in a process of their own, here or remotely; `kept` are cases that refuted them
+    earlier. Never raises for a fault of that process."""
     if lacking := _lacking(work, run):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
@@ -73,14 +73,14 @@ def settle(
 
 def unlike_here(observed: Iterable[Observed], root: Path) -> tuple[Observed, ...]:
     """What a worker observed that differs on this machine, or that cannot be recorded. A record is compared with this
-    machine: no later run could tell that something on another machine changed."""
+    machine: no later run could detect a change on another machine."""
     rows = tuple(observed)
     recorded = (o for o in rows if o.kind is not Seen.OUTSIDE)
     return (*(o for o in rows if o.kind is Seen.OUTSIDE), *differing(recorded, root))
 
 
 def _here(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], request: Request, run: Run) -> Report:
-    """Settle them in a process of their own on this machine."""
+    """Discharge them in a process of their own on this machine."""
     try:
         response = run.processes.run(request, workspace.root)
     except OSError as error:
@@ -90,7 +90,7 @@ def _here(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...],
 
 
 def _lacking(work: Work, run: Run) -> tuple[str, ...]:
-    """The tools of a work, where the remote executor has none of them."""
+    """The tools of a job, as if the remote executor had none."""
     if run.offered is None or work.is_engine or not work.tools:
         return ()
     if not is_portable(method_backend(work.system, planned_method(work))):
@@ -141,7 +141,7 @@ def judged(work: Work, obligations: tuple[Obligation, ...], response: Response) 
 
 
 def _only(obligation: Obligation, answers: list[Outcome]) -> Outcome:
-    """An obligation without an outcome, or with two, must not pass for settled."""
+    """An obligation without an outcome, or with two, must not count as discharged."""
     if len(answers) == 1:
         return answers[0]
     how = "several answers" if answers else "no answer"
@@ -149,7 +149,7 @@ def _only(obligation: Obligation, answers: list[Outcome]) -> Outcome:
 
 
 def _rerun(outcome: Outcome, observed: Iterable[Observed]) -> Outcome:
-    """What rests on something that cannot be recorded could come out otherwise tomorrow: every run repeats it."""
+    """An answer that rests on something that cannot be recorded may differ tomorrow: every run repeats it."""
     outside = [o.path for o in observed if o.kind is Seen.OUTSIDE]
     if not outside:
         return outcome
@@ -158,7 +158,7 @@ def _rerun(outcome: Outcome, observed: Iterable[Observed]) -> Outcome:
 
 
 def _undeclared(report: Report, others: Sequence[Observed], worker: str) -> Report:
-    """The report of a tool that is not on this machine, and that used what no later run could compare."""
+    """The report for a tool that is missing on this machine and used inputs that no later run can compare."""
     rows = dict.fromkeys(Observed(Seen.OUTSIDE, _on(worker, o)) for o in others)
     observed = (*(o for o in report.observed if o not in others), *rows)
     return replace(report, observed=observed, outcomes=tuple(_rerun(o, observed) for o in report.outcomes))

@@ -1,4 +1,4 @@
-"""Avow's own code as an input: whoever edits a translator or a checker asks everything anew that it answered."""
+"""Avow's own code as an input: after an edit of a translator or checker, every answer that it gave is re-run."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ _PACKAGE = Path(avow.__file__).parent
 
 @functools.cache
 def engine_digest() -> str:
-    """Of the code behind the answers of the core's own engines."""
+    """Digest of the code behind the answers of the core's own engines."""
     return _digest(_of(_ROOMS))
 
 
 def backend_digest(tool: Backend) -> str:
-    """Of the code behind a backend's answers: the core's, and its own package or module."""
+    """Digest of the code behind a backend's answers: the core's, and the backend's own package or module."""
     return _digest((*_of(_ROOMS_OF_BACKENDS), *_own(type(tool).__module__)))
 
 
 def code_mark() -> str:
-    """Of this package's files as they lie there now, by their identity: a process that lives long has imported what lay
-    there when it began."""
+    """Digest of this package's files as they are on disk now, by their identity: a long-running process imported those
+    that were there when it started."""
     return sha256(json.dumps([[str(file), identity(file.stat(), file)] for file in sorted(_PACKAGE.rglob("*.py"))]))
 
 
 @functools.cache
 def reading_digest() -> str:
-    """Of the code behind what is kept of the nodes' texts: the core's, and that of this room."""
+    """Digest of the code behind what is cached of the nodes' texts: the core's, and this package's."""
     return _digest((*_of(_ROOMS), _PACKAGE / "pipeline"))
 
 
@@ -75,7 +75,7 @@ TRUSTED = {
     "its instances (instances.dfy)": ("calculus/proofs/instances.dfy",),
     "accounting (avow/assurance)": ("assurance",),
 }
-"""What of Avow has to be trusted for a certified claim, and where it stands."""
+"""The parts of Avow that must be trusted for a certified claim, and their files."""
 
 
 @functools.cache
@@ -114,7 +114,7 @@ def _digest(places: tuple[Path, ...]) -> str:
 
 @functools.cache
 def _parts(place: Path) -> tuple[bytes, ...]:
-    """The names and digests of the files of a room, or of one file."""
+    """The names and digests of the files of a package, or of one file."""
     found: list[bytes] = []
     for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
         if "__pycache__" not in file.parts and file.is_file():

@@ -1,13 +1,12 @@
-"""On what a method's answer depends beside the claim itself, the options, the plan's files and the tools.
+"""What a method's answer depends on besides the claim itself, the options, the plan's files and the tools.
 
 A claim's digest covers its clause and the node's assumptions. A method may see more: the other guarantees that it takes
-on (it settles them together), the types of *all* the node's ports (a program is run on
+on (it discharges them together), the types of *all* the node's ports (a program is run on
 inputs that the clause does not mention), the values of the contract's constants (an option or a program may name one),
-the scenario, and what the node is wired to. What is left out here would make evidence look current that is not; so a
-backend is taken to see all of it unless it says that it does not (`uses_scenario`, `uses_steps`, `uses_wiring`). The
-contracts of the nodes from which its data comes count where it says that it looks there (`uses_upstream`), a constant
-or another guarantee of the node as soon as its name occurs anywhere in the options or files. Of such a guarantee a
-method sees the name only.
+the scenario, and what the node is wired to. An omission here would make stale evidence look current, so a backend is
+assumed to see all of it unless it declares otherwise (`uses_scenario`, `uses_steps`, `uses_wiring`). The contracts of
+the nodes that feed it count if it declares `uses_upstream`; a constant or another guarantee of the node counts as soon
+as its name occurs anywhere in the options or files. A method sees only the name of such a guarantee.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ class Named:
         return any(word.search(text) for text in self.texts)
 
     def types(self, contract: Contract) -> tuple[tuple[str, Sort], ...]:
-        """Those that are named, or one of whose elements or constructors is. (The ports' own are known anyhow.)"""
+        """Those that are named, or that have a named element or constructor. (The ports' own are always included.)"""
         return tuple((name, sort) for name, sort in contract.types if any(map(self, (name, *_words(sort)))))
 
     def others(self, job: Job) -> frozenset[str]:
@@ -112,7 +111,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
 
 
 def _settled_together(job: Job) -> list[list[str]]:
-    """The clauses that the method sees, in whatever order they stand."""
+    """The clauses that the method sees, in any order."""
     assumed = [(clause, digest(clause.formula)) for clause in job.node.assumptions]
     taken = [(job.clause(o), o.digest) for o in job.obligations]
     return sorted([c.kind.value, c.name, meaning] for c, meaning in (*assumed, *taken))
@@ -123,8 +122,8 @@ def _ports(node: Node) -> list[list[str]]:
 
 
 def _wiring(system: System, node: Node, backends: Collection[str]) -> list[Any]:
-    """The node's topics, and for each edge that feeds it: the first value, the source's topics, and what the same
-    backend is told of the source."""
+    """The node's topics, and for each edge that feeds it: the first value, the source's topics, and the options that
+    the same backend has for the source."""
     ros = system.plan.ros
     found: list[Any] = [_topics(node)]
     if ros != Ros():
@@ -161,7 +160,7 @@ def upstream_of(tool: Backend, job: Job) -> frozenset[str]:
 
 
 def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:
-    """A node's clauses, what feeds it, and what the same backend is told."""
+    """A node's clauses, what feeds it, and the options of the same backend."""
     node, plan = job.contract.node(name), job.system.plan.node(name)
     clauses = sorted([c.kind.value, c.name, digest(c.formula)] for c in node.clauses)
     told = [method_options(m) for m in plan.methods if m.backend == backend and name != job.node.name]

@@ -1,4 +1,4 @@
-"""The export stage: what each method generates, written so that it shows whether it still is what was generated."""
+"""The export stage: writes what each method generates, so that later edits of these files are detected."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STAMP = ".export.json"
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """Of what files were generated, their digests, and their identities where they were looked at since."""
+    """What the files were generated from, their digests, and their identities when they were last read."""
 
     key: str
     files: Mapping[str, str]
@@ -56,14 +56,14 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
             return False
         if settled and _marks(place, files) == (seen, True):
             write_note(place / STAMP, Stamp(key, files, seen))
-    except OSError:  # a file that is gone; where nothing can be written, files are read every time
+    except OSError:  # the file is gone; without a writable folder, files are read every time
         return all(is_intact(place / name, sha) for name, sha in files.items())
     return True
 
 
 def _marks(place: Path, files: Iterable[str]) -> tuple[str, bool]:
-    """A digest of what the shortcut takes for a file's identity, and whether all of them are of an earlier moment: an
-    edit at the moment of a change may leave the times as they are. Raises OSError."""
+    """A digest of what the shortcut uses as a file's identity, and whether all of them are older than the clock's tick:
+    an edit within the tick may leave the times unchanged. Raises OSError."""
     paths = [f"{place}/{name}" for name in files]
     marks = [identity(os.stat(path), path) for path in paths]  # noqa: PTH116 - of each artifact in every run
     newest = max((int(mark[-1]) for mark in marks), default=0)
@@ -90,12 +90,12 @@ def key(work: Work) -> str:
 
 @by_identity(20_000)
 def whole_digest(node: Node) -> str:
-    """SHA-256 of all that a method may be shown of the node."""
+    """SHA-256 of everything that a method may read about the node."""
     return sha256(encode(whole_node(node), Path()))
 
 
 def generated(work: Work) -> Mapping[str, str]:
-    """The files that the backend makes of the work's slice and its sentences. Raises Rejected."""
+    """The files that the backend generates from the job's slice and its sentences. Raises Rejected."""
     assert work.shown is not None
     cut = work.shown()
     assert isinstance(cut, MethodSlice)
@@ -106,7 +106,7 @@ def generated(work: Work) -> Mapping[str, str]:
 
 
 def export(workspace: Workspace, work: Work, key: str, processes: Processes | None = None) -> tuple[str, ...]:
-    """Write what the backend generates and remove what it generated before and no more; the files' names."""
+    """Write what the backend generates, remove what it generated only before, and return the files' names."""
     files = processes.generated(work.name) if processes is not None else None
     if files is None:
         files = generated(work)
@@ -154,7 +154,7 @@ def _listed(place: Path) -> Iterable[str]:
 
 def read_stamp(place: Path) -> Stamp | None:
     stamp = read_note(Stamp, place / STAMP)
-    # what is listed here is removed once it is generated no more: never what lies elsewhere
+    # files listed here are removed once they are no longer generated: never files elsewhere
     return stamp if stamp is not None and all(_is_within(name) for name in stamp.files) else None
 
 

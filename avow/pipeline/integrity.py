@@ -1,4 +1,4 @@
-"""Can a system's ledger be believed? All that is known of it, gathered for the gates and for ``avow audit``."""
+"""Is a system's ledger intact? Gathers every finding for the gates and for ``avow audit``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def discrepancies(
     anchors: Sequence[Anchor] = (),
     strict: bool = False,
 ) -> tuple[Discrepancy, ...]:
-    """Everything that the audit finds. Without a survey (a contract that cannot be read) keys are not compared, and
-    that is told. `anchors` name heads that the ledger must hold. Raises OSError."""
+    """Everything that the audit finds. Without a survey (a contract that cannot be read) keys are not compared, and the
+    audit reports that. `anchors` name heads that the ledger must hold. Raises OSError."""
     system = ledger.path.stem
     plugins = surveyed.system.plan.plugins if surveyed else ()
     works = surveyed.catalogue.works if surveyed else ()
@@ -49,7 +49,7 @@ def discrepancies(
 
 
 def _known_damage(ledger: Ledger, index: Index) -> frozenset[str]:
-    """The damaged lines that a person has acknowledged, as the audit names them; none as soon as one is another."""
+    """The damaged lines that a person has acknowledged, as the audit names them; none as soon as one differs."""
     statement = acknowledged(index, ledger.path.stem)
     if statement is None:
         return frozenset()
@@ -62,8 +62,8 @@ def _state(damage: Sequence[Damage]) -> str:
 
 
 def settle_losses(workspace: Workspace, system: str, who: str, why: str) -> tuple[Discrepancy, ...]:
-    """A person has seen what is lost or damaged of a ledger: noted in the index, so that it is no longer open. What was
-    open; nothing is written if nothing was. Raises OSError."""
+    """Note in the index that a person has seen what is lost or damaged in a ledger. Returns what was open; writes
+    nothing if nothing was. Raises OSError."""
     ledger, path = Ledger(workspace.ledger(system)), index_path(workspace.ledgers)
     acknowledge(workspace, ledger)
     index, anchors = read_index(path), reported_heads(workspace, system)
@@ -75,7 +75,7 @@ def settle_losses(workspace: Workspace, system: str, who: str, why: str) -> tupl
         return ()
     if index.damage:
         path.rename(path.with_name(f"{path.name}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"))
-        for other in index.systems:  # what the others were known to reach stays known
+        for other in index.systems:  # keep what is known about the others
             for statement in index.of(other):
                 more = {"note": statement.note, "state": statement.state} if statement.note else {}
                 note(path, statement.event, other, statement.records, statement.head, **more)
@@ -93,8 +93,8 @@ def _unread(system: str) -> Discrepancy:
 
 
 def acknowledge(workspace: Workspace, ledger: Ledger) -> None:
-    """Before a new report takes the place of the old one: what the old one says of the ledger, and is not so, is kept
-    in the index. Otherwise the next run could not know of it. Raises OSError."""
+    """Before a new report replaces the old one, keep in the index what the old one says about the ledger and is not so.
+    Otherwise the next run could not know it. Raises OSError."""
     system, path = ledger.path.stem, index_path(workspace.ledgers)
     entries = ledger.records()
     if not entries:
@@ -104,12 +104,12 @@ def acknowledge(workspace: Workspace, ledger: Ledger) -> None:
         if anchor.head not in known:
             event = Event.LOST if began(read_index(path), system) else Event.REACHED
             note(path, event, system, 0, anchor.head)
-    if not read_index(path).of(system):  # made by an older version, or the index was deleted: told from now on
+    if not read_index(path).of(system):  # made by an older version, or the index was deleted: reported from now on
         note(path, Event.REACHED, system, entries[-1].number + 1, entries[-1].hash)
 
 
 def confirm(workspace: Workspace, ledger: Ledger) -> None:
-    """Note how far the ledger reaches, unless it is not the one that it should be. Raises OSError."""
+    """Note the ledger's length, unless it is another ledger than expected. Raises OSError."""
     entries, path = ledger.records(), index_path(workspace.ledgers)
     known = _known_damage(ledger, read_index(path))
     damaged = any(f"line {d.line}" not in known for d in ledger.damage)
@@ -118,7 +118,7 @@ def confirm(workspace: Workspace, ledger: Ledger) -> None:
 
 
 def reported_heads(workspace: Workspace, system: str | None = None) -> tuple[Anchor, ...]:
-    """What the reports on disk say of ledgers' heads; of one system's, or of all."""
+    """What the reports on disk say about the heads of ledgers, for one system or for all."""
     pattern = f"{system}/report.json" if system else "*/report.json"
     found: list[Anchor] = []
     for file in sorted(workspace.reports.glob(pattern)) if workspace.reports.is_dir() else ():

@@ -1,4 +1,4 @@
-"""What the kernel established of one system in one run."""
+"""What the kernel established for one system in one run."""
 
 from __future__ import annotations
 
@@ -25,4 +25,4 @@ class Checked:
     answers: dict[tuple[str, str, str], Reestablished | None] = field(default_factory=dict)
     runs: dict[str, KernelRun] = field(default_factory=dict)
     counting: tuple[tuple[object, ...], tuple[Entry, ...]] | None = None
-    """A ledger's place, head and length, and what of it counts."""
+    """A ledger's path, head and length, and its entries that count."""

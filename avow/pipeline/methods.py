@@ -23,7 +23,7 @@ Offered = Mapping[str, tuple[str, str]] | None
 
 def tool_identities(tool: Backend, offered: Offered = None) -> tuple[tuple[str, str, str], ...]:
     """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing. With
-    `offered`, of what can be sent there: the tools there."""
+    `offered`, the tools of the remote workers for what can be sent there."""
     if offered is not None and is_portable(tool):
         return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
     found = ((t, package_digest(t.package) if t.package else program_digest(t.places)) for t in tool.tools())
@@ -40,7 +40,7 @@ def method_backend(system: System, method: Method) -> Backend:
 
 
 def method_job(system: System, node: Node, method: Method, tool: Backend | None = None) -> Job:
-    """`tool` is the method's backend, where it is at hand: one under test need not be installed."""
+    """`tool` is the method's backend, if given: a backend under test need not be installed."""
     claimed = (tool or method_backend(system, method)).claims
     names = [c for c in claimed if _can_be_claimed(system, node, c)]
     claims = tuple(_program_claim(system, node, name) for name in names)
@@ -48,7 +48,7 @@ def method_job(system: System, node: Node, method: Method, tool: Backend | None 
 
 
 def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:
-    """A program agrees with a model where the plan has one; where none can be run, the answer says why."""
+    """A program agrees with its model if the plan has one; if none can be run, the answer says why."""
     return name is not ProgramClaim.LINKED or bool(models(system, node.name) or unrun(system, node.name))
 
 
@@ -60,7 +60,7 @@ _CLAIMED = {
 
 @by_identity(50_000)
 def _program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
-    """Something of the node's program: its meaning hangs on the node's ports and assumptions."""
+    """A claim about the node's program: its meaning depends on the node's ports and assumptions."""
     ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
     assumed = sorted(digest(clause.formula) for clause in node.assumptions)
     meaning = sha256(json.dumps([name, ports, assumed]))

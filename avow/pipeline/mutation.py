@@ -1,12 +1,12 @@
-"""Hunting hollow evidence: would a method that supports a guarantee notice if the guarantee said something else?
+"""Finds non-discriminating evidence: would a method that supports a guarantee detect a changed guarantee?
 
-For each guarantee that a method supports, near misses of it (`avow.sanity.mutants`) are put in its place, and the
-method is run on them. A mutant that it refutes is *killed*, and so is one that a prover, asked in the same way, no
-longer proves. A mutant that could not be judged (no row of a table speaks of it, its trigger was not met, the tool
-failed) is neither killed nor a survivor: not to understand a question is not to see through it. Evidence that no judged
-mutant disturbs supports nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that
-it is about; methods that a person's judgement guides (reviews, measurements) do not read the formula and have no score.
-Of each survivor it is said at which input and answer it differs from the contract (`avow.sanity.mutants`).
+For each guarantee that a method supports, mutants (`avow.sanity.mutants`) replace it, and the method is run on them. A
+mutant that it refutes is *killed*, and so is one that a prover, run in the same way, no longer proves. A mutant that
+could not be judged (no row of a table matches it, its trigger was not met, the tool failed) is neither killed nor a
+survivor. Evidence that no judged mutant changes supports nothing: it is recorded as vacuous. The score is appended to
+the ledger with its evidence; methods that rest on a person's judgement (reviews, measurements) do not read the formula
+and have no score. Each survivor is reported with an input and answer at which it differs from the contract
+(`avow.sanity.mutants`).
 """
 
 from __future__ import annotations
@@ -36,8 +36,7 @@ _Task = tuple[Work, Obligation, Evidence]
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How many near misses of a guarantee a method noticed. `survivors` and `unjudged` say what was changed in the
-    others."""
+    """How many mutants of a guarantee a method killed. `survivors` and `unjudged` name the change of the others."""
 
     obligation: str
     method: str
@@ -45,14 +44,14 @@ class Score:
     survivors: tuple[str, ...]
     unjudged: tuple[str, ...]
     differences: tuple[Difference, ...] = ()
-    """Of each survivor, in their order."""
+    """For each survivor, in their order."""
     reasons: tuple[str, ...] = ()
-    """Of each that was not judged, in their order, what the method said."""
+    """For each mutant that was not judged, in their order, what the method said."""
     mapped: bool = False
-    """Whether a person's table stands between the formula and what the method looks at."""
+    """Whether the method reads a person's table in place of the formula."""
 
     def blind(self, difference: Difference) -> str:
-        """What the method did not see, and what would show it."""
+        """The mutants that the method did not detect, and an input that shows the difference."""
         table = (
             ", or what the plan gives it (a table, instances, a property for a ban) leaves that out"
             if self.mapped
@@ -71,15 +70,15 @@ class Score:
 
     @property
     def hollow(self) -> bool:
-        """Mutants were judged, and not one was noticed."""
+        """Mutants were judged, and none was killed."""
         return self.mutants > 0 and self.killed == 0
 
 
 def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jobs: int) -> Iterator[Score]:
-    """Score every piece of current, supporting evidence of these works, `jobs` mutants at once; each score comes as
-    soon as it, and those before it, are there."""
+    """Score every piece of current, supporting evidence of these jobs, `jobs` mutants at once; yields each score in
+    order as soon as it is known."""
     tasks = [task for work in works if _reads_formulas(work) for task in _tasks(workspace, work)]
-    run.processes.prepare(workspace.root)  # while there is one thread
+    run.processes.prepare(workspace.root)  # needs a single thread
     with ThreadPoolExecutor(jobs) as pool:
         yield from pool.map(lambda task: _score(workspace, task, run, limit), tasks)
 
@@ -136,7 +135,7 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
 
 
 def _noticed(outcome: Outcome, record: Evidence) -> bool | None:
-    """Whether the method saw through a mutant; None where it did not judge it."""
+    """Whether the method killed a mutant; None if it did not judge it."""
     if outcome.verdict is Verdict.REFUTED:
         return True
     if outcome.verdict.supports:

@@ -1,6 +1,6 @@
 """The `index.md` in each node's folder of artifacts: claims, files, the outside commands that check them, and verdicts.
 
-It is written whenever a report is rendered, from the same case, so that it shows what the ledger says now.
+It is written with each report, from the same case, so that it shows what the ledger says now.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _checks(workspace: Workspace, work: Work) -> tuple[OutsideCheck, ...] | str:
     job = method_job(work.system, work.system.contract.node(work.node), method)
     try:
         return tuple(tool.outside_checks(job, folder(workspace, work).resolve(), tuple(stamp.files)))
-    except Rejected as wrong:  # the verdict says it, too, if the method's input is at fault
+    except Rejected as wrong:  # the verdict reports a fault of the method's input
         return escaped(wrong.diagnostics[0].message)
 
 

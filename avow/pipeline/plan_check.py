@@ -1,4 +1,4 @@
-"""What is wrong with a contract and a plan, before any solver is asked."""
+"""Finds faults of a contract and a plan before any solver runs."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from avow.system.topics import heard, turned, unknown_types
 def diagnostics(
     system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
 ) -> tuple[Diagnostic, ...]:
-    """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off.
-    `clean`: (node, method) of which nothing is to be said; those found to be so are added. `shelf`: where it is kept
-    what the nodes' texts say, and which options have the right shape."""
+    """Lints of the contract and findings about the plan, without the warnings that the plan switches off. `clean`: each
+    (node, method) without a finding; newly found ones are added. `shelf`: a cache of what the nodes' texts say and
+    which options have the right shape."""
     found = check_paths(system.plan.contract_files, off=system.plan.off, shelf=shelf)[1]
     return (*found, *of_plan(system, clean, shelf))
 
@@ -39,9 +39,8 @@ def diagnostics(
 def of_plan(
     system: System, clean: set[tuple[str, str]] | None = None, shelf: Shelf | None = None
 ) -> tuple[Diagnostic, ...]:
-    """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
-    what each backend says of its options; without the warnings that the plan switches off. `clean` and `shelf`: as for
-    `diagnostics`."""
+    """Findings about a plan that can be read: its account of the ROS graph, its requirements' sentences, and each
+    method's options; without the warnings that the plan switches off. `clean` and `shelf`: as for `diagnostics`."""
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
         *launched.told(system),
@@ -67,8 +66,8 @@ def of_plan(
 
 
 def left_out(system: System) -> tuple[Diagnostic, ...]:
-    """The plans in and below the system's folder that it does not take in, a warning each; none where the plan switches
-    them off."""
+    """A warning for each plan in or below the system's folder that it does not include; none if the plan switches them
+    off."""
     if "CLI021" in system.plan.lints_off:
         return ()
     taken_in = {path.resolve() for path in (system.plan.path, *system.plan.included)}
@@ -77,7 +76,7 @@ def left_out(system: System) -> tuple[Diagnostic, ...]:
 
 
 def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERROR) -> Diagnostic:
-    """What is to be said of a plan that no run looks at; `around`: the system in whose folder it lies."""
+    """The warning about a plan that no run reads; `around`: the system whose folder it is in."""
     why = f"'{around}' does not take it in" if around else "its folder is not one of contracts/ itself"
     hint = "move its folder into contracts/, or take it in under `subsystems` of another plan"
     if path.name != "plan.yaml":
@@ -86,7 +85,7 @@ def not_verified(path: Path, around: str = "", severity: Severity = Severity.ERR
 
 
 def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
-    """What is to be said of the policy and of the methods' options of a system that cannot be loaded."""
+    """Findings about the policy and the methods' options of a system that cannot be loaded."""
     rest = rest_of(folder)
     if rest is None:
         return ()
@@ -109,7 +108,7 @@ def _model(system: System) -> tuple[Diagnostic, ...]:
     """The paper's step 1: does the system model account for all of the ROS graph?"""
     try:
         told = account(system, dataflow(system))
-    except Rejected as rejected:  # a graph that cannot be read: said with everything else that is wrong
+    except Rejected as rejected:  # a graph that cannot be read is reported with all other faults
         return rejected.diagnostics
     return told.findings if told is not None else ()
 
@@ -130,8 +129,8 @@ def _method(
     *,
     follows: Callable[[Diagnostic], bool] = lambda _: False,
 ) -> Iterable[Diagnostic]:
-    """What is wrong with the options, and what the backend says of those that are right, but for what only follows from
-    a fault that is told already."""
+    """Faults of the options, and the backend's findings about the correct ones, without consequences of a fault that is
+    reported already."""
     if method.id in ENGINES:
         yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
         return
@@ -149,14 +148,14 @@ def _method(
     if any(d.is_error for d in wrong):
         method = replace(method, options=_right(tool.options_schema, method.options))
         if any(_schema(tool.options_schema, method.options, whole)):
-            return  # without what is wrong they say nothing
+            return  # without the faulty options the others mean nothing
     if node in [n.name for n in system.contract.nodes]:
         job = method_job(system, system.contract.node(node), method)
         yield from (d for d in one_step.check(tool, job) if not follows(d))
 
 
 def _right(schema: Mapping[str, Any], options: Located) -> Located:
-    """The options that are right by themselves."""
+    """The options that are correct by themselves."""
     known = schema.get("properties", {})
     if not isinstance(options.data, Mapping):
         return options

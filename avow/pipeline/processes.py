@@ -1,7 +1,7 @@
 """The processes of a run's jobs: forks of a server that has imported everything, or else a new Python for each.
 
-To start Python, import Avow and Z3 and build the grammar's tables costs more than many a job. A run has most of that
-imported by the time it knows that there is a job. It forks a server while it has one thread; the server imports the
+Starting Python, importing Avow and Z3, and building the grammar's tables cost more than most jobs. A run has imported
+most of that before its first job. It forks a server while it has one thread; the server imports the
 rest and forks a supervisor for each job. The supervisor forks the job's process, ends it as soon as the run stops
 waiting, and ends whatever it left running. Where this process cannot be forked (several threads, systems other than
 Linux), each job gets a new Python.
@@ -52,14 +52,15 @@ _PRELOADED = (
     "avow.solving.questions",
     "avow.system.formulas",
 )
-"""What nearly every job needs. No backend is among them: its import may start threads, which a fork does not have."""
+"""What nearly every job needs. Backends are left out: importing one may start threads, which a fork does not inherit.
+"""
 
 Files = Mapping[str, str]
 """Name → text."""
 
 
 class Processes:
-    """The processes of one run. They end with it, or at the latest with this process."""
+    """The processes of one run. They end with it, at the latest with this process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -67,10 +68,10 @@ class Processes:
         self._generator: Connection | None = None
         self._forks: list[multiprocessing.process.BaseProcess] = []
         self._owner = 0
-        """This process, once it has forked anything: a fork of it does not use what is not its own."""
+        """This process' id, once it has forked: a fork of it must not use these connections."""
 
     def prepare(self, cwd: Path, generate: Callable[[str], Files] | None = None) -> None:
-        """Fork the server, and with `generate` (from a job's name to files) the generator as well. Without effect where
+        """Fork the server, and with `generate` (from a job's name to files) the generator as well. Without effect if
         this process cannot be forked or has a server."""
         if self._owner == os.getpid() or not _may_fork():
             return
@@ -95,7 +96,7 @@ class Processes:
                 process.unwatch(fork.pid)
 
     def generated(self, name: str) -> Files | None:
-        """What `generate` says of the name in the generator; None where there is no answer."""
+        """The generator's `generate(name)`; None if there is no answer."""
         if self._generator is None or self._owner != os.getpid():
             return None
         try:
@@ -107,8 +108,8 @@ class Processes:
         return found
 
     def run(self, request: Request, cwd: Path, stopped: Callable[[], bool] | None = None) -> Response:
-        """Execute the job in a process of its own, which ends soon after `stopped` says so. Raises OSError where there
-        is no room for its files."""
+        """Execute the job in a process of its own, which ends soon after `stopped` is true. Raises OSError if its files
+        cannot be written."""
         data = request_bytes(request)
         digest, seconds = request_digest(data), request.seconds + WORKER_GRACE
         with tempfile.TemporaryDirectory(prefix="avow-request-") as name:
@@ -127,7 +128,7 @@ class Processes:
     def _executed(
         self, place: Path, cwd: Path, seconds: float, stopped: Callable[[], bool] | None
     ) -> tuple[int | None, str]:
-        """The process' exit code (None: it was out of time) and what it wrote to standard error."""
+        """The process' exit code (None: time-out) and its standard error."""
         self.prepare(cwd)
         mine, theirs = socket.socketpair()
         with mine:
@@ -140,11 +141,11 @@ class Processes:
         command = [sys.executable, "-P", "-m", WORKER, str(place)]
         env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": absolute_only()}
         done = process.run(command, cwd=cwd, seconds=seconds, env=env, stopped=stopped)
-        # the process that guards it tells of a signal by a code above 128
+        # the guarding process reports a signal by a code above 128
         return 128 - done.code if done.code is not None and done.code > 128 else done.code, done.stderr
 
     def _sent(self, place: Path, theirs: socket.socket) -> bool:
-        """Whether a server took the job on."""
+        """Whether a server accepted the job."""
         if self._control is None or self._owner != os.getpid():
             return False
         try:
@@ -156,7 +157,7 @@ class Processes:
 
 
 def _may_fork() -> bool:
-    """Whether a fork of this process would be as good as a new Python."""
+    """Whether a fork of this process can replace a new Python."""
     if os.environ.get(PLAIN) or sys.platform != "linux" or is_led_here():
         return False
     try:
@@ -167,7 +168,7 @@ def _may_fork() -> bool:
 
 
 def _fork(kept: int, cwd: Path, serve: Callable[[], None]) -> multiprocessing.process.BaseProcess:
-    """Run `serve` in a fork. It ends as its connection closes, of which only the descriptor `kept` stays open there."""
+    """Run `serve` in a fork, which ends when its connection closes. Only the descriptor `kept` stays open there."""
 
     def alone() -> None:
         os.setsid()
@@ -181,9 +182,9 @@ def _fork(kept: int, cwd: Path, serve: Callable[[], None]) -> multiprocessing.pr
         os.environ.update({"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": absolute_only()})
         atexit._clear()
         process.forget_orphans()
-        gc.freeze()  # the collector writes to what it looks at, and would copy what the run shares with the fork
+        gc.freeze()  # the collector writes to the objects that it visits, which would copy pages shared with the run
         gc.set_threshold(COLLECTED_IN_WORKS)
-        multiprocessing.current_process().daemon = False  # a backend may have processes of its own
+        multiprocessing.current_process().daemon = False  # a backend may start processes
         serve()
 
     fork = multiprocessing.get_context("fork").Process(target=alone, daemon=True)
@@ -200,7 +201,7 @@ def _generate(connection: Connection, generate: Callable[[str], Files]) -> None:
             name = connection.recv()
             try:
                 found = dict(generate(name))
-            except Exception:  # the run generates them itself, and reports what is wrong
+            except Exception:  # the run generates them itself and reports the fault
                 found = None
             connection.send(found)
 
@@ -228,7 +229,8 @@ def _serve(control: socket.socket) -> None:
 
 
 def _supervise(place: Path, user: socket.socket) -> NoReturn:
-    """In a supervisor: the job's process, until it ends or the user hangs up. Then the user gets the exit code."""
+    """In a supervisor: runs the job's process until it ends or the client closes the connection, and sends the exit
+    code."""
     try:
         os.setsid()
         process.adopt_orphans()
@@ -267,12 +269,12 @@ def _execute(place: Path, supervisor: int) -> NoReturn:
 
 
 def _exit_code(connection: socket.socket, end: float, stopped: Callable[[], bool] | None) -> int | None:
-    """The job's exit code, once it and all that it started have ended; None where its time is up."""
+    """The job's exit code, once it and everything that it started have ended; None after a time-out."""
     while True:
         left = end - time.monotonic()
         if select.select([connection], [], [], max(0.0, left if stopped is None else min(left, FORK_LOOK)))[0]:
             said = connection.recv(32)
-            return int(said) if said else -signal.SIGKILL  # without a word: the supervisor was killed
+            return int(said) if said else -signal.SIGKILL  # no message: the supervisor was killed
         if left <= 0 or (stopped is not None and stopped()):
             connection.shutdown(socket.SHUT_WR)  # the supervisor ends the job, and then answers
             select.select([connection], [], [], FORK_STOP)

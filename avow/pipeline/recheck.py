@@ -1,8 +1,8 @@
-"""No proof of the calculus is believed because it was recorded: the kernel establishes it again, in every run.
+"""Recorded proofs of the calculus are not trusted: the kernel re-establishes each in every run.
 
-A record of the calculus keeps the certificates beside it, as hints. Whether a record still counts is decided here from
-contract and plan as they are now; a record whose claim the kernel does not establish, with the key that it told, counts
-as one of an earlier state, and is asked anew.
+A record of the calculus keeps the certificates beside it, as hints. This module decides from the current contract and
+plan whether a record still counts. If the kernel does not establish its claim under its key, the record counts as
+stale, and the claim is re-run.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def still_counts(record: Evidence, root: Path, system: System, run: Run) -> bool
 
 
 def counting_now(ledger: Ledger, root: Path, system: System, run: Run) -> tuple[Entry, ...]:
-    """The entries; those that do not count any more with a key that is nobody's. Looked at once in a run, for the same
-    ledger: all that a run says is of one moment."""
+    """The entries; those that no longer count get an unused key. Computed once in a run for the same ledger, so that a
+    run's answers are of one moment."""
     checked, state = _checked(system, run), (ledger.path, ledger.head, len(ledger.records()))
     if checked.counting is None or checked.counting[0] != state:
         counting = tuple(
@@ -60,15 +60,15 @@ def counting_now(ledger: Ledger, root: Path, system: System, run: Run) -> tuple[
 
 
 def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: Run) -> KernelRun:
-    """What the kernel establishes, in this run, of what the calculus told that it proved; with cvc5 as well where it is
-    installed, for so many steps of its own. Asked once in a run for the same entries."""
+    """What the kernel establishes in this run of the calculus' proofs, by cvc5 as well if it is installed, within the
+    given number of its steps. Computed once in a run for the same entries."""
     records = [e.evidence for e in entries if e.evidence.method == COMPOSE and e.evidence.verdict is Verdict.PROVED]
     records = [r for r in records if isinstance(r.details.get("certificate"), dict)]
     texts = {_kept(r): _kept_text(r, root) for r in records}
     asked = sha256(json.dumps([run.id, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
     checked = _checked(system, run)
     if asked not in checked.runs:
-        # Z3's answers first: what cvc5 is asked is only what holds already
+        # Z3's answers first: cvc5 only gets what Z3 established
         good = [r for r in records if _holds(r, root, system, run) is not None]
         checked.runs[asked] = _twice(good, texts, system, run.id, checked.solvers)
     return checked.runs[asked]
@@ -85,7 +85,7 @@ def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, r
             one = reestablished(certificates, record.obligation)
             if one is not None and one.key == record.details["certificate"].get("key"):
                 found[record.obligation] = one
-                if one.scope in certificates.kept:  # a loop with nothing to show rests on no certificate
+                if one.scope in certificates.kept:  # a loop without claims needs no certificate
                     used[one.scope] = to_json(certificates.kept[one.scope])
     version = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     parts = (*trusted_parts(), ("Python", version))
@@ -101,7 +101,7 @@ def _checked(system: System, run: Run) -> Checked:
 
 
 def _kept(record: Evidence) -> str:
-    """The file of certificates that a record keeps; empty where it rests on none, as a loop with nothing to show."""
+    """The file of certificates that a record keeps; empty if it needs none, as a loop without claims."""
     return next((path for path in record.outputs if path.endswith(f"/{FILE}")), "")
 
 
@@ -120,7 +120,7 @@ def _established(record: Evidence, root: Path, system: System, run: Run) -> bool
 
 
 def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablished | None:
-    """What the kernel establishes of a record with a certificate, if with the key that the record tells."""
+    """What the kernel establishes for a record with a certificate, provided its key is the record's."""
     told, text, checked = record.details["certificate"], _kept_text(record, root), _checked(system, run)
     question = (record.obligation, str(told.get("key")), sha256(text))
     if question not in checked.answers:
@@ -134,7 +134,7 @@ def _holds(record: Evidence, root: Path, system: System, run: Run) -> Reestablis
 
 
 def _read(text: str) -> dict[str, Certificate]:
-    """What cannot be read is no certificate."""
+    """Text that cannot be read is no certificate."""
     try:
         return from_text(dict[str, Certificate], text)
     except Unreadable:

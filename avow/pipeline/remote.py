@@ -22,7 +22,7 @@ class Executor(Protocol):
         ...
 
     def run(self, request: Request) -> Response:
-        """Called by many threads at once; what goes wrong is a response, too."""
+        """Called by many threads at once; a failure is a response, too."""
         ...
 
 
@@ -36,7 +36,7 @@ class Remote:
     again: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(os.cpu_count() or 1), repr=False
     )
-    """For what is re-run on this machine: less at once than a cluster executes."""
+    """Limits what is re-run on this machine, which executes less at once than a cluster."""
     _warned: set[str] = field(default_factory=set, repr=False)
 
     def warn(self, text: str) -> None:
@@ -47,7 +47,7 @@ class Remote:
 
 
 def remote(executor: Executor) -> Remote:
-    """What an executor offers. Raises Rejected where it has no worker."""
+    """What an executor offers. Raises Rejected if it has no worker."""
     offers = executor.offers()
     if not offers:
         raise Rejected(Diagnostic("CLUSTER004", "the cluster has no workers", hint="start one: avow worker --on …"))

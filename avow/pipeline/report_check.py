@@ -1,12 +1,11 @@
 """Does a report on disk say what the ledger says?
 
-Five steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
-the ledger has no other that could count, no other refutation and no newer one; every conclusion follows again from
-those records (statuses, gates, exit code); the kernel establishes from the certificates in the report what it says that
-the kernel established; the contracts' texts that it shows have the digests that it names; every other format is, byte
-for byte, what that case renders to. What the report was made *of* (contract, plan) is compared by digest where the
-files are here; which files of its evidence are others now is told (`stale`), and is no difference from the ledger. One
-thing it cannot know: whether the obligations are still those of today's contract; that is what `avow verify` is for.
+It checks, each step on its own: every record that the report quotes is in the ledger, unchanged, and the ledger has no
+other record that counts, no other refutation and no newer one; every conclusion (status, gate, exit code) follows from
+those records; the kernel establishes its share from the certificates in the report; the contracts' texts have the
+digests that the report names; every other format equals, byte for byte, what the case renders to. Contract and plan are
+compared by digest if the files are here; changed files of the evidence are reported (`stale`) and are no difference
+from the ledger. It cannot know whether the obligations are still those of today's contract: `avow verify` does.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ from avow.system.load import PLAN_FILE, load_system
 def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tuple[str, ...]:
     """Every way in which the report in `folder` differs from the ledger, in words; nothing where it agrees.
 
-    Without a ledger only the report's own consistency is checked, and that is said.
+    Without a ledger it checks only the report's own consistency, and reports that.
     """
     try:
         case = from_json(codec.parsed(read_regular(folder / "report.json")))
@@ -56,8 +55,8 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
 
 
 def stale(case: Case, root: Path) -> tuple[str, ...]:
-    """The files, under `root` or beyond it, that evidence which counts in the case was made of and that are others now:
-    the report says what the ledger says, but of an earlier state."""
+    """The changed files, under `root` or outside it, among the inputs of evidence that counts: the report agrees with
+    the ledger, but shows an earlier state."""
     counting = [r for view in case.obligations for r in view.records]
     marks = {pair for record in counting for pair in record.inputs.items()}
     seen = {path for record in counting for path in changed(record, root)}
@@ -65,16 +64,16 @@ def stale(case: Case, root: Path) -> tuple[str, ...]:
 
 
 def outdated(case: Case, path: Path, root: Path) -> tuple[str, ...]:
-    """Why a report does not say what is so now: its ledger at `path` says something else, or a file that the report or
-    its evidence was made of has changed. Raises OSError where there is a ledger that cannot be read."""
+    """Why a report is not current: its ledger at `path` differs, or an input of the report or of its evidence has
+    changed. Raises OSError if the ledger cannot be read."""
     files = {name for name, mark in case.digests if (root / name).exists() and _digest(root / name) != mark}
     changed_now = sorted(files | set(stale(case, root)))
     return (*differences(case, path, root), *(f"{name} has changed since the report was made" for name in changed_now))
 
 
 def differences(case: Case, path: Path, root: Path) -> tuple[str, ...]:
-    """Every way in which a case that was read differs from the ledger at `path`, as `check` tells it. Raises OSError
-    where there is a ledger that cannot be read."""
+    """Every way in which a case differs from the ledger at `path`, in the words of `check`. Raises OSError if the
+    ledger cannot be read."""
     if not path.exists():
         return (_NO_LEDGER,)
     ledger = Ledger(path)
@@ -138,7 +137,7 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
         try:
             found = read_regular(path)
             same = found == data
-            if not same and name == ATTESTATION:  # signed: what stands in the envelopes
+            if not same and name == ATTESTATION:  # signed: compare the content of the envelopes
                 same = unseal_lines(found.decode("utf-8", "replace"), keys).encode() == data
         except OSError as error:
             yield f"{name} cannot be read: {error.strerror}"
@@ -170,7 +169,7 @@ def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
         if mark not in known:
             yield f"the report quotes {where}, which the ledger does not hold"
         elif entry not in (known[mark], now[mark]) and not (
-            # what supports and counts no more makes nothing look better
+            # supporting records that no longer count cannot improve a verdict
             entry.evidence.verdict.supports and entry in (not_established(known[mark]), changed_since(known[mark]))
         ):
             yield f"the report quotes {where} otherwise than the ledger has it"
@@ -193,7 +192,7 @@ def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
 
 
 def _kernel(case: Case, root: Path) -> Iterable[str]:
-    """What the report says that the kernel established, from the certificates in it and the contracts that are here."""
+    """Checks what the report credits to the kernel, from its certificates and the contracts here."""
     if not case.kernel.established:
         return
     made_of = sorted((Path(path).name != PLAN_FILE, path) for path, _ in case.digests)

@@ -19,8 +19,8 @@ from avow.base.workspace import Workspace
 from avow.pipeline.state import State, system_of
 
 _SILENT = ("certify", "verify")
-"""Stages whose result is the report and the final table, not a line of their own; they are done in every run that
-does any work."""
+"""Stages without a line of their own, as the report and the final table show their result; every run that does any work
+executes them."""
 
 _ASK_NOTHING = {"check", "obligations", "export", "report"}
 """Stages that give no worker anything to do."""
@@ -32,7 +32,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     desc = "progress, then what was proved, checked, tested, refuted and not run"
 
     _state: State
-    """Of the run that it tells of: set by `reporter_of`, since doit makes the instance."""
+    """The run that it reports: set by `reporter_of`, since doit makes the instance."""
 
     def __init__(self, outstream: IO[str], options: dict[str, Any]) -> None:
         super().__init__(outstream, options)
@@ -105,7 +105,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         results = self._state.results
         if sys.exc_info()[0] is None:
             self._state.run.close()
-        process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
+        process.kill_all()  # no process may outlive the run, even an interrupted one
         with self._lock:
             self._clear()
         self._write_index()
@@ -150,7 +150,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         return earlier(self._state)
 
     def _keep(self) -> None:
-        """Note that all is settled, for the next run, or that it is not."""
+        """Note for the next run whether everything is up to date."""
         state = self._state
         if not state.read:
             return
@@ -196,12 +196,12 @@ def _sweep(workspace: Workspace) -> None:
 
 
 def _lock_run(workspace: Workspace, out: IO[str]) -> IO[str] | None:
-    """One run at a time in a workspace: a second waits for the first and then finds its work done. None where nothing
-    can be written: there, no two runs can be in each other's way."""
+    """One run at a time in a workspace: a second waits for the first and then finds its work done. None if nothing can
+    be written: such runs cannot conflict."""
     place = workspace.artifacts / ".lock"
     try:
         if place.exists() and not place.is_file():
-            place.unlink()  # a pipe in its place would keep us waiting for ever
+            place.unlink()  # opening a pipe in its place would block
         file = place.open("w")
     except OSError:
         return None

@@ -1,4 +1,4 @@
-"""What a job's process is sent, and what it answers: bytes both ways, with a digest of what was asked."""
+"""A job's request and response as bytes; the response names the request's digest."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Request:
     method: str
     engine: str
     keys: Mapping[str, str]
-    """Obligation → what its answer depends on: computed again by the worker, from the slice."""
+    """Obligation → key of its answer: the worker computes it again from the slice."""
     limits: Limits
     cut: bytes
     """The slice (`avow.pipeline.slices`), as `avow.pipeline.blobs` writes it."""
@@ -54,7 +54,7 @@ class Request:
     kept: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     """Obligation → earlier refuting cases, as its backend wrote them (`record.CASE`): they are tried first."""
     earlier: str = ""
-    """What the engine kept for itself in its last job (`avow.calculus.entailment`): hints."""
+    """Hints that the engine kept in its last job (`avow.calculus.entailment`)."""
 
     @property
     def wanted(self) -> Tools:
@@ -63,13 +63,13 @@ class Request:
 
     @property
     def seconds(self) -> float:
-        """What all its obligations together may take."""
+        """Limits for all its obligations together."""
         return self.limits.seconds * max(2, len(self.keys))
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What came of the request with that digest: a report, or why there is none."""
+    """The answer to the request with that digest: a report, or why there is none."""
 
     request: str
     report: Report | None = None

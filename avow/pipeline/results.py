@@ -1,4 +1,4 @@
-"""What came of each system in this run, and the exit code that follows. Light: an idle run needs it too."""
+"""The result of each system in this run, and the exit code that follows. Light: an idle run needs it too."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class Result:
     verdict: str = ""
     """The case's verdict in words."""
     tone: str = ""
-    """The verdict's colour: what is known to be bad is amber, and what nothing is asked of is grey."""
+    """The verdict's colour: a known failure is amber, and a system without required gates is grey."""
     lines: tuple[str, ...] = ()
     """The five answers, for a terminal."""
 
 
 @dataclass(slots=True)
 class Results:
-    """What came of a run so far."""
+    """The results of a run so far."""
 
     finished: dict[str, Result] = field(default_factory=dict)
     """System → its result."""
@@ -47,12 +47,13 @@ class Results:
 
     @property
     def all(self) -> tuple[Result, ...]:
-        """The systems assessed so far, by name: which was through first is chance."""
+        """The systems assessed so far, by name: the order of completion is arbitrary."""
         return tuple(self.finished[name] for name in sorted(self.finished))
 
     @property
     def exit_code(self) -> int:
-        """0: every gate passes; 1: one fails; 3: one fails for want of a tool, and no other. Only systems that were to
+        """0: every gate passes; 1: one fails; 3: a gate fails for a missing tool, and no other fails. Only systems that
+        were to
         be verified count: `doit report` shows failing gates and ends with 0."""
         codes = {self.finished[name].exit_code for name in self.gated}
         return 1 if 1 in codes else max(codes, default=0)

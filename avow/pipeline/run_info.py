@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """A run: its identity, as evidence records name it, and what it found out so far."""
+    """A run: its identity, as evidence records name it, and its cached findings."""
 
     id: str
     fresh: bool
-    """It settles everything anew."""
+    """It re-runs everything."""
     begun: float = field(default_factory=time.monotonic, compare=False)
     remote: Remote | None = field(default=None, compare=False, repr=False)
     """Where it sends jobs; none: it executes all on this machine."""
     checked: dict[Path, Checked] = field(default_factory=dict, compare=False, repr=False)
-    """System's folder → what the kernel established again of it."""
+    """System's folder → what the kernel re-established for it."""
 
     @property
     def offered(self) -> Mapping[str, tuple[str, str]] | None:

@@ -1,4 +1,4 @@
-"""What the environment says of a run, and how the commands say it."""
+"""A run's settings in the environment, and how the commands set them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 from avow.isolation.level import SANDBOX
 
 EXPLAIN = "AVOW_EXPLAIN"
-"""Environment variable that makes gates say what they lack (`avow verify --explain` sets it)."""
+"""Environment variable that makes gates explain what they lack (`avow verify --explain` sets it)."""
 
 FRESH = "AVOW_FRESH"
-"""Environment variable that makes a run settle everything anew (`avow verify --fresh` sets it)."""
+"""Environment variable that makes a run repeat everything (`avow verify --fresh` sets it)."""
 
 SECONDS = "AVOW_SECONDS"
 """Environment variable with the time for one question, in place of the plan's (`avow verify --seconds` sets it)."""
@@ -20,11 +20,11 @@ KEY = "AVOW_KEY"
 """Environment variable with a private key's file: reports' attestations are signed with it (`avow verify --key`)."""
 
 ON = "AVOW_ON"
-"""Environment variable with the cluster that works are sent to (`avow verify --on` sets it)."""
+"""Environment variable with the cluster that jobs are sent to (`avow verify --on` sets it)."""
 
 
 def asked_seconds() -> float | None:
-    """What `SECONDS` says; None where it says nothing that is a time."""
+    """The value of `SECONDS`; None if it is no time."""
     try:
         seconds = float(os.environ.get(SECONDS, ""))
     except ValueError:
@@ -39,7 +39,7 @@ def signing_key() -> Path | None:
 
 
 def asked_of_runs(*, fresh: bool, explain: bool, sandbox: bool, seconds: float | None) -> None:
-    """Let the runs of this process be as the options of `avow verify` say; `seconds` is the time for one question."""
+    """Apply the options of `avow verify` to the runs of this process; `seconds` is the time for one question."""
     wanted = {FRESH: "1" if fresh else "", EXPLAIN: "1" if explain else "", SANDBOX: "required" if sandbox else ""}
     os.environ.update({name: value for name, value in wanted.items() if value})
     if seconds is not None:

@@ -1,11 +1,11 @@
-"""A run with nothing to do, found out by looking at files' identities only, without reading a contract.
+"""Detects a run with nothing to do from files' identities only, without reading a contract.
 
 After a complete run of everything, `keep` notes the identity (inode, size, times of change) of every file that the
 answer depends on: contracts, artifacts, reports, Avow's own code, and the folders in which tools and packages would
-appear; and the environment. While all that is the same, the next `doit verify` has nothing to do and says so. Times of
-*change* (ctime) cannot be set back, so what editors and copies write is never missed; a touched file only costs the
-long way. Where a file system has no such times, the bytes count (`files.identity`). No file is believed that changed
-within the tick of the clock in which it is looked at: a tick passes first.
+appear; and the environment. While all of that is the same, the next `doit verify` has nothing to do and says so. Times
+of *change* (ctime) cannot be set back, so edits and copies are always detected; a touched file only costs a full run.
+On file systems without such times, the bytes are compared (`files.identity`). A file that changed within the current
+tick of the clock is not trusted: the check waits for the next tick.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXP
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
 _OURS = (".doit.json", ".lock", ".settled.json", "report.pdf")
-"""Among the artifacts: doit's own memory and our locks, which change with every run, and what is written on demand."""
+"""Excluded among the artifacts: doit's own memory and our locks, which change with every run, and files written on
+demand."""
 _PACKAGES = (*LIBRARIES, "hypothesis", "rosbags")
-"""Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
+"""Tools that are packages: for other folders on the module path only additions and removals count."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Settled:
-    """What a complete run was of, and what came of it."""
+    """The inputs of a complete run, and its results."""
 
     sources: str
     identity: str
@@ -57,14 +58,14 @@ class Shortcut:
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
         self._begun: str | None = None
-        """What the sources were before this run read them."""
+        """The state of the sources before this run read them."""
 
     def nothing_to_do(self, wanted: Sequence[str]) -> tuple[Result, ...] | None:
         """The results of the last run, if only verification is `wanted` and nothing has changed since; else None.
         Called before anything is read."""
         found = self._settled(wanted)
         if found is None:
-            time.sleep(TICK_SECONDS)  # an edit from now on is told by its time
+            time.sleep(TICK_SECONDS)  # an edit from now on has a later time
         return found
 
     def _settled(self, wanted: Sequence[str]) -> tuple[Result, ...] | None:
@@ -85,9 +86,9 @@ class Shortcut:
         return kept.results if asked - {""} <= names else None
 
     def keep(self, results: Sequence[Result], programs: Iterable[str] = ()) -> None:
-        """Note that everything is settled as things stand, the outside tools' `programs` too. Without effect where a
-        link leads out of the workspace, where a plan reads launch files (which stand anywhere, and say what else is
-        read), or where something was edited during the run: the results are not of what stands there now."""
+        """Note that everything is up to date, including the outside tools' `programs`. Without effect if a link leads
+        out of the workspace, if a plan reads launch files (which may be anywhere and name further files), or if
+        something was edited during the run, so that the results are of an earlier state."""
         time.sleep(TICK_SECONDS)
         try:
             sources = _sources(self.workspace)
@@ -103,11 +104,11 @@ class Shortcut:
 
 
 def _reads_elsewhere(workspace: Workspace) -> bool:
-    """Whether a plan may read files outside ``contracts/``: `launch` stands in it beside comments, or what may spell it
-    otherwise. Raises OSError."""
+    """Whether a plan may read files outside ``contracts/``: it contains `launch` outside comments, or an escape that
+    may spell it. Raises OSError."""
     plans = (read_regular(path) for path in workspace.contracts.rglob("plan.yaml"))
     lines = [line.lstrip() for plan in plans for line in plan.splitlines()]
-    said = (line for line in lines if not (line.startswith(b"#") and line.isascii()))  # YAML has further ends of lines
+    said = (line for line in lines if not (line.startswith(b"#") and line.isascii()))  # YAML has more line ends
     return any(b"launch" in line or b"\\" in line for line in said)
 
 
@@ -116,7 +117,7 @@ def _stamp(workspace: Workspace) -> Path:
 
 
 def _observed(workspace: Workspace) -> tuple[Observed, ...]:
-    """What subjects were seen to look at, beyond the workspace or anywhere in it."""
+    """The files that programs under test read, inside or outside the workspace."""
     from avow.evidence.currency import looked_at
     from avow.evidence.ledger import ledger_of
 
@@ -125,7 +126,7 @@ def _observed(workspace: Workspace) -> tuple[Observed, ...]:
 
 
 def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) -> str:
-    """`sources`: what `_sources` says. Raises OSError for anything that cannot be looked at."""
+    """`sources`: the result of `_sources`. Raises OSError for anything that cannot be read."""
     digest = hashlib.sha256(sources.encode())
     for o in observed:
         mark = marks(o) or look(o.kind, o.path)
@@ -135,7 +136,7 @@ def _identity(workspace: Workspace, sources: str, observed: Sequence[Observed]) 
 
 
 def _sources(workspace: Workspace) -> str:
-    """As `_identity`, of what no run writes: contracts, code, tools, environment."""
+    """As `_identity`, for what no run writes: contracts, code, tools, environment."""
     digest = hashlib.sha256()
     environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
     today = str(datetime.now().astimezone().date())
@@ -143,7 +144,7 @@ def _sources(workspace: Workspace) -> str:
     key = signing_key()
     digest.update(_mark(str(key)).encode() if key is not None else b"")
     signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
-    _add_files(digest, (), workspace.contracts, *signed)  # whatever it is called, a plan may name it
+    _add_files(digest, (), workspace.contracts, *signed)  # a plan may name any file
     _add_files(digest, ("__pycache__",), *_CODE)
     digest.update(json.dumps([package_digest(name) for name in _PACKAGES]).encode())
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
@@ -152,8 +153,8 @@ def _sources(workspace: Workspace) -> str:
 
 
 def _searched(name: str, workspace: Workspace) -> str:
-    """A folder in which tools and modules are looked for. In the workspace itself a run leaves folders of its own and
-    others' caches, which are nobody's input."""
+    """A folder that is searched for tools and modules. In the workspace itself a run leaves its own folders and other
+    tools' caches, which are no inputs."""
     if not Path(name).is_dir():
         return ""
     if not Path(name).samefile(workspace.root):

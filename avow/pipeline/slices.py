@@ -1,7 +1,7 @@
-"""What one work may see, as data: no more than its keys cover.
+"""What one job may see, as data: no more than its keys cover.
 
-An engine gets its slice and nothing else, so that it cannot use what a key does not say. A slice of a slice is the
-slice: whoever receives one computes the keys from it again.
+An engine gets its slice and nothing else, so that it cannot use what a key does not cover. A slice of a slice is the
+slice, so a receiver can compute the keys again.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ class SanitySlice:
 
 @dataclass(frozen=True, slots=True)
 class ComposeSlice:
-    """The whole contract, and what of the plan bears on how its nodes are composed."""
+    """The whole contract, and the parts of the plan that affect the composition of its nodes."""
 
     system: System
 
 
 @dataclass(frozen=True, slots=True)
 class MethodSlice:
-    """A node and one method of it, with what the method's options and files name of the contract's words."""
+    """A node and one of its methods, with the contract's names that the method's options and files use."""
 
     system: System
     node: str
@@ -94,8 +94,8 @@ def compose_slice(system: System) -> ComposeSlice:
 def method_slice(
     tool: Backend, job: Job, files: Iterable[Path] | None = None, *, sentences: bool = False
 ) -> MethodSlice:
-    """`files`: the method's, where they are at hand. `sentences`: with those of the clauses, which no answer may depend
-    on; generated files show them."""
+    """`files`: the method's, if available. `sentences`: include the clauses' sentences, which generated files show and
+    no answer may depend on."""
     plan = job.system.plan
     named = Named.of(method_options(job.method), tool.files(job) if files is None else files)
     graph, own = dataflow(job.system), job.node.name
@@ -130,8 +130,8 @@ def method_slice(
 
 
 def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> Node:
-    """The node with the guarantees that the method takes on; of others that it names there is the name only. A node
-    that is upstream of itself has all of them."""
+    """The node with the guarantees that the method discharges; others that it names keep only their names. A node that
+    is upstream of itself has all of them."""
     node, taken, others = job.node, {o.name for o in job.obligations}, named.others(job)
     if node.name in upstream:
         taken, others = {c.name for c in node.guarantees}, frozenset()
@@ -147,7 +147,7 @@ def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> 
 
 @by_identity(20_000)
 def whole_node(node: Node) -> Node:
-    """The node as a method that takes all of it on sees it, with its sentences."""
+    """The node as seen by a method that discharges all of it, with its sentences."""
     assumed, promised = (
         tuple(replace(_bare_clause(clause), sentence=clause.sentence) for clause in part)
         for part in (node.assumptions, node.guarantees)
@@ -157,20 +157,20 @@ def whole_node(node: Node) -> Node:
 
 
 def _other(node: Node, upstream: Collection[str]) -> Node:
-    """Another node, with its clauses where data reaches the method's own node from there."""
+    """Another node, with its clauses if its data reaches the method's own node."""
     clauses = node if node.name in upstream else replace(node, assumptions=(), guarantees=())
     assumed, promised = (tuple(map(_bare_clause, part)) for part in (clauses.assumptions, clauses.guarantees))
     return replace(node, assumptions=assumed, guarantees=promised, definitions=())
 
 
 def _bare_clause(clause: Clause) -> Clause:
-    """Without how it is written and where it stands."""
+    """Without its notation and source position."""
     return replace(clause, position=0, text="", sentence=None)
 
 
 def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str]) -> NodePlan:
-    """With the methods whose models the program is held against, those whose recordings it is asked on, and, of a node
-    that feeds itself, what is told of it as of any source (`_told`)."""
+    """With the methods whose models the program is compared with, those whose recordings it is run on, and, for a node
+    that feeds itself, its options as a source (`_told`)."""
     told = tuple(m for m in node.methods if m.backend in backends)
     others = {m.id: replace(m, guarantees=()) for m in (*beside(job), *told) if m.id != job.method.id}
     methods = (job.method, *others.values())
@@ -181,10 +181,10 @@ def _planned(tool: Backend, node: NodePlan, job: Job, backends: Collection[str])
 
 
 def _told(node: NodePlan, backends: Collection[str]) -> NodePlan:
-    """A source: what the same backend is told of it."""
+    """A source, with the same backend's options for it."""
     return replace(node, criticality="", source=None, methods=tuple(m for m in node.methods if m.backend in backends))
 
 
 def _bare(plan: Plan) -> Plan:
-    """Nothing but the plan's name and place."""
+    """Only the plan's name and path."""
     return Plan(plan.system, "", plan.path, ())

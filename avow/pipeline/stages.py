@@ -1,8 +1,7 @@
 """The stages as doit tasks, one for each system, node and method.
 
-Whether a task is up to date is decided by the content that it depends on, never by time stamps or by doit's own
-memory: by the keys in the ledger, and by the digests of what stands on disk. So an interrupted run loses only the
-attempts in flight, and a run with nothing to do does nothing.
+The keys in the ledger and the digests of files on disk decide whether a task is up to date, never time stamps or doit's
+own memory. So an interrupted run loses only the attempts in flight, and a run with nothing to do does nothing.
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ STAGES = {
     "report": ("render the reports from the ledger; no tool runs", "render the reports of {0} from the ledger"),
     "verify": ("run all stages, then check the policy's gates", "run all stages for {0}, then check the gates"),
 }
-"""What `doit list --all` says of a stage, and of a task (system, node, method)."""
+"""The descriptions that `doit list --all` shows for a stage and for a task (system, node, method)."""
 
 _OF_A_SYSTEM = ("check", "obligations", "certify", "report", "verify")
-"""Those of which each system has one task."""
+"""The stages with one task for each system."""
 
 
 def stages(state: State) -> Iterator[Task]:
@@ -83,7 +82,7 @@ def _tasks(state: State) -> Iterator[Task]:
     systems = [surveyed.system for surveyed in found.values() if not isinstance(surveyed, Rejected)]
     taken_in = {path.resolve() for system in systems for path in system.plan.included}
     for path in state.workspace.stray_plans() if len(systems) == len(found) else ():
-        if path.resolve() not in taken_in:  # where a system cannot be read, it may be the one that takes it in
+        if path.resolve() not in taken_in:  # a system that cannot be read may include it
             name = path.parent.relative_to(state.workspace.root).as_posix()
             yield from _rejected(name, Rejected(not_verified(path)))
 
@@ -96,7 +95,7 @@ def _mixed_up(name: str, folders: Sequence[Path]) -> Rejected:
 
 
 def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected:
-    """The system, if its ledger is a file that can be read or is to begin."""
+    """The system, if its ledger can be read or does not exist yet."""
     if isinstance(surveyed, Rejected):
         return surveyed
     path = state.workspace.ledger(surveyed.system.name)
@@ -207,7 +206,7 @@ def _settled(state: State, work: Work) -> Callable[[], bool]:
 
 
 def _act(action: Callable[[], object]) -> TaskError | bool:
-    """Bad input and a fault of ours become a failed task with a message; what a stage returns is not for doit."""
+    """Bad input and an internal error become a failed task with a message; doit ignores what a stage returns."""
     try:
         action()
     except Rejected as rejected:

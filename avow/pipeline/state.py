@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class State:
-    """What becomes known in a run of one workspace."""
+    """The state of a run of one workspace."""
 
     workspace: Workspace
     run: Run = field(default_factory=new_run)
     results: Results = field(default_factory=Results)
     surveyed: list[Survey] = field(default_factory=list)
-    """Every system that could be read; none where nothing had to be."""
+    """Every system that could be read; none if nothing had to be read."""
     changed: list[str] = field(default_factory=list)
     """The systems whose report was written anew."""
     cases: dict[str, tuple[str, Case]] = field(default_factory=dict)
-    """System → its case as last made, and the key that it is of."""
+    """System → its latest case, and the case's key."""
     certified: dict[str, str] = field(default_factory=dict)
-    """System → what the kernel established again in this run, in words."""
+    """System → what the kernel re-established in this run, in words."""
     read: bool = False
     """Contracts were read: the run had something to do."""
     answer: IO[str] | None = None
-    """Where the run's results go as JSON, if anybody wants them so; what people read goes to standard error then."""
+    """Where the run's results go as JSON, if requested; text for people goes to standard error then."""
     shortcut: Shortcut = field(init=False)
 
     def __post_init__(self) -> None:
@@ -44,10 +44,10 @@ class State:
 
 
 def task_name(folder: str) -> str:
-    """A folder's name as part of a task's: doit would refuse all tasks for one ``=``, and ``:`` parts names."""
+    """A folder's name as part of a task's: doit would reject all tasks for one ``=``, and ``:`` separates names."""
     return re.sub("[%:=]", lambda found: f"%{ord(found[0]):02X}", folder)
 
 
 def system_of(task: str) -> str:
-    """The system, or the folder, that a task is of, by the task's name; empty where it is of all."""
+    """The system or folder of a task, from the task's name; empty for a task of all systems."""
     return unquote(task.partition(":")[2].partition(":")[0])

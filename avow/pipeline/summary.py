@@ -1,4 +1,4 @@
-"""What a run says on the terminal when it is over."""
+"""What a run prints on the terminal at its end."""
 
 from __future__ import annotations
 
@@ -88,12 +88,12 @@ def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequ
 
 
 def _left_out(results: Sequence[Result]) -> Iterable[tuple[str, str]]:
-    """What was left out, and why: told in every run, and once for all systems."""
+    """What was left out, and why: printed in every run, once for all systems."""
     return dict.fromkeys(row for r in results for row in r.left_out)
 
 
 def _few(reason: str) -> str:
-    """The reason as far as a person reads it there; what to do next is kept."""
+    """The reason, shortened for a terminal; the next step is kept."""
     why, mark, step = reason.partition("; next: ")
     if len(why) > GATE_REASON:
         why = f"{why[:GATE_REASON].rpartition(';')[0] or why[: GATE_REASON - 1] + '…'}; all in the report"
@@ -133,7 +133,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
 
 
 def _inline(text: str) -> str:
-    """Text as it stands, on one line, without meaning to Markdown or HTML."""
+    """The text on one line, escaped for Markdown and HTML."""
     escaped = "".join(f"\\{c}" if c in "\\`*_[]<>|#" else c for c in " ".join(text.split()))
     return escaped.replace("&", "&amp;")
 

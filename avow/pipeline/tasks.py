@@ -29,9 +29,9 @@ Task = dict[str, Any]
 class Pipeline:
     """A run of the pipeline in one workspace, for `dodo.py` and for commands.
 
-    `asked` is doit's command line without the program's name: it tells whether only verification is wanted, so that a
-    run with nothing to do reads no contract. `answer` gets the results as JSON; all else goes to standard error then.
-    `remote`: where jobs are sent that can run on other machines.
+    `asked` is doit's command line without the program's name: if it asks for verification only, a run with nothing to
+    do reads no contract. `answer` gets the results as JSON; all else goes to standard error then. `remote` executes the
+    jobs that can run on other machines.
     """
 
     def __init__(
@@ -39,9 +39,9 @@ class Pipeline:
     ) -> None:
         leave_here()
         sys.dont_write_bytecode = not _has_room()  # else a container's run compiles all of it every time
-        gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
+        gc.set_threshold(COLLECTED)  # a run's objects mostly stay alive, so collections find little
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
-            os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
+            os.environ[FRESH] = "1"  # use no earlier run: otherwise each stage would find nothing to do
         if asked and asked[0] in _OF_MEMORY:
             print(f"doit keeps no memory here for `{asked[0]}`: the ledger says what is settled.", file=sys.stderr)
             print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
@@ -50,7 +50,7 @@ class Pipeline:
         self._wanted = wanted(asked)
 
     def config(self) -> dict[str, Any]:
-        """DOIT_CONFIG for the workspace. Ends with code 2 where there can be no artifacts."""
+        """DOIT_CONFIG for the workspace. Exits with code 2 if the artifacts' folder cannot be written."""
         try:
             self._state.workspace.artifacts.mkdir(exist_ok=True)
         except OSError as error:
@@ -88,18 +88,18 @@ class Pipeline:
 
 
 def _has_room() -> bool:
-    """Whether byte code can be kept: Python does not notice that it wrote half of it, and fails on it ever after."""
+    """Whether byte code can be kept: on a full disk Python writes half of a file unnoticed and fails on it later."""
     place = os.statvfs(Path(__file__).parent)
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     return limit == resource.RLIM_INFINITY and place.f_bavail * place.f_frsize > BYTE_CODE_ROOM
 
 
 _OF_MEMORY = ("forget", "ignore", "reset-dep", "dumpdb")
-"""doit's verbs that are about its own memory of what was done."""
+"""doit's commands about its own memory of executed tasks."""
 
 
 def _runs(asked: Sequence[str]) -> bool:
-    """Whether doit's command is to run tasks: it is where none is named."""
+    """Whether doit's command runs tasks, as it does if none is named."""
     first = next((word for word in asked if not word.startswith("-")), "run")
     return first not in ("list", "info", "clean", "forget", "help", "ignore", "dumpdb", "strace", "auto", "reset-dep")
 
@@ -123,7 +123,7 @@ def execute(
 
 
 def wanted(arguments: Sequence[str]) -> tuple[str, ...]:
-    """The tasks that doit is asked to run; empty for anything that is not plainly a run."""
+    """The tasks that doit is to run; empty for a command line that is not plainly a run."""
     names: list[str] = []
     rest = list(arguments[1:] if arguments[:1] == ["run"] else arguments)
     while rest:

@@ -1,7 +1,7 @@
-"""What there is to do for a system: every obligation, who settles it, and on what the answer depends.
+"""A system's jobs: every obligation, the method that discharges it, and what the answer depends on.
 
-The core's own engines (language, sanity, calculus) and the backends look alike from here: a `Work` is one method
-applied to the obligations that it takes on, with a key for each. A record is current while its key is unchanged.
+The core's own engines (language, sanity, calculus) and the backends have the same form here: a `Work` is one method
+applied to its obligations, with a key for each. A record is current while its key is unchanged.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ LANGUAGE = "language"
 SANITY = "sanity"
 COMPOSE = "compose"
 ENGINES = (LANGUAGE, SANITY, COMPOSE)
-"""The core's own engines; the plan cannot name a method so."""
+"""The core's own engines; the plan cannot give a method one of these names."""
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """One method and the obligations that it takes on; `keys` maps an obligation's id to what its answer depends on."""
+    """One method and its obligations; `keys` maps an obligation's id to a digest of what its answer depends on."""
 
     system: System
     node: str
@@ -56,7 +56,7 @@ class Work:
     keys: Mapping[str, str]
     limits: Limits = field(default_factory=Limits)
     cut: Callable[[], Slice] | None = field(default=None, compare=False, repr=False)
-    """What the engine gets to see; none for what needs no engine."""
+    """What the engine may see; none if no engine is needed."""
     shown: Callable[[], Slice] | None = field(default=None, compare=False, repr=False)
     """What a method's generated files show."""
     files: tuple[Path, ...] = field(default=(), compare=False, repr=False)
@@ -67,7 +67,7 @@ class Work:
     """The digest of the plan's and the contract's texts."""
 
     def changed(self) -> bool:
-        """Whether contract or plan are not what they were when this work was found."""
+        """Whether contract or plan have changed since this job was made."""
         return bool(self.texts) and self.texts != texts_digest(self.system)
 
     @property
@@ -80,7 +80,7 @@ class Work:
 
 
 def _language_work(system: System) -> Work:
-    """The contract parses and types: settled by having been loaded."""
+    """The contract parses and has types: loading it is the check."""
     contract = system.contract
     files = ", ".join(path.name for path in system.plan.contract_files)
     obligation = Obligation(
@@ -96,7 +96,7 @@ def _language_work(system: System) -> Work:
 
 
 def _sanity_work(whole: Frame, node: Node) -> Work:
-    """Is this node's contract worth verifying? `whole` is its system's frame: made once for all nodes."""
+    """Is this node's contract worth verifying? `whole` is its system's frame, made once for all nodes."""
 
     cut = sanity_slice(whole, node)
     obligations, keys = sanity_claims(cut)
@@ -104,7 +104,7 @@ def _sanity_work(whole: Frame, node: Node) -> Work:
 
 
 def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str, str]]:
-    """The obligations that a slice is of, and their keys."""
+    """The obligations of a slice, and their keys."""
 
     node, meaning = cut.node, node_key(cut.node)
     of_the_node = [(claim, meaning) for claim in claims(node)]
@@ -130,7 +130,7 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
 
 @functools.cache
 def _no_values() -> str:
-    """What a scenario says of a node to whose inputs it gives none."""
+    """A scenario's part for a node without values for its inputs."""
 
     return encode(({}, Ranges()), Path()).decode()
 
@@ -152,12 +152,12 @@ def _method_works(system: System, offered: Offered = None) -> tuple[Work, ...]:
         method_work(system, system.contract.node(plan.node), method, offered)
         for plan in system.plan.nodes
         for method in plan.methods
-        if method.guarantees  # else nothing of the node is written
+        if method.guarantees  # otherwise no file is generated for the node
     )
 
 
 def method_work(system: System, node: Node, method: Method, offered: Offered = None) -> Work:
-    """`offered`: the tools of the machines that works are sent to, if they are."""
+    """`offered`: the tools of the machines that jobs are sent to, if any."""
 
     tool = method_backend(system, method)
     job = method_job(system, node, method)
@@ -192,7 +192,7 @@ def method_work(system: System, node: Node, method: Method, offered: Offered = N
 
 
 def _compared(system: System, job: Job) -> tuple[str, ...]:
-    """The models that the program is held against, and the recordings: their programs, files and options."""
+    """The models that the program is compared with, and the recordings: their programs, files and options."""
     found = []
     for method in beside(job):
         tool = method_backend(system, method)
@@ -214,11 +214,11 @@ def _compared(system: System, job: Job) -> tuple[str, ...]:
 
 
 _BOUNDS = {"seconds": (0.1, 604_800), "megabytes": (64, 10_000_000), "seed": (0, 2**31 - 1)}
-"""Least and greatest value of each limit: beyond them a slip of the pen, or what the system's calls do not take."""
+"""Least and greatest value of each limit: others are typing errors or rejected by system calls."""
 
 
 def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
-    """Raises Rejected, as every stage needs them and none may guess."""
+    """Raises Rejected for a value out of range."""
     wrong = []
     for name, (least, most) in _BOUNDS.items():
         value = options.get(name, least)
@@ -234,19 +234,19 @@ def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
 
 
 def planned_method(work: Work) -> Method:
-    """The plan's method that a work is of; not for the core's own engines."""
+    """The plan's method of a job; not for the core's own engines."""
     return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
 
 
 def programs(works: Iterable[Work]) -> tuple[str, ...]:
-    """Where the outside tools are that these works use."""
+    """The paths of the outside tools that these jobs use."""
     used = (method_backend(work.system, planned_method(work)) for work in works if not work.is_engine)
     return tuple(dict.fromkeys(place for backend in used for tool in backend.tools() for place in tool.places))
 
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """All obligations of a system, each once, and all works."""
+    """All obligations of a system, each once, and all jobs."""
 
     system: System
     obligations: tuple[Obligation, ...]
@@ -261,7 +261,7 @@ class Catalogue:
 
 
 def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = None) -> Catalogue:
-    """`offered`: as `method_work` has it. `shelf`: where it is kept what follows from the nodes' texts. Raises Rejected
+    """`offered`: as for `method_work`. `shelf`: a cache of what follows from the nodes' texts. Raises Rejected
     for an unknown backend, and where the plan's formulas are wrong."""
 
     if shelf is not None:
@@ -279,7 +279,7 @@ def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = Non
         replace(work, texts=texts, limits=replace(work.limits, seconds=asked, asked=True) if asked else work.limits)
         for work in works
     )
-    own = (node for node in system.contract.nodes if not node.relay)  # a relay is wiring, as a link is
+    own = (node for node in system.contract.nodes if not node.relay)  # a relay is wiring, like a link
     guarantees = (guarantee(system, node, c.name) for node in own for c in node.guarantees)
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}
@@ -307,8 +307,8 @@ def _work(
 def _keys(
     obligations: Iterable[Obligation], method: str, *parts: str, reasons: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Of ``[id, digest, method, *parts]`` as JSON: what all have in common is written once. `reasons`: what else
-    settles some, by id."""
+    """Digests of ``[id, digest, method, *parts]`` as JSON, with the common part serialised once. `reasons`: further
+    inputs of some, by id."""
     common, more = json.dumps([method, *parts])[1:], reasons or {}
     own = {o.id: [o.id, o.digest, *([more[o.id]] if o.id in more else [])] for o in obligations}
     return {name: sha256(f"{json.dumps(parts)[:-1]}, {common}") for name, parts in own.items()}
@@ -319,7 +319,7 @@ def _files(paths: Iterable[Path]) -> str:
 
 
 def texts_digest(system: System) -> str:
-    """Of the files that contract and plan were read from: comments count."""
+    """Digest of the files that contract and plan were read from: comments count."""
     plan = system.plan
     return sha256(json.dumps(list(map(digest_or_missing, (plan.path, *plan.contract_files, *plan.included)))))
 
@@ -333,7 +333,7 @@ def _contract_digest(contract: Contract) -> str:
 
 
 def _scenario(system: System) -> str:
-    """What the core's engines see of it; its `steps` only temporal requirements ask for, whose digest has them."""
+    """What the core's engines see of it. Only temporal requirements use its `steps`, and their digest has them."""
     return system.plan.scenario.content if system.plan.scenario else ""
 
 

@@ -1,8 +1,8 @@
 """A job in a process of its own: ``python -m avow.pipeline.worker FOLDER``, or a fork that does the same
 (`avow.pipeline.processes`).
 
-A solver that crashes, eats the memory or never returns takes this process with it and nothing else: the pipeline turns
-that into a verdict. Two workers use two cores, whatever Python's lock says.
+A solver that crashes, exhausts the memory or never returns ends only this process, and the pipeline records that as a
+verdict. Two workers use two cores despite Python's global lock.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ from avow.system.plan import System
 
 
 class Refused(Exception):  # noqa: N818 - it names what happened
-    """What was asked is not what the keys are of; says why."""
+    """The request does not match its keys; the text says why."""
 
 
 def entry(place: Path) -> int:
@@ -83,7 +83,7 @@ def answer(asked: bytes) -> bytes:
             return response_bytes(Response(digest, failure=str(refused), worker=platform.node()))
         if process.ended_by_others() or request.limits.asked:
             report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
-        process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
+        process.end_orphans()  # no process of a tool or program under test outlives the answer
         told = json.dumps(to_json(report), default=str).replace(f"{place}/", "")
         spent = os.times()
         cpu = spent.user + spent.system + spent.children_user + spent.children_system
@@ -92,7 +92,7 @@ def answer(asked: bytes) -> bytes:
 
 
 def _asked_again(outcome: Outcome) -> Outcome:
-    """What is open after a tool was killed from outside, or within a time for this run only, is for the next run."""
+    """An answer left open by a kill from outside, or by this run's own time limit, is for the next run."""
     if outcome.verdict not in (Verdict.ERROR, Verdict.UNKNOWN):
         return outcome
     return replace(outcome, details={**outcome.details, RETRY: True})
@@ -126,7 +126,7 @@ def _execute(request: Request, root: Path) -> Report:
 
 
 def keys_of(cut: Slice) -> Mapping[str, str]:
-    """Obligation → the key that a slice gives it. Raises Refused for a slice without what it is about."""
+    """Obligation → the key that a slice gives it. Raises Refused for a slice that lacks its subject."""
     try:
         match cut:
             case SanitySlice(linked=linked):
@@ -153,8 +153,8 @@ def _shown(tools: Tools) -> str:
 
 
 def _claims(request: Request, obligations: Sequence[Obligation], keys: Mapping[str, str]) -> tuple[Obligation, ...]:
-    """What is asked for. Raises Refused where a key is not that of what came: its answer would be recorded under a key
-    that it does not answer."""
+    """The requested obligations. Raises Refused if a key does not match the slice: the answer would be recorded under a
+    wrong key."""
     if any(keys.get(name) != key for name, key in request.keys.items()):
         raise Refused(CHANGED if request.root else "what came is not what its keys are of")
     return tuple(o for o in obligations if o.id in request.keys)
@@ -181,14 +181,14 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
         kept=request.kept,
     )
     report = one_step.discharge(tool, job, folder, request.limits)
-    if request.root and not request.altered:  # tools read the plan's files by themselves, at any time until now
+    if request.root and not request.altered:  # tools read the plan's files themselves, at any time until now
         again = _method_work(system, work.node, work.method)
         _claims(request, again.obligations, again.keys)
     return report if request.altered else remarked(report, one_step.check(tool, job), job)
 
 
 def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits: Limits) -> Report:
-    """Settle sanity claims of one node by the solver."""
+    """Discharge sanity claims of one node by the solver."""
     bounds = results.Bounds(seed=limits.seed)
     if limits.asked:
         bounds = replace(bounds, effort=from_seconds(limits.seconds))
@@ -201,8 +201,8 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
 
 
 def remarked(report: Report, found: Iterable[Diagnostic], job: Job) -> Report:
-    """The report with the warnings among `found`, but for those that the plan switches off: an assessor reads what a
-    method's check remarks of plan and files beside its answers."""
+    """The report with the warnings among `found`, but for those that the plan switches off: an assessor reads a
+    method's remarks on plan and files beside its answers."""
     told = [
         {"code": d.code, "place": _place(d.span, job.root), "message": d.message}
         for d in dict.fromkeys(found)

@@ -1,4 +1,4 @@
-"""A system as read from its folder, with all that there is to do for it."""
+"""A system as read from its folder, with all its jobs."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from avow.system.plan import System
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """`digest` is of the plan's and the contract's text: comments count here, as they show in reports."""
+    """`digest` covers the plan's and the contract's text: comments count here, as reports show them."""
 
     system: System
     catalogue: Catalogue
     digest: str
     shelf: Shelf | None = field(default=None, compare=False, repr=False)
-    """Where it is kept what was found out of the texts; none in a run that believes no earlier one."""
+    """The cache of what follows from the texts; none in a run that uses no earlier one."""
 
     def work(self, method: str) -> Work:
-        """The first work of that method; for the engines that there is one of. Raises KeyError."""
+        """The first job of that method, for engines with a single job. Raises KeyError."""
         for work in self.catalogue.works:
             if work.method == method:
                 return work
@@ -51,8 +51,8 @@ class Survey:
 
 
 def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey | Rejected:
-    """A system that cannot be read is a value here: it must not keep the others from being verified. `offered`: as
-    `method_work` has it. `fresh`: without what an earlier run found out of the nodes' texts."""
+    """A system that cannot be read is a value here, so that the others can be verified. `offered`: as for
+    `method_work`. `fresh`: without an earlier run's cache of the nodes' texts."""
     shelf = None if fresh else Shelf(folder, reading_digest())
     try:
         system = load_system(folder, shelf)
@@ -70,7 +70,7 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
 
 @dataclass(frozen=True, slots=True)
 class ListedClaim:
-    """An obligation in obligations.json: `at` is its place, `methods` who settles it."""
+    """An obligation in obligations.json: `at` is its source position, `methods` are those that discharge it."""
 
     id: str
     kind: Kind
@@ -89,7 +89,7 @@ class Listing:
 
 
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:
-    """artifacts/<system>/obligations.json: every claim, with its formula and who settles it. `dry`: is it current?"""
+    """artifacts/<system>/obligations.json: every claim, with its formula and its methods. `dry`: is it current?"""
     text = _listed(workspace, surveyed)
     path = workspace.artifacts / surveyed.system.name / "obligations.json"
     if dry:
