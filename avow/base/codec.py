@@ -2,14 +2,14 @@
 follows.
 
 Writing, reading and the schema come from the same type hints, so they cannot drift apart. Reading is strict: an unknown
-or missing field, a value of another type, a key that stands twice, or what is no number, is `Unreadable`, never a
-guess; all that is wrong is told at once. What a field of type Any holds is made plain when it is written (fractions,
-paths, enumerations become texts). A NamedTuple is a row, a list without names, for what there are thousands of; bytes
-are text in base64. Of a union, what is read is the first that the data fits.
+or missing field, a value of another type, a repeated key, or a malformed number is `Unreadable`, never guessed; all
+faults are reported at once. Values in a field of type Any become plain when written (fractions, paths, enumerations
+become texts). A NamedTuple is a row, a list without names, for data in thousands; bytes are text in base64. For a
+union, the first member that fits the data is read.
 
-Plain dictionaries are made elsewhere only where a standard says what is in them (SARIF, in-toto, DSSE, JUnit,
-CycloneDX, ReqIF, ROS), where a command shows what no dataclass holds, and in `avow.pipeline.blobs`, whose values share
-their parts. (Of the libraries, msgspec passes over fields that a dataclass does not have.)
+Other modules make plain dictionaries only if a standard defines them (SARIF, in-toto, DSSE, JUnit, CycloneDX, ReqIF,
+ROS), if a command shows data without a dataclass, and in `avow.pipeline.blobs`, whose values share their parts.
+(msgspec was rejected because it ignores unknown fields.)
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ T = TypeVar("T")
 Read = Callable[[Any], Any]
 
 LATER: Mapping[str, Any] = {"avow.later": True}
-"""Metadata of a field that texts of earlier versions do not have, and that is not written where it is empty."""
+"""Metadata of a field that texts of earlier versions lack, and that is not written if it is empty."""
 
 
 def called(key: str) -> Mapping[str, Any]:
@@ -42,14 +42,14 @@ def called(key: str) -> Mapping[str, Any]:
 
 
 class Foreign:
-    """Base of dataclasses for another program's format: of its fields only those that we read are declared, others are
-    passed over, and one with a default may be missing."""
+    """Base of dataclasses for another program's format: only the fields that Avow reads are declared, others are
+    ignored, and one with a default may be missing."""
 
     __slots__ = ()
 
 
 class Unreadable(ValueError):  # noqa: N818 - it says what the text is
-    """Text that is not what it should be: torn, edited, or of another program. `faults`: each with its place."""
+    """Text in a wrong format: torn, edited, or of another program. `faults`: each with its place."""
 
     def __init__(self, *faults: str) -> None:
         self.faults = faults
@@ -57,7 +57,7 @@ class Unreadable(ValueError):  # noqa: N818 - it says what the text is
         super().__init__("; ".join([*faults[:FAULTS], *more]))
 
     def within(self, place: str) -> list[str]:
-        """The faults, where what was read stands at a place of something larger."""
+        """The faults, for text that is part of a larger one at that place."""
         return [place + fault for fault in self.faults]
 
 
@@ -67,17 +67,17 @@ def canonical(value: object) -> str:
 
 
 _CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-"""Made once: `json.dumps` makes one for each call that asks for anything but its defaults."""
+"""Made once: `json.dumps` makes one for each call with other than default arguments."""
 
 
 def line(value: object) -> bytes:
-    """A dataclass, or plain data, as a message between processes of ours: one line, which `from_text` reads."""
+    """A dataclass, or plain data, as a message between Avow's processes: one line, which `from_text` reads."""
     return f"{canonical(to_json(value))}\n".encode()
 
 
 def document(value: object) -> str:
-    """JSON for people and other programs, an item a line. What is no character (half of one, which Python has for a
-    file name's byte) is shown as unreadable: no reader of JSON takes it."""
+    """JSON for people and other programs, an item a line. A lone surrogate (Python's form of an undecodable byte in a
+    file name) is shown as unreadable: no reader of JSON accepts it."""
     return _HALVES.sub("\ufffd", json.dumps(to_json(value), indent=1, ensure_ascii=False))
 
 
@@ -85,7 +85,7 @@ _HALVES = re.compile("[\ud800-\udfff]")
 
 
 def plain(value: object) -> Any:
-    """A value as JSON can hold it without loss of what it says; unknown objects become their text."""
+    """A value in a form that JSON can hold without loss of meaning; unknown objects become their text."""
     match value:
         case None | bool() | int():
             return value
@@ -99,7 +99,7 @@ def plain(value: object) -> Any:
             return sorted((plain(item) for item in value), key=canonical)
         case list() | tuple():
             return [plain(item) for item in value]
-        case _:  # what JSON has no form for
+        case _:  # no form in JSON
             return str(value)
 
 
@@ -143,7 +143,7 @@ def from_text(kind: type[T], text: str | bytes) -> T:
 
 
 def parsed(text: str | bytes) -> Any:
-    """The plain data of a JSON text, of which all readers of JSON would say the same. Raises Unreadable."""
+    """The plain data of a JSON text that all readers of JSON understand alike. Raises Unreadable."""
     try:
         said = text if isinstance(text, str) else str(text, "utf-8")
         return json.loads(said, object_pairs_hook=once, parse_constant=_no_number)
@@ -154,7 +154,7 @@ def parsed(text: str | bytes) -> Any:
 
 
 def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object each of whose keys stands once: readers of JSON differ in which value of a repeated one they take."""
+    """An object without repeated keys: readers of JSON differ in which of the values they take."""
     found = dict(pairs)
     if len(found) < len(pairs):
         keys = [key for key, _ in pairs]
@@ -249,7 +249,7 @@ def _of_fields(kind: type) -> Read:
 
 
 def _every(reads: Iterable[tuple[str, Read, Any]]) -> list[Any]:
-    """What is read at each place. Raises Unreadable, with all faults."""
+    """The values read at each place. Raises Unreadable, with all faults."""
     found, faults = list[Any](), list[str]()
     for place, read, item in reads:
         try:
@@ -262,7 +262,7 @@ def _every(reads: Iterable[tuple[str, Read, Any]]) -> list[Any]:
 
 
 def _row(kind: Any) -> tuple[Any, ...]:
-    """The types of a NamedTuple's items; of anything else none."""
+    """The types of a NamedTuple's items; empty for other types."""
     if not (isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")):
         return ()
     hints = typing.get_type_hints(kind)
@@ -404,7 +404,7 @@ def schema(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
 
 
 def published(kind: type, identifier: str, title: str) -> dict[str, Any]:
-    """The JSON schema of a document, whole: that of its dataclass, with what it is called."""
+    """The complete JSON schema of a document: that of its dataclass, with its title."""
     definitions: dict[str, Any] = {}
     schema(kind, definitions)
     body = definitions.pop(kind.__name__)

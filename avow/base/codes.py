@@ -1,8 +1,8 @@
-"""Every diagnostic code of the language, declared once: what it means, and a text that brings it about.
+"""Every diagnostic code of the language, declared once: its meaning, and a text that triggers it.
 
 Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that can be switched off).
-The tests check every example, and docs/language.md lists every code. The codes of everything else stand in
-`avow.base.codes_workspace` and with the backends; docs/diagnostics.md has them all in one table.
+The tests check every example, and docs/language.md lists every code. Other codes are in `avow.base.codes_plan`,
+`codes_ros`, `codes_workspace` and in the backends; docs/diagnostics.md has one table of all.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ node monitor {{
   {clause}
 }}
 """
-"""Where an example that is only a clause stands."""
+"""The file around an example that is only a clause."""
 
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """One thing that can be wrong. `example` is a file, or the clauses of `FRAME`'s node; empty where no text can show
-    it (an unreadable file)."""
+    """A kind of fault. `example` is a file, or the clauses of `FRAME`'s node; empty if no text can show it (an
+    unreadable file)."""
 
     code: str
     title: str
@@ -38,7 +38,7 @@ class Code:
     example: str = ""
     severity: Severity = Severity.ERROR
     remedy: str = ""
-    """What to do; empty where the example or the message says it."""
+    """The remedy; empty if the example or the message gives it."""
 
     @property
     def text(self) -> str:
@@ -59,7 +59,7 @@ def declare(code: str, title: str, explanation: str, remedy: str, *, warning: bo
 
 
 def register(*codes: Code) -> dict[str, Code]:
-    """Codes by name, in order. Raises ValueError where one is declared twice."""
+    """Codes by name, in order. Raises ValueError if one is declared twice."""
     found: dict[str, Code] = {}
     for code in codes:
         if code.code in found:

@@ -1,4 +1,4 @@
-"""The diagnostic codes of plans, systems and the calculus: their examples are plans, and stand in tests/system."""
+"""The diagnostic codes of plans, systems and the calculus: their examples are plans, in tests/system."""
 
 from __future__ import annotations
 

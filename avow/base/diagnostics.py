@@ -1,4 +1,4 @@
-"""Places in the user's text, and what Avow has to say about them.
+"""Places in the user's text, and findings about them.
 
 Errors are values: a pass returns (or collects) `Diagnostic`s; text, JSON, SARIF and the language server are printers
 of them. Only at a boundary where nothing more can be done are they raised, together, as `Rejected` (exit code 2).
@@ -37,7 +37,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One thing to say about one place. `code` is declared, with its explanation, in `avow.base.codes`."""
+    """A finding at a place. `code` is declared, with its explanation, in `avow.base.codes`."""
 
     code: str
     message: str
@@ -60,7 +60,7 @@ class Rejected(Exception):  # noqa: N818 - it reads as what happened to the inpu
 
 
 def refuse(found: Iterable[Diagnostic]) -> None:
-    """Raises Rejected with the errors among them, where there are any."""
+    """Raises Rejected with the errors among them, if there are any."""
     errors = [diagnostic for diagnostic in found if diagnostic.is_error]
     if errors:
         raise Rejected(*errors)

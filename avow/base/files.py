@@ -1,5 +1,5 @@
-"""Files, written so that a reader never sees half of one, and their digests; paths that stay in a folder; and by what
-it is known that a file is as it was."""
+"""Atomic writes of files, and their digests; paths that stay in a folder; and identities that show whether a file is
+unchanged."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pathlib import Path
 from avow.base.tuning.running import READER_SECONDS, SETTLED_NS
 
 PART = ".part"
-"""How the name of a file ends that is still being written; one that stays was left by a killed process."""
+"""Suffix of a file that is still being written; one that remains was left by a killed process."""
 
 
 def sha256(data: bytes | str) -> str:
@@ -25,14 +25,14 @@ def sha256(data: bytes | str) -> str:
 
 
 def digest_file(path: Path) -> str:
-    """SHA-256 of a file's bytes. Raises OSError, also for what is no file and might have no end (a device, a pipe)."""
+    """SHA-256 of a file's bytes. Raises OSError, also for a device or a pipe, which may have no end."""
     _must_be_regular(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_regular(path: Path) -> bytes:
-    """A file's bytes. Raises OSError, also for what is no file and might have no end (a device, a pipe)."""
+    """A file's bytes. Raises OSError, also for a device or a pipe, which may have no end."""
     _must_be_regular(path)
     return path.read_bytes()
 
@@ -79,10 +79,10 @@ def digest_once(path: Path) -> str:
 
 
 def identity(info: os.stat_result, path: str | Path) -> tuple[int | str, ...]:
-    """What tells that a file is as it was a moment ago: its place on the disk, size in bytes, times in nanoseconds, the
-    time of its last change at the end. That time cannot be set back; where it can, or counts whole seconds only and was
-    a moment ago, the content itself is looked at. Raises OSError."""
-    # once whole seconds are over, no later change has the same time: so lies what an image was unpacked from
+    """An identity that shows whether a file is unchanged: device, inode, size in bytes, times in nanoseconds, the time
+    of its last change (ctime) at the end. That time cannot be set back. If the file system does not guarantee this, or
+    counts whole seconds only and the change was recent, the content itself is read. Raises OSError."""
+    # once the second is over, no later change has the same time: files from an unpacked image are like this
     told = info.st_ctime_ns % 1_000_000_000 or time.time_ns() - info.st_ctime_ns > SETTLED_NS
     true = told and keeps_changes(os.fspath(path), info.st_dev)
     content = "" if true else _content(os.fspath(path), info.st_mode)
@@ -90,7 +90,7 @@ def identity(info: os.stat_result, path: str | Path) -> tuple[int | str, ...]:
 
 
 def _content(path: str, mode: int) -> str:
-    """Of a folder, the names in it."""
+    """The digest of the names in a folder."""
     if stat.S_ISDIR(mode):
         return sha256("\0".join(sorted(os.listdir(path))).encode("utf-8", "surrogateescape"))  # noqa: PTH208
     return digest_file(Path(path)) if stat.S_ISREG(mode) else ""
@@ -98,13 +98,13 @@ def _content(path: str, mode: int) -> str:
 
 @functools.lru_cache(maxsize=100_000)
 def _digest_as(path: Path, mark: tuple[int | str, ...]) -> str:
-    """A file that is as it was a moment ago is not read again."""
+    """A file with the same identity is not read again."""
     return digest_file(path)
 
 
 def _open_special(path: Path) -> int:
-    """A device or a pipe, open for writing. A pipe that nobody reads within `READER_SECONDS` is an error, not a wait:
-    whoever reads it (`-o >(less)`) may open it a moment later than we do."""
+    """A device or a pipe, open for writing. A pipe without a reader for `READER_SECONDS` is an error: a reader (`-o
+    >(less)`) may open it a moment after Avow does."""
     end = time.monotonic() + READER_SECONDS
     while True:
         try:
@@ -116,8 +116,7 @@ def _open_special(path: Path) -> int:
 
 
 def write_out(path: Path, content: str) -> None:
-    """Put `content` where the user asked for it: as `write`, but a device or a pipe is written to, and stays what it
-    is. Raises OSError."""
+    """Write `content` to the user's path: as `write`, but a device or a pipe is not replaced. Raises OSError."""
     if path.exists() and not path.is_file() and not path.is_dir():
         descriptor = _open_special(path)
         os.set_blocking(descriptor, True)
@@ -128,8 +127,8 @@ def write_out(path: Path, content: str) -> None:
 
 
 def write(path: Path, content: str | bytes) -> bool:
-    """Put `content` in place of the file in one step, whatever stands there but a folder; says whether that changed
-    anything. Raises OSError."""
+    """Replace the file, or anything but a folder, by `content` in one step; returns whether that changed anything.
+    Raises OSError."""
     data = content.encode() if isinstance(content, str) else content
     if path.is_file() and path.read_bytes() == data:
         return False
@@ -147,30 +146,30 @@ def write(path: Path, content: str | bytes) -> bool:
 
 
 def inside(root: Path, text: str) -> Path | None:
-    """The absolute path of `text` below `root`, or None where it leads (also by a symbolic link) out of it, or where no
-    file can have such a path (its name is too long)."""
+    """The absolute path of `text` below `root`, or None if it leads (also by a symbolic link) out of it, or if its name
+    is too long for a file."""
     if "\0" in text or not text or Path(text).is_absolute():
         return None
     base = root.resolve()
     try:
         path = (base / text).resolve()
-        path.exists()  # raises for a name that is too long, where all later looks at the path would
+        path.exists()  # raises for a name that is too long, as all later uses of the path would
     except (OSError, RuntimeError, ValueError):
         return None
     return path if path == base or base in path.parents else None
 
 
-# -- which file systems keep the time of a last change by themselves, so that nobody can set it back -------------------
+# -- file systems that keep the time of a last change themselves, so that it cannot be set back -------------------
 
 _MOUNTS = Path("/proc/self/mountinfo")
 _KEEPING = frozenset({"ext2", "ext3", "ext4", "xfs", "btrfs", "overlay", "zfs", "f2fs", "bcachefs", "jfs"})
-"""Those of Linux that do, by their own clock's ticks. FAT has no such time, nor do many ways to somebody else's files
-(NFS, 9p, FUSE) show it as it is now. In memory (tmpfs, ramfs) what a process writes through a mapping moves it once and
-never again; on a disk, once for each time that the page is written back."""
+"""Those of Linux that do, in ticks of their own clock. FAT has no such time, and many network or shared file systems
+(NFS, 9p, FUSE) do not show the current one. In memory (tmpfs, ramfs) writes through a mapping update it only once; on a
+disk, once each time that the page is written back."""
 
 
 def keeps_changes(path: str, device: int) -> bool:
-    """Whether the file system on which a file lies (its `st_dev`) does."""
+    """Whether the file system of a file (its `st_dev`) does."""
     if device not in _known:
         _known[device] = _kind(os.path.realpath(path)) in _KEEPING
     return _known[device]
@@ -180,7 +179,7 @@ _known: dict[int, bool] = {}
 
 
 def _kind(path: str) -> str:
-    """What the innermost mount over a path is; empty where nobody says."""
+    """The kind of the innermost mount over a path; empty if unknown."""
     inside = [(len(place), at, kind) for at, (place, kind) in enumerate(_mounts()) if f"{path}/".startswith(place)]
     return max(inside, default=(0, 0, ""))[2]
 
@@ -189,7 +188,7 @@ def _mounts() -> tuple[tuple[str, str], ...]:
     """(folder with a slash, kind of file system), the later over the earlier."""
     try:
         lines = _MOUNTS.read_bytes().splitlines()
-    except OSError:  # no Linux
+    except OSError:  # not Linux
         return ()
     found = []
     for line in lines:

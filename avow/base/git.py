@@ -1,7 +1,7 @@
-"""What git knows of a folder, asked so that nothing of that folder is executed.
+"""Queries to git about a folder that execute nothing from that folder.
 
-A repository's own settings name programs: filters for what is checked out or archived, hooks, pagers, ways to fetch
-what is missing. So only questions are asked in which none of them has a part, and nothing is fetched.
+A repository's own settings name programs: filters for checkout and archive, hooks, pagers, remote helpers. So this
+module uses only commands that run none of them, and fetches nothing.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ _ALONE = {"GIT_ALLOW_PROTOCOL": "none", "GIT_NO_LAZY_FETCH": "1", "GIT_OPTIONAL_
 
 
 class GitFailed(Exception):  # noqa: N818 - it says what happened
-    """Git is not here, did not end in time, or failed; the message is its own last line."""
+    """Git is missing, timed out, or failed; the message is its own last line."""
 
 
 def head(folder: Path) -> str:
-    """The revision that the folder is at, in short; empty where it is under none."""
+    """The folder's revision, abbreviated; empty if it is not under git."""
     try:
         return _ask(folder, "rev-parse", "--short=12", "HEAD", seconds=5).decode(errors="replace").strip()
     except GitFailed:

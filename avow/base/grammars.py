@@ -1,4 +1,4 @@
-"""Parsers of Lark's, whose tables are kept between runs: to build them costs more than to parse most texts."""
+"""Lark parsers with tables cached between runs: building them costs more than parsing most texts."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from avow.base.notes import cache_folder, read_note, write_note
 def lark_of(
     grammar: Path, name: str, start: tuple[str, ...], build: Callable[[], object] | None = None, **options: Any
 ) -> Any:
-    """Lark's LALR parser of a grammar's file, made once. `name`: with which that of the file in which its tables are
-    kept begins. `build` makes what is called for each rule."""
+    """Lark's LALR parser of a grammar's file, made once. `name`: the prefix of the cache file's name. `build` makes the
+    callbacks of the rules."""
     from lark import Lark
 
     options |= {"parser": "lalr", "start": list(start), "lexer": options.get("lexer", "basic")}
     if build is not None:
         options["transformer"] = build()
     text = grammar.read_text("utf-8")
-    cache = _cache_file(f"{name}-{sha256(text)[:12]}")  # two versions on one machine keep their own
+    cache = _cache_file(f"{name}-{sha256(text)[:12]}")  # each version on a machine has its own
     if cache is None:
         return Lark(text, **options)
     note = cache.with_suffix(".json")
@@ -50,8 +50,8 @@ def lark_of(
 
 
 def _cache_file(name: str) -> Path | None:
-    """A file in a folder of the user's own, since Lark's cache is a pickle: it is read only where this user's Avow
-    wrote it, byte for byte. Tables that somebody else put there would execute, or make `<=` of `<`."""
+    """A file in the user's own folder, since Lark's cache is a pickle: it is read only if this user's Avow wrote it,
+    byte for byte. Other content could execute code or turn `<` into `<=`."""
     try:
         folder = cache_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Directed graphs: what can be reached, strongly connected components, and circles within them."""
+"""Directed graphs: reachability, strongly connected components, and cycles within them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ N = TypeVar("N", bound=Hashable)
 
 
 def reached(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> dict[N, None]:
-    """The roots and all that can be reached from them, each once, in the order in which they are met."""
+    """The roots and all nodes reachable from them, each once, in the order of discovery."""
     found = dict.fromkeys(roots)
     stack = [*found]
     while stack:
@@ -21,7 +21,7 @@ def reached(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> dict[
 
 
 def strong_components(roots: Iterable[N], successors: Callable[[N], Iterable[N]]) -> Iterator[list[N]]:
-    """Tarjan's strongly connected components, each after those that it can reach; found as they are asked for."""
+    """Tarjan's strongly connected components, each after those that it can reach; computed lazily."""
     index: dict[N, int] = {}
     low: dict[N, int] = {}
     on_stack: set[N] = set()
@@ -60,8 +60,8 @@ def strong_components(roots: Iterable[N], successors: Callable[[N], Iterable[N]]
 
 
 def components(nodes: Iterable[N], arcs: Iterable[tuple[N, N]]) -> tuple[tuple[N, ...], ...]:
-    """Strongly connected components of a graph that is there whole, sources of arcs before their targets; nodes within
-    one in the order given. Arcs to or from other nodes do not count."""
+    """Strongly connected components of a complete graph structure, sources of arcs before their targets; nodes within
+    one in the given order. Arcs to or from other nodes are ignored."""
     names = tuple(nodes)
     successors: dict[N, list[N]] = {name: [] for name in names}
     for source, target in arcs:
@@ -73,12 +73,12 @@ def components(nodes: Iterable[N], arcs: Iterable[tuple[N, N]]) -> tuple[tuple[N
 
 
 def cycle_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """A cycle within a component, or an empty tuple where there is none."""
+    """A cycle within a component, or an empty tuple if there is none."""
     return next(iter(cycles_in(component, arcs)), ())
 
 
 def cycles_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
-    """Short cycles within a component, so many that every node that is on one is on one of these; shortest first."""
+    """Short cycles within a component that together cover every node on a cycle; shortest first."""
     inside = set(component)
     successors: dict[str, list[str]] = {name: [] for name in component}
     for source, target in arcs:

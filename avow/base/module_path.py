@@ -1,4 +1,4 @@
-"""Where modules are looked for: never in the folder in which one happens to stand. Imports nothing but the library."""
+"""Keeps the working folder off the module path. Imports only the standard library."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import sys
 
 
 def absolute_only() -> str:
-    """PYTHONPATH without entries that mean a place under the folder in which one happens to stand."""
+    """PYTHONPATH without entries relative to the working folder."""
     entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     return os.pathsep.join(entry for entry in entries if os.path.isabs(entry))  # noqa: PTH117
 
 
 def is_led_here() -> bool:
-    """Whether modules would be found in the folder in which this process stands, other than as Avow's own."""
+    """Whether modules other than Avow's own would be found in the working folder."""
     here, own = os.path.realpath(os.curdir), os.path.realpath(_OWN)
     return here != own and here in map(os.path.realpath, sys.path)
 
@@ -25,8 +25,8 @@ _OWN = os.path.join(__file__, "..", "..", "..")  # noqa: PTH118
 
 
 def leave_here() -> None:
-    """Take what such entries put on this process's module path off it, and out of its environment. The folder that
-    Avow itself comes from stays."""
+    """Remove such entries from this process's module path and environment. The folder that Avow itself comes from
+    stays."""
     given = os.environ.get("PYTHONPATH")
     if not given:
         return
@@ -38,8 +38,8 @@ def leave_here() -> None:
 
 
 def keep_z3() -> None:
-    """Have Z3's module, whoever imports it, load the library that came with it. By itself it looks in the folder in
-    which one happens to stand first, and on the PATH."""
+    """Make Z3's module load the library that came with it. By default it searches the working folder first, then the
+    PATH."""
     spec = importlib.util.find_spec("z3")
     for place in (spec.submodule_search_locations if spec is not None else None) or ():
         here = os.path.abspath(place)  # noqa: PTH100

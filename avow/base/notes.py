@@ -1,9 +1,8 @@
-"""Notes that only save time: what was found before, bound to this user by a keyed digest.
+"""Notes that only save time: earlier results, bound to this user by a keyed digest.
 
-Whatever a note says could be worked out again. So one that was edited, made up or carried here from another machine
-is no note at all: the long way is gone, and ends where the files say. The key lies in the user's cache folder, not in
-the workspace. It keeps a verdict from being edited; it is no signature, and nothing that is to be believed elsewhere
-rests on it.
+The content of a note can always be computed again. A note that was edited, made up or copied from another machine is
+ignored, and the result is computed from the files. The key is in the user's cache folder, not in the workspace. It
+keeps a verdict from being edited; it is no signature, and nothing that other people rely on depends on it.
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ _KEY_BYTES = hashlib.sha256().digest_size
 
 
 def write_note(path: Path, said: object) -> None:
-    """`said`: a dataclass, or a dictionary. Raises OSError."""
+    """`said`: a dataclass or a dictionary. Raises OSError."""
     body = to_json(said)
     write(path, json.dumps({**body, _MARK: _mark(path, body)}) + "\n")
 
 
 def read_note(kind: type[T], path: Path) -> T | None:
-    """What this user's Avow wrote there, and nothing else."""
+    """The content, only if this user's Avow wrote it there."""
     try:
         data = parsed(read_regular(path))
         mark = data.pop(_MARK)
@@ -45,12 +44,12 @@ def read_note(kind: type[T], path: Path) -> T | None:
 
 
 def sealed(path: Path, data: bytes) -> bytes:
-    """The data as they may be kept at that place."""
+    """The data, sealed for that place."""
     return _seal(path, data) + data
 
 
 def unsealed(path: Path) -> bytes | None:
-    """What this user's Avow sealed for that place, and nothing else."""
+    """The data, only if this user's Avow sealed it for that place."""
     try:
         kept = read_regular(path)
     except OSError:
@@ -60,8 +59,8 @@ def unsealed(path: Path) -> bytes | None:
 
 
 def cache_folder() -> Path:
-    """Where this user's caches lie: never in the folder that Avow is started in, which may be somebody else's. A user
-    without a home (of a container that does not know the number) keeps nothing: there is no such folder."""
+    """The folder of this user's caches: never the working folder, which may belong to another user. Without a home
+    directory (an unknown user id in a container) nothing is cached."""
     named, home = Path(os.environ.get("XDG_CACHE_HOME", "")), Path(os.environ.get("HOME", ""))
     if named.is_absolute():
         return named / "avow"
@@ -79,7 +78,7 @@ def _seal(path: Path, data: bytes) -> bytes:
 
 
 def _mark(path: Path, body: Mapping[str, Any]) -> str:
-    """Of one place among the artifacts: a note that is copied to another says nothing there."""
+    """Bound to one place among the artifacts: a note copied to another is ignored there."""
     parts = path.absolute().parts
     within = max((at for at, part in enumerate(parts) if part == "artifacts"), default=0)
     text = json.dumps([parts[within:], body], sort_keys=True)
@@ -88,7 +87,7 @@ def _mark(path: Path, body: Mapping[str, Any]) -> str:
 
 @functools.cache
 def _key(folder: str) -> bytes:
-    """Made when it is first needed; where it cannot be kept, one for this process alone."""
+    """Made when first needed; if it cannot be stored, it is for this process alone."""
     path = Path(folder) / "notes.key"
     kept = _kept_key(path)
     if kept is not None:
@@ -103,7 +102,7 @@ def _key(folder: str) -> bytes:
         try:
             if path.is_file() and path.stat().st_size != 2 * _KEY_BYTES:
                 path.unlink()
-            os.link(part, path)  # of two that make one at once, the first
+            os.link(part, path)  # of two processes that make one at once, the first wins
         finally:
             part.unlink()
     except OSError:
@@ -112,7 +111,7 @@ def _key(folder: str) -> bytes:
 
 
 def _kept_key(path: Path) -> bytes | None:
-    """None where there is none, or less than one: an empty file would be a key that everybody knows."""
+    """None if there is none or it is too short: an empty file would be a known key."""
     try:
         key = bytes.fromhex(read_regular(path).decode())
     except (OSError, ValueError):

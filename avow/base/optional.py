@@ -1,4 +1,4 @@
-"""Several answers, of which each may be missing."""
+"""Several answers, each of which may be missing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 def complete(answers: Iterable[T | None]) -> list[T] | None:
-    """All of them; None where one is missing."""
+    """All of them; None if one is missing."""
     found: list[T] = []
     for answer in answers:
         if answer is None:

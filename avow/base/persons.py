@@ -1,4 +1,4 @@
-"""Names and dates that people write: names of reviewers, and the days on which something was done."""
+"""Names and dates that people write: names of reviewers, and the days of their work."""
 
 from __future__ import annotations
 
@@ -63,15 +63,15 @@ def _words(name: str) -> list[str]:
 
 
 EARLIEST = date(2000, 1, 1)
-"""Before ROS: an earlier day is a slip of the pen."""
+"""Before ROS: an earlier day is a typing error."""
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
 
 
 def wrong_day(text: str, *, past: bool = True) -> str:
-    """What is wrong with a day such as 2026-11-21, in words; empty: nothing. With `past` it says when something was
-    done, and must not be in the future anywhere on earth."""
+    """What is wrong with a day such as 2026-11-21, in words; empty if nothing is. With `past` the day must not be in
+    the future in any time zone."""
     try:
-        if not _DAY.fullmatch(text):  # ISO 8601 has other forms, which do not sort as texts
+        if not _DAY.fullmatch(text):  # other forms of ISO 8601 do not sort as texts
             raise ValueError
         day = date.fromisoformat(text)
     except ValueError:

@@ -1,5 +1,5 @@
-"""Plain words: texts that a reader meets before any contract hold no identifiers; numbers as people write them; texts
-that people take for one another."""
+"""Plain words: identifiers as words for readers who do not know the contract; numbers as people write them; texts that
+look alike."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_+|-+")
 
 
 ALLOWS_MORE = "`seconds:` in the plan, or `--seconds`, allows more"
-"""What a person can do where a limit ended something."""
+"""What a person can do if a limit ended something."""
 
 
 def identifiers(text: str) -> tuple[str, ...]:
@@ -47,15 +47,14 @@ def words_of(name: str) -> str:
 
 
 def invisible(text: str, *, allowed: str = "\n\t\u200c\u200d") -> str:
-    """The first character that nobody sees, though it may change what is read (a control character, a mark of the
-    direction of writing, a space of no width), as ``U+202E``; empty: none. What joins or parts letters may
-    stand there."""
+    """The first invisible character that may change the reading (a control character, a mark of the writing direction,
+    a zero-width space), as ``U+202E``; empty if none. Joiners and non-joiners of letters are allowed."""
     odd = (char for char in text if char not in allowed and unicodedata.category(char) in _UNSEEN)
     return next((f"U+{ord(char):04X}" for char in odd), "")
 
 
 def is_blank(text: str) -> bool:
-    """Whether a text has neither a letter nor a digit that can be seen."""
+    """Whether a text has no visible letter or digit."""
     return not any(char.isalnum() and "FILLER" not in unicodedata.name(char, "") for char in text)
 
 
@@ -63,7 +62,7 @@ _UNSEEN = frozenset(("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"))
 
 
 def bare(name: str) -> str:
-    """A heading as it is compared: in small letters, with single blanks."""
+    """A heading in the form that is compared: in lower case, with single blanks."""
     return " ".join(name.lower().split())
 
 
@@ -83,7 +82,7 @@ def count(number: int, one: str, many: str = "") -> str:
 
 
 def listed(items: Sequence[str], most: int = 8) -> str:
-    """So many items at most, and how many more there are: ``a, b and 3 more``."""
+    """At most so many items, and the number of the others: ``a, b and 3 more``."""
     more = f" and {len(items) - most} more" if len(items) > most else ""
     return ", ".join(items[:most]) + more
 
@@ -102,7 +101,7 @@ def exact(text: str) -> Fraction:
 
 
 def decimal(value: Fraction) -> str | None:
-    """The number with all its decimals (``-2.5``, ``3``); None where they do not end."""
+    """The number with all its decimals (``-2.5``, ``3``); None if they do not end."""
     digits, rest = 0, value.denominator
     for prime in (2, 5):
         power = 0
@@ -117,7 +116,7 @@ def decimal(value: Fraction) -> str | None:
     return f"{'-' if value < 0 else ''}{whole[:-digits]}.{whole[-digits:]}"
 
 
-# -- texts that people take for one another: in other forms and cases, with signs that are not seen, of letters alike --
+# -- texts that look alike: other forms and cases, invisible characters, similar letters -----------------------------
 
 LOOK = str.maketrans(
     "aceiopsxyABCEHIKMOPSTX",
@@ -137,7 +136,7 @@ SEEN_AS = {
 
 
 def alike(text: str) -> str:
-    """The same for all texts that look the same, or differ in case only."""
+    """A key that is equal for texts that look the same or differ in case only."""
     plain = unicodedata.normalize("NFKC", text.translate(SEEN_AS))
     seen = "".join(c for c in plain if unicodedata.category(c) not in ("Cc", "Cf"))
     return " ".join(seen.casefold().split())

@@ -24,17 +24,17 @@ from avow.base.tuning.running import FORK_LOOK
 from avow.base.tuning.sizes import OUTPUT_KEPT
 
 _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGXFSZ})
-"""How a tool ends that somebody ended: a person, or a system out of memory or room. A crash of its own is none of
-them."""
+"""Signals of a tool that was ended from outside: by a person, or by a system out of memory or disk space. A crash of
+its own gives others."""
 
 
 HOME_PREFIX = "avow-home-"
-"""How the empty folders are called that tools get as their homes, among the temporary folders."""
+"""Prefix of the empty temporary folders that tools get as their homes."""
 
 
 @dataclass(slots=True)
 class _Process:
-    """What this process started, was told and may do: of it, and not of a run, as its imports are."""
+    """What this process started, received and may do: state of the process, not of a run, like its imports."""
 
     running: set[int] = field(default_factory=set)
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -64,7 +64,7 @@ class Completed:
 
 
 class ToolMissing(Exception):  # noqa: N818 - it names a state, not a fault
-    """The program is not on this machine."""
+    """The program is missing on this machine."""
 
 
 def run(
@@ -82,9 +82,9 @@ def run(
     """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception. It ends
     soon after `stopped` says so, as if its time were up.
 
-    It gets the variables `bare` and `env`, and no others: what stands in somebody's environment or home is no part of
-    any question. It dies with this process, if it is `tied`: what ends at once by itself need not be, and starts at a
-    tenth of the cost, as nothing of ours is copied for it."""
+    It gets the variables `bare` and `env`, and no others, so that no answer depends on a person's environment or home.
+    If `tied`, it dies with this process; an untied one, for tools that end at once, starts at a tenth of the cost, as
+    it needs no fork."""
     assert tied or megabytes is None
     start = time.monotonic()
     with (
@@ -116,14 +116,14 @@ def run(
                 kill_tree(process.pid)
                 process.wait()
             else:
-                _kill_group(process.pid)  # of what it left, nothing else can be told to be its own
+                _kill_group(process.pid)  # only its group can be attributed to it
             unwatch(process.pid)
         ended_with(code)
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
 
 
 def _wait(process: subprocess.Popen[bytes], end: float, stopped: Callable[[], bool] | None) -> int | None:
-    """Its code; None where its time is up, or nobody waits for it any more."""
+    """Its exit code; None after a time-out or if it was cancelled."""
     while True:
         left = end - time.monotonic()
         try:
@@ -134,20 +134,20 @@ def _wait(process: subprocess.Popen[bytes], end: float, stopped: Callable[[], bo
 
 
 def bare(home: str) -> dict[str, str]:
-    """The variables that an outside program gets: the way to programs, an empty folder of its own, one language."""
+    """The variables that an outside program gets: PATH, an empty folder as HOME, one language."""
     fixed = {"HOME": home, "TMPDIR": home, "LANG": "C.UTF-8", "LC_ALL": "C.UTF-8", "TZ": "UTC"}
     return {"PATH": os.environ.get("PATH", os.defpath), **fixed}
 
 
 def ended_with(code: int | None) -> None:
-    """A program that this process ran ended so; where that was somebody else's doing, `ended_by_others` says so. A
-    program that runs another one tells of that one's signal by a code above 128."""
+    """Note how a program that this process ran ended; if it was killed from outside, `ended_by_others` is true. A
+    program that runs another one reports that one's signal by a code above 128."""
     if code is not None and (128 - code if code > 128 else code) in _FROM_OUTSIDE:
         here.ended_by_others = True
 
 
 def ended_by_others() -> bool:
-    """Was a tool that this process ran ended by somebody else? Then its failure says nothing of what it was given."""
+    """Whether a tool that this process ran was killed from outside: its failure then says nothing about its input."""
     return here.ended_by_others
 
 
@@ -158,13 +158,13 @@ def watch(pid: int) -> None:
 
 
 def unwatch(pid: int) -> None:
-    """It has ended and was waited for: its number may be another's now."""
+    """It has ended and was waited for: its process id may be reused now."""
     with here.lock:
         here.running.discard(pid)
 
 
 def kill_all() -> None:
-    """Kill every tool under way: called when Avow is interrupted."""
+    """Kill every running tool: called when Avow is interrupted."""
     with here.lock:
         pids = tuple(here.running)
     for pid in pids:
@@ -202,7 +202,7 @@ def _parents() -> dict[int, list[int]]:
     with contextlib.suppress(OSError), os.scandir("/proc") as processes:
         for name in [entry.name for entry in processes if entry.name.isdigit()]:
             with contextlib.suppress(OSError, ValueError, IndexError), open(f"/proc/{name}/stat", "rb", 0) as stat:  # noqa: PTH123 - there are many
-                # the name in parentheses may hold spaces and parentheses of its own
+                # the name in parentheses may contain spaces and parentheses
                 fields = stat.read(4096).rpartition(b")")[2].split()
                 children.setdefault(int(fields[1]), []).append(int(name))
     return children
@@ -215,16 +215,16 @@ _LIBC = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 
 
 def die_with(parent: int) -> None:
-    """Said by a new process: it must not outlive `parent`, which started it, however that dies."""
+    """Called by a new process: it must not outlive `parent`, which started it, however that dies."""
     if _LIBC is not None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:  # it died before that was said
+        if os.getppid() != parent:  # it died before the call
             os._exit(1)
 
 
 def adopt_orphans() -> None:
-    """From now on, what a descendant leaves running becomes our child, whatever session or group it moved to; and
-    where the system can hide our memory and descriptors from our own user, it does. Only on Linux."""
+    """From now on, a process that a descendant leaves running becomes our child, in any session or group; and our
+    memory and descriptors are hidden from our own user if the system can do so. Only on Linux."""
     if _LIBC is None or here.adopted_since is not None:
         return
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
@@ -233,18 +233,17 @@ def adopt_orphans() -> None:
 
 
 def forget_orphans() -> None:
-    """In a fork: what the process that it is a fork of adopts, runs and was told is not this one's."""
+    """In a fork: forget what the parent adopts, runs and received."""
     here.adopted_since, here.ended_by_others = None, False
     here.running.clear()
 
 
 def end_orphans(own: Collection[int] = ()) -> bool:
-    """Kill all that became our child unasked, until nothing is left; whether there was any but these `own`. See
-    `adopt_orphans`."""
+    """Kill all adopted children until none is left; whether there was any but these `own`. See `adopt_orphans`."""
     if here.adopted_since is None:
         return False
     found = False
-    for _ in range(1000):  # what is killed may leave children of its own, which become ours
+    for _ in range(1000):  # a killed process may leave children, which become ours
         with here.lock:
             expected = here.adopted_since | here.running
         orphans = [pid for pid in children(os.getpid()) if pid not in expected]
@@ -260,15 +259,15 @@ def end_orphans(own: Collection[int] = ()) -> bool:
 
 
 def guard(*, tied: bool) -> None:
-    """Returns in a fork, which goes on; this process only watches it from now on, and ends as it ends. Whatever the
-    fork leaves running, however it ends, is ended as well. `tied`: so it is when the process that started this one
-    ends. Only on Linux: elsewhere nothing is watched."""
+    """Returns in a fork, which goes on; this process only watches it from now on, and ends with the same code. It ends
+    whatever the fork leaves running, and, if `tied`, all of it when the process that started this one ends. Only on
+    Linux: elsewhere nothing is watched."""
     if _LIBC is None:
         return
     adopt_orphans()
     signals = {signal.SIGCHLD, signal.SIGTERM}
     signal.pthread_sigmask(signal.SIG_BLOCK, signals)
-    if tied:  # until here it was to die at once, and nothing was running
+    if tied:  # until here it was to die at once, with nothing running
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     watching, pid = os.getpid(), os.fork()
     if pid == 0:
@@ -280,7 +279,7 @@ def guard(*, tied: bool) -> None:
         return
     code = 1
     try:
-        os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # whose connections they are is to hear that it ended
+        os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # the other ends of these connections must see them close
         ended, status = 0, 0
         while not ended and signal.sigwait(signals) == signal.SIGCHLD:
             ended, status = os.waitpid(pid, os.WNOHANG)
@@ -291,7 +290,7 @@ def guard(*, tied: bool) -> None:
 
 
 def children(pid: int) -> list[int]:
-    """The processes that one has started itself, or has adopted."""
+    """The processes that a process has started or adopted."""
     return _parents().get(pid, [])
 
 

@@ -1,8 +1,8 @@
-"""The library's `dataclass`, with methods that are made when they are first asked for.
+"""The library's `dataclass`, with lazily generated methods.
 
-To write and compile `__init__`, `__eq__`, `__hash__` and `__repr__` of some four hundred classes took two fifths of
-what a short run costs, and a run makes instances of few of them. What a class promises is the library's: fields,
-defaults, slots, patterns of `match`, `replace`, `FrozenInstanceError`.
+Generating `__init__`, `__eq__`, `__hash__` and `__repr__` of some four hundred classes took two fifths of a short run,
+and a run makes instances of few of them. The behaviour is the library's: fields, defaults, slots, patterns of `match`,
+`replace`, `FrozenInstanceError`.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ def _frozen(kind: type) -> type:
 
 def _made(kind: Any, generated: tuple[str, ...] = ("__init__", "__repr__", "__eq__")) -> type:
     owner: list[type] = []
-    inherited = "__eq__" in vars(kind) and vars(kind)["__hash__"] is None  # what Python adds is not a person's
+    inherited = "__eq__" in vars(kind) and vars(kind)["__hash__"] is None  # added by Python, not written in the class
     for name in generated:
         if name not in vars(kind) or (name == "__hash__" and inherited):
             setattr(kind, name, _first(owner, name))
     if "__hash__" not in vars(kind):
         kind.__hash__ = None
-    kind.__doc__ = kind.__doc__ or kind.__name__  # else the library asks for a signature
+    kind.__doc__ = kind.__doc__ or kind.__name__  # otherwise the library computes a signature
     made: type = dataclasses.dataclass(init=False, repr=False, eq=False, slots=True)(kind)
     owner.append(made)
     return made

@@ -1,7 +1,7 @@
-"""Answers about frozen data, kept while they are few: a question about the very same object is not worked out twice.
+"""Caches of answers about frozen data: an answer about the same object is not computed twice.
 
-An answer about a *text* can also be kept from run to run, on a `Shelf`: it is found by the digest of all that it was
-worked out from, and lies in the user's cache under the user's seal (`avow.base.notes`).
+An answer about a *text* can also be kept from run to run, on a `Shelf`: its key is the digest of everything it was
+computed from, and it is in the user's cache under the user's seal (`avow.base.notes`).
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ T = TypeVar("T")
 
 
 class Remembered(Generic[P, T]):
-    """A pure function of frozen arguments that remembers what it answered."""
+    """A pure function of frozen arguments that caches its answers."""
 
     def __init__(self, function: Callable[P, T], most: int) -> None:
         self.name = function.__qualname__
         self._function = function
         self._most = most
         self._known: dict[tuple[int, ...], tuple[object, T]] = {}
-        """The arguments are kept with the answer: while they are alive, no other object has their place."""
+        """The arguments are kept with the answer: while they are alive, no other object gets their id."""
         update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -44,7 +44,7 @@ class Remembered(Generic[P, T]):
         return self._learn(self._function(*args, **kwargs), args) if found is None else found[1]
 
     def learn(self, answer: T, *args: P.args, **kwargs: P.kwargs) -> None:
-        """The answer, as it was found in an earlier run."""
+        """The answer of an earlier run."""
         assert not kwargs
         self._learn(answer, args)
 
@@ -56,35 +56,35 @@ class Remembered(Generic[P, T]):
 
 
 def by_identity(most: int) -> Callable[[Callable[P, T]], Remembered[P, T]]:
-    """Decorates a pure function of frozen arguments. Which objects they are is compared, not what they say: to compare
-    a deep formula costs as much as to work it out again. Of more than `most` answers none is kept."""
+    """Decorates a pure function of frozen arguments. Arguments are compared by identity: comparing a deep formula costs
+    as much as the answer. With more than `most` answers the cache is emptied."""
     return lambda function: Remembered(function, most)
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Whole lines of a file, from `first` on and before `end`. What was worked out from their text is the same wherever
-    it stands, but for the places in it."""
+    """Whole lines of a file, from `first` on and before `end`. What follows from their text is the same at any
+    position, apart from the places in it."""
 
     file: str
     first: int
     end: int
     heads: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    """File → the line before which stands what the answer may name by its place, too; the answer's digest covers it."""
+    """File → the line before which the answer may also name places; the answer's digest covers that part."""
 
     def has(self, span: Span) -> bool:
         return span.file == self.file and self.first <= span.line and span.end_line <= self.end
 
 
 _TRUE = ""
-"""In the place of a digest: what is known to be so."""
+"""In place of a digest: known facts."""
 
 
 class Shelf:
-    """What was found out of the texts of one folder, from run to run.
+    """Answers about the texts of one folder, kept from run to run.
 
-    An answer that was edited, half-written, made by another user or found by other code is none: the file has a seal
-    that is bound to its place, and `given` (what every answer depends on) is part of every digest.
+    An answer that was edited, half-written, or made by another user or other code is ignored: the file has a seal bound
+    to its place, and `given` (what every answer depends on) is part of every digest.
     """
 
     def __init__(self, folder: Path, *given: str) -> None:
@@ -97,12 +97,12 @@ class Shelf:
         self._new = False
 
     def digest(self, *texts: str) -> str:
-        """Of everything that an answer is worked out from."""
+        """Digest of everything that an answer is computed from."""
         return sha256("".join(f"{len(text)}:{text}" for text in (*self._given, *texts)))
 
     def answer(self, digest: str, stretch: Stretch, make: Callable[[], T], what: str = "") -> T:
-        """What `make` finds of the texts with that digest, which stand at the stretch; `what` tells several answers of
-        one digest apart. `make` uses nothing else."""
+        """The answer of `make` for the texts with that digest, at the stretch; `what` distinguishes several answers
+        with one digest. `make` uses nothing else."""
         answers = self._asked.setdefault(digest, self._kept.get(digest, {}))
         if what in answers:
             return cast(T, _Placing(io.BytesIO(answers[what]), stretch).load())
@@ -113,23 +113,23 @@ class Shelf:
         return made
 
     def knows(self, digest: str) -> bool:
-        """Whether it was found to be so, of the texts with that digest."""
+        """Whether the fact is known for the texts with that digest."""
         return digest in self._asked[_TRUE]
 
     def note(self, digest: str) -> None:
-        """That it is so. It stays known when the texts change; of very many nothing is."""
+        """Record the fact. It stays known when the texts change; if there are very many, all are dropped."""
         if len(self._asked[_TRUE]) >= NOTED:
             self._asked[_TRUE].clear()
         self._asked[_TRUE][digest] = b""
         self._new = True
 
     def is_of(self, value: object, digest: str, stretch: Stretch) -> None:
-        """The value was worked out from the texts with that digest: so is what follows from it alone."""
+        """Note that the value, and what follows from it alone, was computed from the texts with that digest."""
         self._texts[id(value)] = (value, digest, stretch)
 
     def recall(self, function: Remembered[[T], Any], value: T) -> bool:
-        """Let the function know what it answered of that value in an earlier run, or will be asked in a later one.
-        Whether the value was worked out from a text here."""
+        """Give the function its answers about that value from an earlier run, or keep them for a later one. Returns
+        whether the value was computed from a text here."""
         if id(value) not in self._texts:
             return False
         _, digest, stretch = self._texts[id(value)]
@@ -137,11 +137,11 @@ class Shelf:
         return True
 
     def keep(self) -> None:
-        """Write down what was asked for, if there is anything new in it. What was not asked for is of earlier texts."""
+        """Write the requested answers if any is new. Answers that were not requested belong to earlier texts."""
         if not self._new:
             return
         self._new = False
-        with contextlib.suppress(OSError):  # a read-only home costs that each time
+        with contextlib.suppress(OSError):  # with a read-only home this is repeated each time
             write(self._path, sealed(self._path, pickle.dumps(self._asked)))
             shelves = sorted(self._path.parent.iterdir(), key=lambda path: path.stat().st_mtime)
             for path in shelves[: -SHELVES or None]:
@@ -150,7 +150,7 @@ class Shelf:
 
 
 def _here(line: int, column: int, end_line: int, end_column: int) -> Span:
-    """Stands for a place in the stretch, by its distance from the first line."""
+    """A place in the stretch, by its distance from the first line."""
     raise NotImplementedError
 
 

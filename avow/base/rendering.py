@@ -1,7 +1,7 @@
 """Diagnostics for people (with the source line and a caret under the place), as JSON, and as SARIF 2.1.0.
 
-Everything shown comes from files that nobody vouches for: what is not printable is made visible, never passed on to the
-terminal, and long lines are cut to what surrounds the place. The JSON is flat, and has every key.
+Text from files may contain anything: unprintable characters are made visible and never reach the terminal, and long
+lines are cut around the place. The JSON is flat, and has every key.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _COLOURS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.NOTE: "36"}
 
 
 def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] | None = None, *, colour: bool = False) -> str:
-    """The diagnostics for a terminal, one block each. `sources` maps a file's name to its text; what is not in it is
-    read from the disk where that is possible, and shown without source line where not."""
+    """The diagnostics for a terminal, one block each. `sources` maps a file's name to its text; other files are read
+    from the disk if possible, and else shown without a source line."""
     lines = _Lines(dict(sources or {}))
     return "\n".join(_block(d, lines, colour) for d in diagnostics)
 
@@ -60,7 +60,7 @@ class _Lines:
 
 
 def _read(path: Path) -> str:
-    """A file's text; nothing of what is no file, and might have no end. Raises OSError, ValueError."""
+    """A file's text; empty for a device or a pipe, which may have no end. Raises OSError, ValueError."""
     if not path.is_file():
         return ""
     with path.open("rb") as stream:
@@ -94,7 +94,7 @@ def _block(diagnostic: Diagnostic, lines: _Lines, colour: bool) -> str:
 
 
 def printable(text: str) -> str:
-    """The text with every control character, and whatever else would steer a terminal, made visible."""
+    """The text with control characters and other terminal controls made visible."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else "\ufffd" for c in text.replace("\t", " ").replace("\n", " "))
@@ -137,8 +137,8 @@ def _excerpt(line: str, span: Span) -> tuple[str, int, int]:
 
 @dataclass(frozen=True, slots=True)
 class ShownDiagnostic:
-    """A diagnostic. Its file is called as it was on the command line; lines and columns count from 1, columns in
-    characters (code points), the end is exclusive; where it has no place, these are null."""
+    """A diagnostic. Its file has the name given on the command line; lines and columns count from 1, columns in
+    characters (code points), the end is exclusive; without a place, these are null."""
 
     file: str | None
     line: int | None
@@ -153,7 +153,7 @@ class ShownDiagnostic:
 
 @dataclass(frozen=True, slots=True)
 class CheckDocument:
-    """What is to be said of files."""
+    """The findings about files."""
 
     diagnostics: tuple[ShownDiagnostic, ...]
 

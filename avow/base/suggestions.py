@@ -1,4 +1,4 @@
-"""What someone who wrote an unknown name most likely meant, as the hint of a diagnostic."""
+"""The name that was most likely meant by an unknown one, as the hint of a diagnostic."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 
 def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.6) -> list[str]:
-    """The known names that are nearest to one that is not known, if any are near: the one that differs in capitals
-    only, else up to so many. `alike`: how near, as `difflib` has it."""
-    import difflib  # seldom needed, and it takes a while
+    """The known names nearest to an unknown one, if any are near: the one that differs in case only, else up to so
+    many. `alike`: the least similarity, as in `difflib`."""
+    import difflib  # rarely needed and slow to import
 
     if len(name) > 100:
         return []
@@ -19,7 +19,7 @@ def nearest(name: str, known: Iterable[str], most: int = 1, *, alike: float = 0.
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str | None:
-    """A hint; None where nothing is near. Many short names differ by one letter."""
+    """A hint; None if no name is near. Many short names differ by one letter."""
     return _hint(nearest(name, known, most, alike=0.6 if len(name) > 3 else 0.75))
 
 

@@ -1,6 +1,6 @@
-"""Outside tools: finding them, and of what they are made. Asking a program for its version may take a second, so the
-answer is kept for as long as all that the program is made of is the same: what it says of its version need not change
-when what it loads does."""
+"""Outside tools: where they are, and which files they consist of. Asking a program for its version may take a second,
+so the answer is cached while all files of the program are the same: its version text may stay the same when a library
+changes."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from avow.base.tuning.sizes import PROGRAM_FILES, SCRIPT_BYTES
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool as found on this machine. `version` is None where it is missing; `install` is one command."""
+    """A tool as found on this machine. `version` is None if it is missing; `install` is one command."""
 
     name: str
     version: str | None
     path: str | None
     install: str
     optional: bool = True
-    """Its absence leaves something unasked, but no method without an engine."""
+    """Whether its absence disables a part of a method, and not the method."""
     package: str = ""
-    """The Python package that it is, where it is no program of its own."""
+    """Its Python package, if it is not a program of its own."""
     parts: tuple[str, ...] = ()
-    """Further programs that it runs, and folders that it is made of."""
+    """Further programs that it runs, and folders with its files."""
     trial: Callable[[], str] | None = field(default=None, compare=False)
     """Does a one-line job with the tool, for `avow doctor`; returns what went wrong, empty if nothing did."""
 
@@ -52,7 +52,7 @@ class Tool:
 
 
 def z3_tool() -> Tool:
-    """The solver that Avow brings along."""
+    """The solver that comes with Avow."""
     install = "pip install z3-solver"
     return Tool("z3", package_version("z3-solver"), None, install, False, package="z3", trial=_try_z3)
 
@@ -92,7 +92,7 @@ def find_tool(
     pattern: str = r"\d+(\.\d+)+",
     optional: bool = True,
 ) -> Tool:
-    """The program `name` on the PATH, with its version ("unknown" where it says none). Never raises."""
+    """The program `name` on the PATH, with its version ("unknown"if it prints none). Never raises."""
     path = shutil.which(name)
     if path is None:
         return Tool(name, None, None, install, optional)
@@ -101,7 +101,7 @@ def find_tool(
 
 @functools.cache
 def package_version(name: str) -> str:
-    """Of an installed distribution. Raises `importlib.metadata.PackageNotFoundError`."""
+    """The version of an installed distribution. Raises `importlib.metadata.PackageNotFoundError`."""
     from importlib import metadata  # slow to import
 
     return metadata.version(name)
@@ -109,8 +109,8 @@ def package_version(name: str) -> str:
 
 @functools.cache
 def package_digest(name: str) -> str:
-    """SHA-256 of all files of an installed top-level package, byte code aside; empty where there is none. Nothing is
-    imported. Kept, one for each environment."""
+    """SHA-256 of all files of an installed top-level package, byte code aside; empty if there is none. Imports nothing.
+    Cached for each environment."""
     spec = importlib.util.find_spec(name)
     if spec is None or not spec.submodule_search_locations:
         return ""
@@ -121,7 +121,7 @@ def package_digest(name: str) -> str:
 
 
 LIBRARIES = ("z3", "cvc5", "lark", "yaml")
-"""Packages by which any answer may come about: solvers, of which the second need not be there, and readers of texts."""
+"""Packages that any answer may depend on: solvers (the second is optional) and parsers."""
 
 
 @functools.cache
@@ -159,10 +159,10 @@ def _remember(key: str, version: str) -> None:
         write_note(_file(), {**_read(), key: version})
 
 
-# -- what a program is made of -----------------------------------------------------------------------------------------
+# -- the files of a program --------------------------------------------------------------------------------------------
 
 _SHARED = frozenset({"bin", "sbin", "lib", "lib64", "tmp", "etc", "dev"})
-"""Folders of many programs: what lies in one says nothing of a program in it."""
+"""Folders of many programs: their other files say nothing about one program."""
 
 
 def program_digest(places: tuple[str, ...]) -> str:
@@ -182,8 +182,8 @@ class _Digest:
 
 
 def _kept_digest(name: str, files: Mapping[str, str]) -> str:
-    """SHA-256 of files (what each is called → its path). Kept, sealed, under that name, while each file is the same by
-    its identity: there are many, and some are large."""
+    """SHA-256 of files (label → path). Cached, sealed, under that name while each file's identity is the same: there
+    are many, and some are large."""
     mark = sha256(json.dumps([[file, _mark(file)] for file in files.values()]))
     note = cache_folder() / f"{name}.json"
     known = read_note(_Digest, note)
@@ -197,8 +197,9 @@ def _kept_digest(name: str, files: Mapping[str, str]) -> str:
 
 @functools.cache
 def program_files(path: str) -> tuple[Path, ...]:
-    """The program; of a script, what it names by its whole path, with what lies beside that where it has a folder of
-    its own; of a binary, the libraries that it is linked with; of a folder, what is in its `bin` and `lib`."""
+    """The files of a program: for a script, the files that it names by absolute path, with those beside them if they
+    have a folder of their own; for a binary, the libraries that it is linked with; for a folder, the files in its `bin`
+    and `lib`."""
     found: dict[Path, None] = {}
     binaries: list[Path] = []
     waiting = [Path(path)]
@@ -220,7 +221,7 @@ def program_files(path: str) -> tuple[Path, ...]:
 
 
 def program_folders(path: str) -> tuple[Path, ...]:
-    """Of a program that is a folder, those of which every file counts; none of any other."""
+    """For a program that is a folder, the folders whose files all count; none for any other."""
     place = Path(os.path.realpath(path))
     if not place.is_dir():
         return ()
@@ -247,7 +248,7 @@ def _named(script: bytes) -> Iterator[Path]:
 
 
 def _linked(binary: Path) -> frozenset[Path]:
-    """The libraries that it is loaded with, those of its libraries among them."""
+    """The libraries that it is loaded with, including those of its libraries."""
     try:
         listed = process.run(["ldd", str(binary)], seconds=VERSION_SECONDS, tied=False).stdout
     except process.ToolMissing:
