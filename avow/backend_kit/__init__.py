@@ -1,5 +1,4 @@
-"""What a verification backend promises to the core, and what it gets from it.
-
-Front doors: `avow.backend_kit.protocol` (what a backend offers), `avow.backend_kit.given` (reading what the plan gives
+"""The interface between a verification backend and the core. Start reading at: `avow.backend_kit.protocol` (what a
+backend offers), `avow.backend_kit.given` (reading what the plan gives
 it), `avow.backend_kit.registry` (which backends there are).
 """

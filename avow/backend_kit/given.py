@@ -1,5 +1,5 @@
-"""Reading what a plan gives a method, and telling what is wrong with it, in one way for all backends; and the options
-that say how messages are read."""
+"""Reads a method's options and files and reports their faults, in the same way for all backends; and the options for
+reading messages."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from avow.base.suggestions import suggest
 
 
 def schema(properties: Mapping[str, Any], *required: str, **more: Any) -> dict[str, Any]:
-    """The JSON schema (2020-12) of a method's options, which takes no others; `more` is what else is asked of them."""
+    """The JSON schema (2020-12) of a method's options, which allows no others; `more` adds constraints."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **mapping(properties, *required), **more}
 
 
 def mapping(properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """An option that is a mapping, and takes no other keys."""
+    """An option that is a mapping and allows no other keys."""
     closed = {"properties": dict(properties), "required": [*required], "additionalProperties": False}
     return {"type": "object", **closed}
 
@@ -44,15 +44,15 @@ NAN = {"const": "possible", "description": "a REAL input may be NaN or an infini
 
 
 def file_path(job: Job, key: str) -> Path | None:
-    """The path under an option, whether or not a file is there; None where the option names nothing in the system's
-    folder. For `Backend.files`, which also counts what does not exist yet."""
+    """The path under an option, whether or not the file exists; None if the option names no path in the system's
+    folder. For `Backend.files`, which also includes missing files."""
     name = job.options.get(key)
     return inside(job.root, name) if isinstance(name, str) else None
 
 
 def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hint: str | None = None) -> Path:
-    """The file that the option `key` names (`name` is its value). Raises Rejected: with code `wrong` where that is no
-    place in the system's folder, with code `absent` where no file is there; `hint` says how to get one."""
+    """The file that the option `key` names (`name` is its value). Raises Rejected: with code `wrong` if that is no path
+    in the system's folder, with code `absent` if no file is there; `hint` says how to get one."""
     place = job.method.options.at(key)
     if not name:
         message = f"{job.method.backend} needs '{key}': a file of the system's folder"
@@ -66,8 +66,8 @@ def existing_file(job: Job, key: str, name: str, *, wrong: str, absent: str, hin
 
 
 def file_bytes(path: Path, absent: str, wrong: str = "", most: int | None = None) -> bytes:
-    """What a file holds. Raises Rejected: with code `absent` where it cannot be read, with code `wrong` where it has
-    more than `most` bytes."""
+    """A file's bytes. Raises Rejected: with code `absent` if it cannot be read, with code `wrong` if it has more than
+    `most` bytes."""
     start = Span(str(path), 1, 1, 1, 2)
     try:
         size = path.stat().st_size
@@ -80,7 +80,7 @@ def file_bytes(path: Path, absent: str, wrong: str = "", most: int | None = None
 
 
 def file_text(path: Path, absent: str, wrong: str, most: int) -> str:
-    """The UTF-8 text of a file. Raises Rejected as `file_bytes`, and with code `wrong` where it is none."""
+    """The UTF-8 text of a file. Raises Rejected as `file_bytes`, and with code `wrong` if it is not UTF-8."""
     data = file_bytes(path, absent, wrong, most)
     try:
         return data.decode("utf-8-sig")
@@ -90,7 +90,7 @@ def file_text(path: Path, absent: str, wrong: str, most: int) -> str:
 
 
 def told(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:
-    """Diagnostics in one line, for an outcome's summary: with places that are the same on every machine."""
+    """Diagnostics in one line, for an outcome's summary, with places that are the same on every machine."""
     said = [_line(job, d) for d in diagnostics[:most]]
     if len(diagnostics) > most:
         said.append(f"and {len(diagnostics) - most} more")
@@ -107,9 +107,9 @@ def _line(job: Job, diagnostic: Diagnostic) -> str:
 
 
 def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong: str, hint: str) -> Job:
-    """What a command works on: the job of the node's only method of a backend, or of the one of them with the id
-    `method`. Raises Rejected: with code `wrong` where there is none, or are several; `hint` says how to add one."""
-    from avow.system.load import load_system  # who only imports a backend needs no reader of plans
+    """The job that a command works on: that of the node's only method of a backend, or of the one with the id `method`.
+    Raises Rejected with code `wrong` if there is none, or several; `hint` says how to add one."""
+    from avow.system.load import load_system  # importing a backend needs no reader of plans
 
     system = load_system(folder)
     known = [n.name for n in system.contract.nodes]
@@ -123,7 +123,7 @@ def job_for(folder: Path, node: str, backend: str, method: str | None, *, wrong:
     return Job(system, system.contract.node(node), found[0], ())
 
 
-# -- how messages are read ---------------------------------------------------------------------------------------------
+# -- the reading of messages--------------------------------------------------------------------------------------------
 
 PATH = text("a field of the message: pose.position.x, ranges[0]")
 DURATION = {
@@ -213,4 +213,4 @@ READING: dict[str, Any] = {
     },
 }
 """`when`, `answers`, `mapping`: how a node's messages are read, and when they are judged. Every method that judges
-messages takes them."""
+messages has these options."""

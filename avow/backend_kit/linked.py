@@ -1,8 +1,9 @@
-"""A model that was verified in the place of a program, held against the program: both are given the same steps, those
-that the program's own method draws and those of the recordings that the plan names.
+"""Compares a verified model with the program that it stands for: both get the same steps, drawn by the program's own
+method or taken from the recordings that the plan names.
 
-A difference refutes the *link* between the two, a claim of its own (`ProgramClaim.LINKED`): the guarantee may well hold
-of either. A backend whose models can be run says so (`Backend.runs_models`); one that runs the program asks here.
+A difference refutes the *link* between the two, a claim of its own (`ProgramClaim.LINKED`): each may still meet the
+guarantee. A backend whose models can be run declares `Backend.runs_models`; a backend that runs the program calls this
+module.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def _methods(system: System, node: str, wanted: Callable[[Backend], bool]) -> tu
 
 
 def beside(job: Job) -> tuple[Method, ...]:
-    """The other methods that the job's answer depends on: models that its program is held against, and recordings."""
+    """The other methods that the job's answer depends on: models that its program is compared with, and recordings."""
     if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
         return ()
     system, node = job.system, job.node.name
@@ -56,7 +57,7 @@ def beside(job: Job) -> tuple[Method, ...]:
 
 
 def reads_recordings(job: Job) -> bool:
-    """Whether the job's program is asked on recorded steps, which are read by topics, connections and scenario."""
+    """Whether the job's program is run on recorded steps, whose reading depends on topics, connections and scenario."""
     return any(backend(m.backend, job.system.plan.plugins).records for m in beside(job))
 
 
@@ -66,7 +67,7 @@ def connected(tool: Backend, job: Job) -> bool:
 
 
 def told_too(tool: Backend, job: Job) -> frozenset[str]:
-    """The backends whose options of other nodes the job's answer may depend on: its own, and those that read its
+    """The backends whose options for other nodes the job's answer may depend on: its own, and those that read its
     messages."""
     judge = judge_of_runs() if wired(tool, job.source) and not tool.uses_wiring else None
     reading = [m.backend for m in beside(job) if backend(m.backend, job.system.plan.plugins).records]
@@ -75,19 +76,19 @@ def told_too(tool: Backend, job: Job) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What the recordings of a node have for its program."""
+    """The recorded inputs of a node's program."""
 
     runs: tuple[tuple[Mapping[str, Any], ...], ...] = ()
-    """For each recording the inputs of its steps, as a program is given them: port → float, int, bool, text, list."""
+    """For each recording the inputs of its steps, in the program's form: port → float, int, bool, text, list."""
     without: int = 0
-    """Steps that lack an input, or have one that is no machine value."""
+    """The number of steps that lack an input, or have one that is no machine value."""
     wrong: str = ""
-    """Why a recording cannot be read."""
+    """The reason why a recording cannot be read."""
 
 
 def recorded(job: Job, ports: Sequence[str]) -> Recorded:
-    """The recorded steps on which the job's program can be asked: those that have all of these inputs, the first
-    few thousand."""
+    """The recorded steps on which the job's program can be run: those with all of these inputs, the first few
+    thousand."""
     runs: list[tuple[Mapping[str, Any], ...]] = []
     without = left = 0
     if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
@@ -113,7 +114,7 @@ def _asked(step: Step, ports: Sequence[str]) -> Mapping[str, Any] | None:
 
 
 def _machine(value: Value) -> Any:
-    """A value as a program is given it. Raises TypeError, OverflowError."""
+    """A value in the program's form. Raises TypeError, OverflowError."""
     match value:
         case bool() | int():
             return value
@@ -129,8 +130,8 @@ def _machine(value: Value) -> Any:
 def settled(
     job: Job, steps: Sequence[Step], why: str = "", of_recordings: Recorded | None = None, kept: int = 0
 ) -> tuple[Outcome, ...]:
-    """The outcome of the job's claim that model and program agree, where it has one. `steps` are what the program did
-    within its assumptions, `kept` of them those of recordings; where there are none, `why` says it."""
+    """The outcome of the job's claim that model and program agree, if it has one. `steps` are the program's steps
+    within its assumptions, `kept` those among them from recordings; if there are none, `why` gives the reason."""
     found = of_recordings or Recorded()
     claims = [claim for claim in job.claims if claim.name == ProgramClaim.LINKED]
     if found.wrong:
@@ -139,7 +140,7 @@ def settled(
 
 
 def _told(outcome: Outcome, found: Recorded, kept: int) -> Outcome:
-    """With what of the recordings it rests on."""
+    """The outcome with the recordings that it rests on."""
     asked = sum(map(len, found.runs))
     if not asked and not found.without:
         return outcome
@@ -201,7 +202,7 @@ def _said(run: Callable[[Step], Step], step: Step) -> Step | None:
 
 
 def _same(one: Value, other: Value) -> bool:
-    """The same value; a REAL as nearly as rounding a few times lets a program be."""
+    """Whether two values are equal; for a REAL, up to the rounding of a few operations."""
     match one, other:
         case SequenceValue(items=left), SequenceValue(items=right):
             return len(left) == len(right) and all(map(_same, left, right))

@@ -1,8 +1,8 @@
-"""How a backend is asked. What speaks of other steps reaches only a backend that says that it understands that
-(`Backend.remembers`), and of that only what it can say (`Backend.unsaid`): of the others, the guarantee is refused by
-name, and they see a contract without it.
+"""Calls a backend with the clauses that it understands. Clauses about other steps reach only a backend that declares
+`Backend.remembers`, and only if it can express them (`Backend.unsaid`). Other guarantees are refused by name, and the
+backend sees a contract without them.
 
-An assumption that speaks of other steps holds for the whole node: none of its guarantees can be asked about then.
+An assumption about other steps applies to the whole node, so then none of its guarantees can be checked.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from avow.system.plan import System
 
 
 def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
-    """`Backend.discharge`; what is refused is `unknown`, with the reason."""
+    """`Backend.discharge`; a refused guarantee is `unknown`, with the reason."""
     asked, refused = _sayable(tool, job)
     outcomes = tuple(Outcome(o.id, Verdict.UNKNOWN, refused[o.id]) for o in job.obligations if o.id in refused)
     if job.obligations and not asked.obligations:
@@ -35,7 +35,7 @@ def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
 
 
 def export(tool: Backend, job: Job) -> Mapping[str, str]:
-    """`Backend.export`, of what the backend can say."""
+    """`Backend.export`, for the clauses that the backend can express."""
     asked, refused = _sayable(tool, job)
     return {} if refused and not asked.obligations else tool.export(asked)
 
@@ -52,7 +52,7 @@ def check(tool: Backend, job: Job) -> Iterator[Diagnostic]:
 
 
 def translate(tool: Backend, notation: str, system: System, node: Node) -> Translated:
-    """`Backend.translate`, of what the backend can say. Raises Rejected where the input is at fault."""
+    """`Backend.translate`, for the clauses that the backend can express. Raises Rejected if the input is at fault."""
     told = {clause.name: _refusal(tool, node, clause) for clause in node.guarantees}
     missing = tuple(
         Diagnostic("BACKEND006", why, node.clause(name).span, Severity.WARNING)
@@ -67,7 +67,7 @@ def translate(tool: Backend, notation: str, system: System, node: Node) -> Trans
 
 
 def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
-    """The job without what the backend cannot say, and why not, by obligation."""
+    """The job without the guarantees that the backend cannot express, and the reasons, by obligation."""
     if tool.remembers and tool.answers_itself(job):
         return job, {}
     told = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
@@ -80,7 +80,7 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
 
 
 def refusal(judge: str, node: Node, clause: Clause) -> str | None:
-    """Why whoever judges single steps cannot be asked about a guarantee, if he cannot."""
+    """Why a method that judges single steps cannot check a guarantee; None if it can."""
     said = next(((c, found[0]) for c in (clause, *node.assumptions) if (found := histories(c.formula))), None)
     if said is None:
         return None
@@ -111,9 +111,9 @@ def _without(node: Node) -> Node:
 
 
 def unsaid(judge: str, node: Node, clause: Clause, *, functions: bool = False) -> str | None:
-    """Why whoever judges runs of steps by cells (`avow.formulas.temporal`) cannot be asked about a guarantee, if he
-    cannot: the guarantee, or an assumption of the node, has no cells, or such as keep something for each value of a
-    quantified variable (`functions` says that he can do with those)."""
+    """Why a method that judges runs by state variables (`avow.formulas.temporal`) cannot check a guarantee; None if it
+    can. It cannot if the guarantee, or an assumption of the node, has no state variables, or has one for each value of
+    a quantified variable (unless `functions` is set)."""
     for each in (clause, *node.assumptions):
         reason = _reason(each, functions)
         if reason is not None:

@@ -1,4 +1,4 @@
-"""What a verification backend promises to the core, and what it gets from it.
+"""The interface between a verification backend and the core.
 
 A backend is a module-level object named in the entry-point group ``avow.backends`` (or the attribute ``BACKEND`` of a
 module that a plan names under ``plugins``). The core calls `export` (pure) and `discharge` (the only place that runs a
@@ -49,28 +49,28 @@ __all__ = [
 
 
 COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
-"""Options of every method, whatever its backend: they are the pipeline's, which reads and checks them. `id` names the
-method in records and commands, `guarantees` are those that it takes on, the others are `Limits`."""
+"""Options of every method, for any backend: the pipeline reads and checks them. `id` names the method in records and
+commands, `guarantees` are those that it discharges, the others are `Limits`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One method of one node: all that a backend may look at."""
+    """One method of one node: everything that a backend may read."""
 
     system: System
     node: Node
     method: Method
     obligations: tuple[Obligation, ...]
-    """Kind GUARANTEE, one for each clause that the method takes on; `Obligation.name` is the clause's name."""
+    """Kind GUARANTEE, one for each clause that the method discharges; `Obligation.name` is the clause's name."""
     claims: tuple[Obligation, ...] = ()
-    """Kind PROGRAM, one for each of the backend's `claims`: they are answered beside the obligations."""
+    """Kind PROGRAM, one for each of the backend's `claims`: they are answered with the obligations."""
     kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Obligation's id → cases that refuted it once, as this backend put them under `record.CASE` into an outcome's
-    details. A backend that puts any there tries them first, whatever its options say."""
+    details. A backend that stores cases tries them first, with any options."""
 
     @property
     def every(self) -> tuple[Obligation, ...]:
-        """All that is to be answered."""
+        """All obligations and claims to be answered."""
         return self.obligations + self.claims
 
     @property
@@ -84,12 +84,12 @@ class Job:
 
     @property
     def source(self) -> Source | None:
-        """The program that the plan says the node is."""
+        """The node's program according to the plan."""
         return self.system.plan.node(self.node.name).source
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """The method's options that are the backend's own, as its schema describes them; none where the plan gives no
+        """The method's options for the backend itself, as its schema describes them; empty if the plan gives no
         mapping."""
         return {key: value for key, value in self._given.items() if key not in COMMON_OPTIONS}
 
@@ -116,12 +116,12 @@ class Limits:
     megabytes: int = 4096
     seed: int = 0
     asked: bool = False
-    """A person gave the seconds on the command line: they stand in place of the plan's and of an engine's own."""
+    """The seconds were given on the command line: they replace the plan's and an engine's own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that one call of `discharge` found. `tool` is the engine that really answered."""
+    """The result of one call of `discharge`. `tool` is the engine that really answered."""
 
     outcomes: tuple[Outcome, ...]
     tool: str
@@ -130,10 +130,10 @@ class Report:
     logs: Mapping[str, str] = field(default_factory=dict)
     """Name → text of logs and results to be kept beside the artifacts."""
     observed: tuple[Observed, ...] = ()
-    """What the program under test was seen to look at; the core keys the answer by it. With something `Seen.OUTSIDE` in
-    it the answer is re-run in every run."""
+    """What the program under test read; it is part of the answer's key. If it contains `Seen.OUTSIDE`, every run
+    repeats the answer."""
     isolation: Isolation = Isolation.NONE
-    """How far the subject was kept from whoever judged it."""
+    """How the program under test was isolated from its oracle."""
 
     @classmethod
     def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:
@@ -142,13 +142,13 @@ class Report:
 
     @classmethod
     def unanswered(cls, job: Job, verdict: Verdict, why: str, tool: str, tool_version: str) -> Report:
-        """Where the process that was to answer did not: what it hung on nobody knows, and the next run asks again."""
+        """For a process that did not answer: the cause is unknown, and the next run re-runs it."""
         outcomes = (Outcome(o.id, verdict, why, details={RETRY: True}) for o in job.every)
         return cls(tuple(outcomes), tool, tool_version)
 
     @classmethod
     def unsealed(cls, job: Job, why: Unavailable, tool: str, tool_version: str) -> Report:
-        """Where a sandbox is required, and there is none: the next run asks again."""
+        """For a missing but required sandbox: the next run re-runs it."""
         return cls.unanswered(job, Verdict.NOT_RUN, str(why), tool, tool_version)
 
 
@@ -159,7 +159,7 @@ class OutsideCheck:
     file: Path
     """The file that holds the claim; absolute."""
     command: tuple[str | Path, ...]
-    """Words for the shell, run in the workspace's folder; a path is shown relative to it. The same for all guarantees
+    """Arguments of a command, run in the workspace's folder; a path is shown relative to it. Equal for all guarantees
     that one run decides."""
     guarantees: tuple[str, ...]
     """The guarantees that hold only if this check passes."""
@@ -172,14 +172,14 @@ class Translated:
     """A node in a notation of a backend's own."""
 
     files: Mapping[str, str]
-    """Name → text; names are relative to a folder of the node's own. None, where nothing of the node can be said."""
+    """Name → text; names are relative to a folder of the node's own. None if nothing of the node can be translated."""
     missing: tuple[Diagnostic, ...] = ()
-    """A warning for each guarantee that is not in them, with the reason."""
+    """A warning for each missing guarantee, with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What became of a clause in one run of messages."""
+    """The result of a clause in one run of messages."""
 
     held: int = 0
     broken: int = 0
@@ -190,7 +190,7 @@ class Judged:
     triggered: bool = False
     """Its antecedent was met, or it has none."""
     shown: Counterexample | None = None
-    """The first breach, or the first value of an output that is none of its type."""
+    """The first breach, or the first output value that is not of its type."""
     at: int = 0
     """The event at which that was, from 1."""
     reason: str = ""
@@ -199,20 +199,20 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class JudgedRun:
-    """The contract's word on one run of messages."""
+    """The contract's verdict on one run of messages."""
 
     clauses: Mapping[str, Judged]
-    """Guarantee → what became of it."""
+    """Guarantee → its result."""
     assumption: tuple[int, str] | None = None
     """The first event (from 1) that breaks an assumption or whose input is no value of its type, and why."""
 
 
 class NoModel(Exception):  # noqa: N818 - it names a state
-    """There is no model to be run, or it has no answer."""
+    """There is no model to run, or it has no answer."""
 
 
 _IN_WORKERS = frozenset({"discharge", "model", "steps"})
-"""Methods that only a worker's process asks: what they raise is the verdict `error`, with the traceback as its log."""
+"""Methods that only a worker's process calls: an exception is the verdict `error`, with the traceback as its log."""
 
 _MADE_WHOLE: Mapping[str, tuple[Callable[[Any], Any], type]] = {
     "tools": (tuple, Tool),
@@ -221,12 +221,14 @@ _MADE_WHOLE: Mapping[str, tuple[Callable[[Any], Any], type]] = {
     "outside_checks": (tuple, OutsideCheck),
     "export": (dict, str),
 }
-"""Methods whose answer is gone through at once, so that what a generator raises is theirs, too; and what it has."""
+"""Methods whose answer is listed at once, so that an exception of a generator is attributed to them; with the item's
+type."""
 
 
 @contextlib.contextmanager
 def asking(name: str, part: str) -> Iterator[None]:
-    """What a backend raises of itself where it is asked in Avow's own process, as its defect. Raises Rejected."""
+    """Reports an exception of a backend that was called in Avow's own process as the backend's defect. Raises
+    Rejected."""
     try:
         yield
     except Rejected:
@@ -238,7 +240,7 @@ def asking(name: str, part: str) -> Iterator[None]:
 
 
 def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
-    """A method of a backend, of which whoever calls it is told that what it raises is the backend's defect."""
+    """A backend's method, wrapped so that an exception is reported as the backend's defect."""
 
     @functools.wraps(method)
     def told(tool: Backend, *arguments: Any, **named: Any) -> Any:
@@ -257,9 +259,9 @@ def _told(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Backend(ABC):
-    """A verification method. What has no value here, a backend must say; the rest may stay as it is.
+    """A verification method. A backend must define the attributes without a value here; the others have defaults.
 
-    See `docs/developers/adding-a-backend.md`; `avow.conformance` holds a backend to all of this.
+    See `docs/developers/adding-a-backend.md`; `avow.conformance` checks a backend against all of this.
     """
 
     def __init_subclass__(cls, **more: Any) -> None:
@@ -270,56 +272,56 @@ class Backend(ABC):
                 setattr(cls, name, _told(name, method))
 
     name: str
-    """As plans write it: a word of small letters, digits, `_` and `-`."""
+    """Its name in plans: a word of small letters, digits, `_` and `-`."""
     title: str
     """What it does, in one line, for the report."""
     version: str
     """Raised when the translation or the reading of answers changes: old evidence is then stale."""
     strength: Verdict
-    """The best verdict that it may give."""
+    """The strongest verdict that it may give."""
     link: Link
-    """How what it verifies hangs together with the contract's formula; an outcome may say otherwise for itself."""
+    """How its input relates to the contract's formula; an outcome may override it."""
     options_schema: Mapping[str, Any]
     """JSON schema (2020-12) of the method's own options in plan.yaml (not of `COMMON_OPTIONS`)."""
     green_means: str
-    """What a good verdict of this backend does and does not show, in a sentence or two."""
+    """What a good verdict of this backend shows and does not show, in a sentence or two."""
 
     uses_scenario: bool = True
-    """Whether an answer may depend on the plan's scenario. Say False only if it cannot: a change there then re-runs
-    nothing, and evidence that should be stale would look current."""
+    """Whether an answer may depend on the plan's scenario. False only if it cannot: with False a change there re-runs
+    nothing, so that stale evidence would look current."""
     uses_steps: bool = True
     """Whether an answer may depend on the scenario's `steps`; likewise."""
     uses_wiring: bool = True
-    """Whether an answer may depend on topics, connections or other nodes; likewise. Of a callback class it always may
+    """Whether an answer may depend on topics, connections or other nodes; likewise. For a callback class it always may
     (`wired`)."""
     uses_upstream: bool = False
-    """Whether an answer may depend on the contracts of the nodes from which data reaches the node, over however many
-    others, and on what the same backend is told of them. Where it is False the job has no clause of another node."""
+    """Whether an answer may depend on the contracts of all nodes upstream, and on the same backend's options for them.
+    With False the job has no clause of another node."""
     remembers: bool = False
-    """Whether it judges clauses that speak of other steps (`avow.formulas.temporal`), or does not read formulas at all.
-    The others are never shown such a clause: what the plan asks of them is refused by name."""
+    """Whether it judges clauses about other steps (`avow.formulas.temporal`), or does not read formulas at all. Other
+    backends never see such a clause: the guarantee is refused by name."""
     uses_source: bool = False
-    """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. Where it is False they are not
-    in the job at all."""
+    """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. With False they are not in the
+    job."""
     uses_criticality: bool = False
-    """Whether an answer may depend on the node's `criticality:`. Where it is False, that is empty in the job."""
+    """Whether an answer may depend on the node's `criticality:`. With False it is empty in the job."""
     claims: tuple[ProgramClaim, ...] = ()
-    """What it says of the node's program besides its guarantees (`Job.claims`)."""
+    """Its claims about the node's program besides the guarantees (`Job.claims`)."""
     runs_models: bool = False
     """Whether what it verifies is a model that can be run on single inputs (`model`)."""
     not_run: str = ""
-    """Why the models that it verifies cannot be run on single inputs, in words: told where a program is held against
-    the node's models."""
+    """Why its models cannot be run on single inputs, in words: reported when a program is compared with the node's
+    models."""
     records: bool = False
-    """Whether the plan names recordings of the running node to it, whose steps it can tell (`steps`)."""
+    """Whether its options name recordings of the running node, whose steps it can extract (`steps`)."""
     judges_runs: bool = False
     """Whether it can judge runs of messages that another backend makes (`judge`)."""
     of: Object = Object.MODEL
-    """What is verified; an outcome may say otherwise for itself."""
+    """The kind of artifact that it verifies; an outcome may override it."""
     portable: bool = False
-    """Whether an answer depends on the job and the bytes of `files` alone: not on the exported files, on other files of
-    the system's folder, or on what they start. Such a work can be sent to another machine; others run where the
-    workspace is."""
+    """Whether an answer depends only on the job and the bytes of `files`: not on the exported files, on other files of
+    the system's folder, or on what they start. Such a job can run on another machine; others run where the workspace
+    is."""
     codes: Mapping[str, Code] = {}
     """The diagnostic codes that `check` and `translate` use (`avow.base.codes.register`)."""
     translations: Mapping[str, str] = {}
@@ -330,32 +332,32 @@ class Backend(ABC):
         return ()
 
     def suits(self, node: Node) -> bool:
-        """Whether the node's contract looks like what the backend verifies: only there do reports suggest it. Cheap; a
-        guess is good enough."""
+        """Whether the node's contract suits the backend: reports suggest it only then. Cheap; a guess is good
+        enough."""
         return True
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
-        """Why a backend that `remembers` cannot be asked about a guarantee that speaks of other steps, or whose node
-        assumes something that does; None where it can. See `avow.backend_kit.one_step`."""
+        """Why a backend that `remembers` cannot check a guarantee about other steps, or one whose node has such an
+        assumption; None if it can. See `avow.backend_kit.one_step`."""
         return None
 
     def answers_itself(self, job: Job) -> bool:
-        """Whether of this job a backend that `remembers` answers itself for what it cannot say: `unsaid` is not
-        asked."""
+        """Whether a backend that `remembers` itself answers what it cannot express in this job: `unsaid` is then not
+        called."""
         return False
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        """What is wrong with the plan's options: missing files, unknown names, models that do not parse."""
+        """Faults of the plan's options: missing files, unknown names, models that do not parse."""
         return ()
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        """The files of the plan (programs, data, reviews) that the answer depends on; absolute, also where they do not
-        exist. Never raises for what the options say."""
+        """The files of the plan (programs, data, reviews) that the answer depends on; absolute, including missing ones.
+        Never raises for faulty options."""
         return ()
 
     def export(self, job: Job) -> Mapping[str, str]:
         """Relative path → text of every generated file. Pure: same job, same bytes; no clock, no tool. Raises Rejected
-        with what `check` says, or leaves out what cannot be said."""
+        with the faults that `check` reports, or leaves out what cannot be expressed."""
         return {}
 
     def outside_checks(self, job: Job, folder: Path, names: Sequence[str]) -> Iterable[OutsideCheck]:
@@ -365,28 +367,30 @@ class Backend(ABC):
 
     @abstractmethod
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        """Settle `job.obligations` and `job.claims`, one outcome for each. `folder` holds the exported files. Never
-        raises for what the contract, the plan or a tool may do: a crash, a time-out, a missing tool are outcomes."""
+        """Discharge `job.obligations` and `job.claims`, one outcome for each. `folder` holds the exported files. Never
+        raises for faults of contract, plan or tool: a crash, a time-out, a missing tool are outcomes."""
 
     def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
-        """What it verifies, to be run on one step's inputs: both by qualified name. Raises Rejected where the plan's
-        input is at fault, and NoModel where there is nothing to be run; so does a call that has no answer."""
+        """The verified model as a function from one step's inputs to its outputs, by qualified name. Raises Rejected if
+        the plan's input is at fault, and NoModel if there is no model to run; a call without an answer also raises
+        NoModel."""
         raise NoModel(f"{self.name} has no model that can be run")
 
     def steps(self, job: Job) -> Iterator[tuple[Mapping[str, Value], ...]]:
-        """Of each recording that the method's options name the node's steps: the inputs that were known, by qualified
-        name. Raises Rejected where one cannot be read."""
+        """The node's steps in each recording that the method's options name: the known inputs, by qualified name.
+        Raises Rejected if one cannot be read."""
         raise NotImplementedError(self.name)
 
     def judge(self, job: Job) -> Callable[[Iterable[Mapping[str, Any]]], JudgedRun]:
-        """The contract's word on whole runs of messages on the node's topics: events as recordings have them (`topic`,
-        `time` in seconds, fields; at the end one without a topic says how long it was). Of the method's options those
-        in `avow.backend_kit.given.READING` count. Raises Rejected where they are at fault."""
+        """The contract's verdict on whole runs of messages on the node's topics: events as recordings have them
+        (`topic`,
+        `time` in seconds, fields; a last one without a topic gives the length). Uses the method's options in
+        `avow.backend_kit.given.READING`. Raises Rejected if they are at fault."""
         raise NotImplementedError(self.name)
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
-        """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
-        notation merely cannot say is `Translated.missing`."""
+        """The node in one of `translations`. Pure, like `export`. Raises Rejected if the input is at fault; clauses
+        that the notation cannot express are in `Translated.missing`."""
         raise NotImplementedError(notation)
 
 
@@ -397,18 +401,18 @@ def _asked() -> frozenset[str]:
 
 @functools.cache
 def _required() -> Mapping[str, type]:
-    """What a backend says of itself, each with its type: what stands above, annotated."""
+    """The attributes of a backend with their types, as annotated above."""
     return {name: get_origin(kind) or kind for name, kind in get_type_hints(Backend).items()}
 
 
 def wired(tool: Backend, source: Source | None) -> bool:
-    """Whether an answer may depend on topics, connections and other nodes: of a callback class, whose messages come by
-    them, that of every method that looks at the source."""
+    """Whether an answer may depend on topics, connections and other nodes. For a callback class, which gets its
+    messages through them, this holds for every method that reads the source."""
     return tool.uses_wiring or (tool.uses_source and source is not None and source.kind is not Driving.STEP)
 
 
 def lacks(found: object) -> str:
-    """Why an object is no backend, in words; empty where it is one."""
+    """Why an object is no backend, in words; empty if it is one."""
     if not isinstance(found, Backend):
         return "it is no instance of avow.backend_kit.protocol.Backend"
     missing = [name for name in _required() if not hasattr(found, name)]

@@ -19,7 +19,7 @@ GROUP = "avow.backends"
 
 @functools.cache
 def installed() -> dict[str, EntryPoint]:
-    """Name → entry point; nothing is imported. Raises Rejected where two packages claim one name."""
+    """Name → entry point; imports nothing. Raises Rejected if two packages claim one name."""
     found: dict[str, EntryPoint] = {}
     for point in entry_points(group=GROUP):
         other = found.get(point.name)
@@ -41,7 +41,7 @@ def names() -> tuple[str, ...]:
 
 @functools.cache
 def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
-    """The backend of that name, imported now. Raises Rejected with the reason where it cannot be had."""
+    """The backend of that name, imported now. Raises Rejected with the reason if it cannot be imported."""
     for plugin in _plugins(plugins):
         if plugin.name == name:
             if name in installed():
@@ -70,8 +70,8 @@ def every_code() -> Mapping[str, Code]:
 
 
 def translators(plugins: tuple[str, ...] = ()) -> dict[str, Backend]:
-    """Notation → the backend that translates into it. A backend that does not load offers none; of two that offer one
-    notation, the first by name has it."""
+    """Notation → the backend that translates into it. A backend that does not load offers none; if two offer one
+    notation, the first by name counts."""
     found: dict[str, Backend] = {}
     for one in (*_offered(plugins), *_plugins(plugins)):
         for notation in one.translations:
@@ -91,7 +91,7 @@ def _offered(plugins: tuple[str, ...]) -> Iterator[Backend]:
 
 
 def trust_plugins() -> None:
-    """From now on this process imports a plan's plug-ins: said by what runs a workspace's code anyway."""
+    """Allow this process to import a plan's plug-ins: called by commands that run a workspace's code anyway."""
     process.here.trusts_plugins = True
 
 

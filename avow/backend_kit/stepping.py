@@ -1,11 +1,11 @@
-"""A program that keeps something from step to step, and a contract that remembers: as one step of a larger node.
+"""A stateful program and a contract with state variables, as one step of a larger node.
 
-What the program holds and what the contract remembers (its cells) are inputs of that node, as the step before has left
-them; what the program holds after the step is an output. An *invariant* links the two: it holds before the first step,
-and a step keeps it, so that it is an assumption of every step. Each guarantee is then one of a single step.
+The program's state and the contract's state variables (cells), as the previous step left them, are inputs of that node;
+the program's state after the step is an output. An *invariant* links the two: it holds before the first step, and a
+step keeps it, so that it is an assumption of every step. Each guarantee is then about a single step.
 
-Invariants are a person's, from the plan, or guesses, of which the largest part stays that is kept. A cell is a
-definition: that it is as the contract says needs no proof.
+Invariants come from the plan or are guesses; the largest set of guesses that a step keeps is used. A state variable is
+a definition: its value needs no proof.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What a program keeps from one step to the next; `initial` is its value before the first, without variables."""
+    """A part of a program's state; `initial` is its value before the first step, without variables."""
 
     name: str
     sort: Sort
@@ -49,7 +49,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Invariant:
-    """What holds before every step, over cells and what the program holds."""
+    """What holds before every step, over the contract's and the program's state."""
 
     text: str
     formula: t.Term
@@ -64,13 +64,13 @@ class Stepping:
     own: Node
     """The contract's."""
     node: Node
-    """Its clauses as formulas of one step; cells, and what the program holds, among its ports."""
+    """Its clauses as formulas of one step; the ports include the contract's and the program's state."""
     cells: tuple[Cell, ...]
     held: tuple[Held, ...]
     invariants: tuple[Invariant, ...]
 
     def first(self, formula: t.Term) -> t.Term:
-        """A formula over cells and what is held, before the first step."""
+        """A formula over state, before the first step."""
         values = {h.before: h.initial for h in self.held}
         return self._at(formula, values, {c: c.initial for c in self.cells if c.initial is not None})
 
@@ -79,7 +79,7 @@ class Stepping:
         return self._at(formula, {h.before: h.after for h in self.held}, {c: c.now for c in self.cells})
 
     def _at(self, formula: t.Term, held: Mapping[t.Variable, t.Term], cells: Mapping[Cell, t.Term]) -> t.Term:
-        """The formula with other terms for what is held and what the cells have, all at once."""
+        """The formula with other terms for all state at once."""
         functions = {c: replace(c.before, name=f"{c.name}'") for c in cells if c.parameters}
         plain = {c.before: term for c, term in cells.items() if not c.parameters}
         made = substitute(formula, {**held, **plain, **{c.before: name for c, name in functions.items()}})
@@ -101,8 +101,8 @@ def stepping(
     stated: Iterable[tuple[str, Span]] = (),
     contract: Contract = NOTHING,
 ) -> Stepping:
-    """The steps of a node, of which the guarantees `names` are asked. `stated` are the plan's invariants, each with its
-    place: RCL about what is held, by name, and about the steps before (``previous(…)``, …). Raises Rejected (code
+    """The steps of a node whose guarantees `names` are checked. `stated` are the plan's invariants, each with its
+    place: RCL about the program's state, by name, and about earlier steps (``previous(…)``, …). Raises Rejected (code
     ``BACKEND007``)."""
     records = Records()
     wanted = frozenset(names)
@@ -163,8 +163,8 @@ def _applied(term: t.Term, functions: Mapping[t.Variable, tuple[tuple[t.Variable
 
 
 def guesses(steps: Stepping) -> Iterator[tuple[Invariant, ...]]:
-    """What often links a program's memory and a contract's: that cells begin as they do, ranges, that two counters or
-    conditions are one. Each in its forms, the strongest first; most are wrong."""
+    """Common links between a program's state and a contract's: initial values, ranges, equal counters or conditions.
+    Each in its forms, the strongest first; most are wrong."""
     for forms in dict.fromkeys(_families(steps)):
         yield tuple(Invariant("", formula, None, True) for formula in forms)
 
@@ -196,14 +196,15 @@ def _families(steps: Stepping) -> Iterator[tuple[t.Term, ...]]:
 
 
 def _agreeing(one: t.Term, others: Iterable[t.Term]) -> Iterator[tuple[t.Term, ...]]:
-    """That two conditions are one, or that one follows from the other, or its opposite does."""
+    """That two conditions are equivalent, or that one or its negation follows from the other."""
     for other in others:
         yield t.Iff(one, other), t.Implies(other, one), t.Implies(other, t.Not(one))
         yield t.Iff(one, t.Not(other)), t.Implies(one, other), t.Implies(t.Not(one), other)
 
 
 def _counters(counter: t.Variable, cell: Cell) -> Iterator[t.Term]:
-    """A counter of the program and a number that the contract remembers, which starts at 0 or (an age) at -1."""
+    """A counter of the program and a number among the contract's state variables, which starts at 0 or (a timer) at
+    -1."""
     ages = cell.sort == INTEGER
     value: t.Term = t.Arithmetic("+", cell.before, _number(1), INTEGER) if ages else cell.before
     if (counter.sort == REAL) != (cell.sort == REAL):
@@ -217,7 +218,7 @@ def _counters(counter: t.Variable, cell: Cell) -> Iterator[t.Term]:
 
 
 def _limits(cell: Cell) -> tuple[int, ...]:
-    """The numbers that a cell's definition writes down."""
+    """The numbers in a state variable's definition."""
     numbers = map(written, subterms(cell.now))
     return tuple(dict.fromkeys(number for number in numbers if number is not None and number > 0))
 

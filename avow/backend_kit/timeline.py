@@ -1,9 +1,9 @@
-"""What was heard in a recorded run, and where a monitor found something wrong: lanes over the run's events.
+"""The signals of a recorded run and a monitor's findings: lanes over the run's events.
 
-A method leaves it in its evidence's details, under `timeline`; the report draws it. However long the run was, a lane
-has a bounded number of columns. Signals lose detail by that; marks are counted, and none is lost.
+A method puts it into its evidence's details, under `timeline`; the report draws it. A lane has a bounded number of
+columns for runs of any length. Signals lose detail by that; marks are counted, and none is lost.
 
-Of stretches and marks, which are rows, a record has thousands.
+Stretches and marks are rows, as a record has thousands.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ KINDS: Mapping[str, tuple[str, str]] = {
 
 
 class Word(NamedTuple):
-    """What a lane's signal was over some events, counted from 1; "" for several words."""
+    """A lane's signal over some events, counted from 1; "" for several words."""
 
     first: int
     last: int
@@ -42,7 +42,7 @@ class Word(NamedTuple):
 
 
 class Band(NamedTuple):
-    """Between which numbers it was."""
+    """The range of its numbers."""
 
     first: int
     last: int
@@ -54,7 +54,7 @@ Stretch = Word | Band
 
 
 class Mark(NamedTuple):
-    """So many findings of one kind, at neighbouring events; `time`: of the first of them, in seconds, as text."""
+    """A number of findings of one kind, at neighbouring events; `time`: of the first, in seconds, as text."""
 
     kind: str
     first: int
@@ -74,7 +74,7 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """One run. `every`: the signals are those of about one event in so many; marks are of all."""
+    """One run. `every`: signals are sampled at about one event in so many; marks cover all."""
 
     name: str = field(metadata=called("trace"))
     events: int
@@ -89,8 +89,8 @@ T = TypeVar("T")
 
 
 class Columns(Generic[T]):
-    """Items by event, in at most TIMELINE_COLUMNS columns: they get wider as events go on. `joined` makes one item of
-    two neighbours."""
+    """Items by event, in at most TIMELINE_COLUMNS columns, which get wider as events are added. `joined` merges two
+    neighbours."""
 
     def __init__(self, joined: Callable[[T, T], T]) -> None:
         self._joined = joined
@@ -113,7 +113,7 @@ class Columns(Generic[T]):
 
 
 def joined_stretches(one: Stretch, other: Stretch) -> Stretch:
-    """Over both: the least and the greatest number, or the word if it is one."""
+    """The union of two: the least and the greatest number, or the word if both have the same."""
     first, last = min(one.first, other.first), max(one.last, other.last)
     match one, other:
         case Band(), Band():
@@ -130,7 +130,7 @@ def joined_marks(one: Mark, other: Mark) -> Mark:
 
 
 def runs(stretches: Iterable[Stretch]) -> tuple[Stretch, ...]:
-    """Neighbours that say the same word, or the same number, as one."""
+    """Merges neighbours with the same word or number."""
     found: list[Stretch] = []
     for stretch in stretches:
         if found and stretch[2:] != ("",) and found[-1][2:] == stretch[2:]:
@@ -141,7 +141,7 @@ def runs(stretches: Iterable[Stretch]) -> tuple[Stretch, ...]:
 
 
 def timelines(details: Mapping[str, Any]) -> list[Timeline]:
-    """Those of an evidence's details. Evidence may be anybody's: what is no timeline is left out."""
+    """The timelines in an evidence's details. Evidence may come from any backend: other data is left out."""
     found = details.get("timeline")
     read = []
     for one in found if isinstance(found, list) else ():
@@ -151,7 +151,7 @@ def timelines(details: Mapping[str, Any]) -> list[Timeline]:
 
 
 def _is_whole(timeline: Timeline) -> bool:
-    """Whether all of it lies within its events."""
+    """Whether all items are within its events."""
     marks = [mark for lane in timeline.lanes for mark in lane.marks]
     stretches = [stretch for lane in timeline.lanes for stretch in lane.stretches]
     return (
@@ -167,7 +167,7 @@ def _is_whole(timeline: Timeline) -> bool:
 
 _WIDTH, _LEFT, _RIGHT, _LANE, _CLAUSE, _SIGNAL = 720, 170, 12, 40, 18, 24
 _ACROSS = ("broken", "assumption")
-"""Findings that are drawn through all lanes, to see what the signals were."""
+"""Findings that are drawn through all lanes, to show the signals there."""
 _STYLE = (
     "<style>text{font:10px 'Libertinus Serif',serif;fill:#3c4654}.lane{fill:#f2f4f7}.signal{fill:none;stroke:#1f539e;"
     "stroke-width:1.3}.word{fill:#fff;stroke:#5b6472;stroke-width:.7}"
@@ -177,7 +177,7 @@ _NO_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def picture(timeline: Timeline, alone: bool = False) -> Markup:
-    """The timeline as SVG. `alone`: with its own colours, for where the page's style sheet is not."""
+    """The timeline as SVG. `alone`: with its own colours, for use without the page's style sheet."""
     tops = [2]
     for lane in timeline.lanes:
         tops.append(tops[-1] + _height(lane))
@@ -196,11 +196,11 @@ def picture(timeline: Timeline, alone: bool = False) -> Markup:
         x = _LEFT if anchor == "start" else _WIDTH - _RIGHT
         parts.append(f'<text x="{x}" y="{height - 6}" text-anchor="{anchor}">{_text(words)}</text>')
     parts.append("</svg>")
-    return Markup("".join(parts))  # every text in it is escaped where it is put in
+    return Markup("".join(parts))  # each text is escaped when it is inserted
 
 
 def in_words(timeline: Timeline) -> str:
-    """What the picture shows that matters, for those who do not see it."""
+    """A text alternative with the picture's findings."""
     told = [
         f"{lane.name}: {KINDS[kind][1]} {count(sum(m.number for m in found), 'time')}, first at event {found[0].first}"
         + (f" (t = {found[0].time})" if found[0].time else "")
@@ -241,9 +241,9 @@ def _drawn(lane: Lane, top: int, events: int) -> Iterable[str]:
 def _curve(
     stretches: Sequence[Stretch], ends: Sequence[int], reach: tuple[float, float], top: int, events: int
 ) -> Iterable[str]:
-    """In steps, as a value stays until the next message; up and down where a column has several values."""
+    """A step line, as a value stays until the next message; vertical if a column has several values."""
     low, high = reach
-    size = high / 2 - low / 2  # halves: the difference may be more than a float holds
+    size = high / 2 - low / 2  # halves: the difference may overflow a float
 
     def y(value: float) -> float:
         return top + 32 - (_SIGNAL * ((value / 2 - low / 2) / size) if size > 0 else _SIGNAL / 2)

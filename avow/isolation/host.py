@@ -1,8 +1,8 @@
 """Runs a program under test, and nothing else, in a process of its own.
 
-A script without imports from Avow: it is read at every start. Each line of JSON that comes in holds the inputs of some
-cases; a line with an answer for each goes out (`subject.Message`) over a pipe that is not standard output.
-Values of the contract are given to the program as plain Python: an element of an enumeration is a string, a REAL is a
+A script without imports from Avow: it is read at every start. Each incoming line of JSON has the inputs of some cases;
+a line with an answer for each goes out (`subject.Message`) over a pipe that is not standard output. The program gets
+values of the contract as plain Python: an element of an enumeration is a string, a REAL is a
 `Fraction`, ``move(1, 2)`` is ``("move", 1, 2)``, a sequence is a tuple, a function or relation is a `Table`.
 """
 
@@ -67,7 +67,7 @@ class Table:
 
 
 def plain(data: Any) -> Any:
-    """A value as the judge sends it, as the program gets it."""
+    """Converts a value from the judge's form to the program's."""
     match data:
         case {"q": [numerator, denominator]}:
             return Fraction(int(numerator), int(denominator))
@@ -82,7 +82,7 @@ def plain(data: Any) -> Any:
 
 
 def coded(value: Any, depth: int = 0) -> Any:
-    """Whatever the program returned, as JSON; what no contract has is named by its type."""
+    """The program's return value as JSON; a value outside the contract's types is named by its type."""
     if depth > 20:
         return {"?": "something nested too deeply"}
     inner = depth + 1
@@ -127,7 +127,7 @@ def load(path: str, function: str, drive: Any = None) -> Any:
     spec.origin, spec.has_location = path, True
     module = importlib.util.module_from_spec(spec)
     sys.modules["avow_subject"] = module
-    sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its own neighbours, as if it were run
+    sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its neighbours, as if it were run
     spec.loader.exec_module(module)
     if drive is not None:
         driven = json.loads(function)
@@ -136,8 +136,8 @@ def load(path: str, function: str, drive: Any = None) -> Any:
 
 
 def driving(function: str) -> Any:
-    """What drives the class that the JSON in `function` names; nothing of a function. What stands in for ROS is there
-    before the file is loaded."""
+    """The driver of the class that the JSON in `function` names; None for a function. The substitute for ROS is in
+    place before the file is loaded."""
     if not function.startswith("{"):
         return None
     steps = _beside("../drive/steps.py")
@@ -148,7 +148,7 @@ def driving(function: str) -> Any:
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
-    """Never believes a compiled file: it may be of an edit within the same second."""
+    """Never uses a compiled file: it may be older than an edit within the same second."""
 
     def get_code(self, fullname: str) -> Any:
         path = self.get_filename(fullname)
@@ -172,7 +172,7 @@ def _read_sources_only(root: str) -> None:
 
 
 def _found_before() -> list[tuple[str, str]]:
-    """What is imported already, and the folders in which it was looked for before Python's own."""
+    """The modules imported already, and the folders that are searched before Python's own."""
     files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
     ours = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep  # noqa: PTH100, PTH120
     first = itertools.takewhile(lambda folder: folder != os.path.dirname(os.__file__), sys.path)  # noqa: PTH120
@@ -181,13 +181,13 @@ def _found_before() -> list[tuple[str, str]]:
 
 
 def _folders_only() -> list[tuple[str, str]]:
-    """Packages that are no more than folders: a file ``__init__.py`` that appears there would be imported."""
+    """Namespace packages: a file ``__init__.py`` that appears there would be imported."""
     found = (module for module in list(sys.modules.values()) if getattr(module, "__file__", None) is None)
     return [("list", folder) for module in found for folder in getattr(module, "__path__", ())]
 
 
 def _beside(file: str) -> Any:
-    """A module near this one, which is no package's here."""
+    """Loads a module from this folder, outside of any package."""
     place = os.path.join(os.path.dirname(__file__), file)  # noqa: PTH118, PTH120
     name = "avow_" + os.path.basename(file).partition(".")[0]  # noqa: PTH119
     loader = importlib.machinery.SourceFileLoader(name, place)

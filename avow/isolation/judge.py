@@ -1,6 +1,6 @@
-"""A judge in a process of its own, which answers through a descriptor that no subject has.
+"""A judge in a process of its own, which answers through a descriptor that no program under test has.
 
-The answer counts if the judge ended well and wrote one line and nothing else.
+The answer counts if the judge exited with 0 and wrote exactly one line.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Channel:
         self.theirs = self._file.fileno()
 
     def close(self) -> bytes:
-        """What was written, up to a limit, once the writer has ended."""
+        """The written bytes, up to a limit, once the writer has ended."""
         with self._file:
             self._file.seek(0)
             return self._file.read(CHANNEL_KEPT)
@@ -74,14 +74,14 @@ def ask(
 
 @dataclass(frozen=True, slots=True)
 class _Word:
-    """A judge's. `ended`: its subject was, by somebody else."""
+    """A judge's answer. `ended`: its program under test was killed from outside."""
 
     answer: Any
     ended: bool
 
 
 def say(channel: int, answer: object) -> None:
-    """The judge's one word to whoever started it."""
+    """Write the judge's only answer."""
     data = line(_Word(answer, process.ended_by_others()))
     while data:
         data = data[os.write(channel, data) :]

@@ -1,9 +1,10 @@
-"""What a subject was seen to look at: files that it read, files that it looked for in vain, folders that it listed.
+"""What a program under test was observed to use: files that it read, files that it looked for in vain, folders that it
+listed.
 
-Who declares nothing reads all the same. So what was seen becomes part of what an answer depends on: a record is current
-only while every one of these is as it was.
+Programs read files that no plan declares. So the observed inputs are part of what an answer depends on: a record is
+current only while each of them is unchanged.
 
-In a record each is a row: there may be thousands.
+In a record each is a row, as there may be thousands.
 """
 
 from __future__ import annotations
@@ -27,29 +28,29 @@ from avow.base.tuning.sizes import FOLDED
 
 
 class Seen(StrEnum):
-    """What is to be compared later."""
+    """The kind of later comparison."""
 
     READ = "read"
     """A file; the digest is of its bytes."""
     MISSING = "missing"
-    """There was nothing of that name. The digest is empty."""
+    """A missing file. The digest is empty."""
     LISTING = "listing"
     """A folder; the digest is of the names in it."""
     FOLDER = "folder"
-    """All that lies directly in a folder: names, kinds, and the bytes of files. It stands for many rows (`folded`)."""
+    """Everything directly in a folder: names, kinds, and the bytes of files. It replaces many rows (`folded`)."""
     STATE = "state"
-    """Looked at, not opened: besides its kind, its size and its mode."""
+    """Metadata was read: kind, size and mode."""
     KIND = "kind"
-    """Whether it is there, whether it is a file, a folder or a link, and where a link points to."""
+    """Its existence, its kind (file, folder, link), and a link's target."""
     MODULES = "modules"
-    """Where modules are looked for from the start; the digest is of PYTHONPATH and of what adds to it (`_modules`)."""
+    """The initial module path; the digest covers PYTHONPATH and the files that extend it (`_modules`)."""
     OUTSIDE = "outside"
-    """Something whose content cannot be recorded: the network, another program, a device. The digest is empty. An
-    answer that rests on it is re-run in every run, never reused."""
+    """An input whose content cannot be recorded: the network, another program, a device. The digest is empty. An answer
+    that rests on it is re-run in every run, never reused."""
 
 
 class Observed(NamedTuple):
-    """One thing that the answer depends on. `path` is absolute, or relative to the workspace in a record."""
+    """One input of the answer. `path` is absolute, or relative to the workspace in a record."""
 
     kind: Seen
     path: str
@@ -57,18 +58,18 @@ class Observed(NamedTuple):
 
 
 def look(kind: Seen, path: str) -> str:
-    """The digest as of now. A thing that has changed its kind has another digest."""
+    """The current digest. An input that changed its kind has another digest."""
     if kind is Seen.MODULES:
         return _modules()
     try:
-        info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
+        info = os.stat(path)  # noqa: PTH116 - names that are not UTF-8 are kept as bytes
         match kind:
             case Seen.READ:
                 return digest_file(Path(path))
             case Seen.MISSING:
                 return "there"
             case Seen.LISTING:
-                # what Python and we leave behind is nobody's input
+                # files left by Python and Avow are no inputs
                 return sha256(json.dumps(_names(path)))
             case Seen.FOLDER:
                 return sha256(json.dumps([[name, _content(os.path.join(path, name))] for name in _names(path)]))  # noqa: PTH118
@@ -84,7 +85,8 @@ def look(kind: Seen, path: str) -> str:
 
 
 def _modules() -> str:
-    """The folders that a subject's Python starts with, and the files there that add others or run at its start."""
+    """The folders on the initial module path of the program's Python, and the files there that add others or run at its
+    start."""
     found = [absolute_only()]
     for folder in dict.fromkeys(site.getsitepackages()):
         names = _names(folder) if os.path.isdir(folder) else []  # noqa: PTH112
@@ -105,8 +107,8 @@ def _content(path: str) -> str:
 
 
 def marks(observed: Observed) -> tuple[object, ...] | None:
-    """What tells, without reading, that the bytes which a row stands for are as they were a moment ago; None where to
-    look again costs no more."""
+    """An identity that shows, without reading, that the bytes of a row are unchanged; None if reading again is as
+    cheap."""
     try:
         if observed.kind is Seen.READ:
             return identity(os.stat(observed.path), observed.path)  # noqa: PTH116
@@ -122,8 +124,8 @@ def marks(observed: Observed) -> tuple[object, ...] | None:
 
 
 def folded(observed: Iterable[Observed]) -> tuple[Observed, ...]:
-    """Fewer rows that stand for no less: a thing below a folder that is not there is missing with it, and many things
-    in one folder are that folder. Folders of many programs stay apart: what else lies there is nobody's input."""
+    """Fewer rows that cover the same inputs: a path below a missing folder is missing with it, and many files of one
+    folder become that folder. Shared folders of many programs are not folded: their other files are no inputs."""
     rows = {(o.path, o.kind): o for o in map(_missing, observed)}
     beside: dict[str, set[str]] = {}
     for path, kind in rows:
@@ -136,7 +138,7 @@ def folded(observed: Iterable[Observed]) -> tuple[Observed, ...]:
     read = {path for path, kind in rows if kind is Seen.READ}
 
     def stands(path: str, kind: Seen) -> bool:
-        """Whether the row says more than others do."""
+        """Whether no other row covers this one."""
         if kind in _OF_FILES and os.path.dirname(path) in whole:  # noqa: PTH120
             return False
         return kind not in (Seen.LISTING, Seen.KIND, Seen.STATE) or path not in whole | read
@@ -150,7 +152,7 @@ _LIBRARIES = f"/lib/{sysconfig.get_config_var('MULTIARCH')}"
 
 
 def _missing(observed: Observed) -> Observed:
-    """Of what is missing, the first folder on the way there that is."""
+    """For a missing path, its first missing ancestor."""
     path = observed.path
     if observed.kind is not Seen.MISSING:
         return observed
@@ -160,7 +162,7 @@ def _missing(observed: Observed) -> Observed:
 
 
 def _link(path: str) -> str:
-    """Where a link points to; empty: it is none."""
+    """A link's target; empty if it is no link."""
     try:
         return sha256(os.fsencode(os.readlink(path)).hex())  # noqa: PTH115
     except (OSError, ValueError):
@@ -168,11 +170,11 @@ def _link(path: str) -> str:
 
 
 def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
-    """What (event, path) pairs of a subject's process stand for, each once, with digests as of now."""
+    """The inputs for the (event, path) pairs of a program's process, each once, with current digests."""
     found: dict[tuple[str, Seen], Observed] = {}
     for event, path in events:
         kind = _kind(event, path)
-        if kind is not None and os.sep + HOME_PREFIX not in path:  # the empty home that a tool got is no input
+        if kind is not None and os.sep + HOME_PREFIX not in path:  # a tool's empty home folder is no input
             found.setdefault((path, kind), Observed(kind, path, look(kind, path)))
     return tuple(found[key] for key in sorted(found))
 
@@ -203,7 +205,7 @@ def _kind(event: str, path: str) -> Seen | None:
 
 
 _OF_EVERY_PROCESS = re.compile(r"/proc(/(thread-)?self(/(?!(cwd|root)$)\w+|/fd/\d+)?)?")
-"""What is there for every process. Where a link of it leads, and what lies beyond, is each one's own."""
+"""Whether a path is the same for every process. The targets of its links may differ between processes."""
 
 
 _EMPTY = ("/dev/null", "/dev/zero", "/dev/full")
@@ -213,9 +215,9 @@ _INSTALLED = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib"
 
 
 def _of_python(path: str) -> bool:
-    """Of the interpreter that runs us; its version and program stand for all of it."""
+    """Whether a path belongs to the interpreter that runs Avow; its version and program identify all of it."""
     if path.endswith("/__pycache__") or ("/__pycache__/" in path and path.endswith(".pyc")):
-        return True  # of a package: its source is recorded
+        return True  # of a package, whose source is recorded
     installed = (*_INSTALLED, *(f"{folder}/dist-packages" for folder in _PYTHON))
     return _within(path, _PYTHON) and not _within(path, installed)
 
@@ -225,11 +227,11 @@ def _within(path: str, folders: Iterable[str]) -> bool:
 
 
 def as_here(kind: Seen) -> Observed:
-    """Where modules are looked for: what is imported from elsewhere is asked again."""
+    """The folders of modules: imports from elsewhere are re-run."""
     return Observed(kind, "module path", look(kind, "module path"))
 
 
 def interpreter() -> Observed:
-    """The Python that runs a subject."""
+    """The Python that runs a program under test."""
     path = os.path.realpath(sys.executable)
     return Observed(Seen.READ, path, look(Seen.READ, path))

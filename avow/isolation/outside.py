@@ -1,8 +1,8 @@
-"""Outside tools, run so that nothing undeclared enters their answers, or is told.
+"""Runs outside tools so that undeclared inputs are either excluded or recorded.
 
-A tool gets the variables that Avow gives it, an empty home, and the way to the system's programs and its own. What it
-opens, executes and looks for besides is recorded by `strace`. Where that does not run, what the tool reads is not
-known, and its answer is re-run each time.
+A tool gets only the variables that Avow sets, an empty home folder, and a PATH with the system's programs and its own.
+`strace` records what else it opens, executes and looks for. Without strace its reads are unknown, and its answer is
+re-run each time.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _SYSTEM = ("/usr/local/sbin", "/usr/local/bin", "/usr/sbin", "/usr/bin", "/sbin"
 
 @dataclass(frozen=True, slots=True)
 class Outside:
-    """Runs of these tools for one answer; safe to use from several threads. What the tools are made of is in the
-    answer's key, and is not told again."""
+    """Runs of these tools for one answer; safe to use from several threads. The tools' own files are in the answer's
+    key and are not recorded again."""
 
     tools: tuple[Tool, ...]
     _events: dict[tuple[str, str], None] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class Outside:
         megabytes: int | None = None,
         env: Mapping[str, str] | None = None,
     ) -> Completed:
-        """As `process.run`. `cwd` is a folder made for this: nothing that lies in it is told."""
+        """As `process.run`. `cwd` is a folder made for this run: its files are not recorded."""
         program = shutil.which(command[0]) if os.sep not in command[0] else str(cwd / command[0])
         if program is None or not os.access(program, os.X_OK):
             raise ToolMissing(f"{command[0]}: not found, or not to be executed")
@@ -62,7 +62,7 @@ class Outside:
         return Completed(tuple(command), done.code, done.stdout, done.stderr, done.seconds)
 
     def observed(self) -> tuple[Observed, ...]:
-        """What they looked at so far that is in no key."""
+        """The inputs so far that are in no key."""
         places = [place for tool in self.tools for place in tool.places]
         known = {str(file) for place in places for file in program_files(place)}
         within = tuple(f"{folder}{os.sep}" for place in places for folder in program_folders(place))
@@ -81,7 +81,7 @@ class Outside:
 
 
 def _beyond(events: Iterable[tuple[str, str]], own: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Those of what does not lie in the tool's own folders; of a link there, of what it leads to."""
+    """The events outside the tool's own folders; for a link inside, those of its target."""
     for event, path in events:
         if event == "outside":
             yield event, path
@@ -93,6 +93,6 @@ def _beyond(events: Iterable[tuple[str, str]], own: tuple[str, ...]) -> Iterator
 
 
 def _with_its_tracer() -> list[str]:
-    """What has a program end with strace, which stands between us and it."""
+    """Arguments that make the program end with strace, its parent process."""
     program = shutil.which("setpriv")
     return [program, "--pdeathsig", "KILL", "--"] if program is not None else []

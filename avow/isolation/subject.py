@@ -1,5 +1,5 @@
-"""A program under test in a process of its own, from the judge's side: questions and answers as lines of JSON over
-pipes, with bounded patience. Its standard output is not read."""
+"""A program under test in a process of its own, from the judge's side: requests and answers are lines of JSON over
+pipes, with time limits. Its standard output is not read."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from avow.isolation.observed import Observed, Seen, as_here, interpreter, record
 
 
 class SubjectFailed(Exception):  # noqa: N818 - it names what happened
-    """The program raised, ended, hung, or returned what is no value of the output's type."""
+    """The program raised, ended, hung, or returned no value of the output's type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,23 +34,23 @@ class Message:
     """A line from the program's process (`host`, or a compiled program), which writes it without the codec."""
 
     seen: tuple[tuple[str, str], ...] = field(default=(), metadata=LATER)
-    """(event, path) of what it has looked at since the message before."""
+    """(event, path) pairs observed since the previous message."""
     ready: bool = field(default=False, metadata=LATER)
     error: str = field(default="", metadata=LATER)
     """Why it is not ready."""
     replies: tuple[Any, ...] | None = field(default=None, metadata=LATER)
-    """One a case: ``{"value": …}`` or ``{"error": "…"}``."""
+    """One for each case: ``{"value": …}`` or ``{"error": "…"}``."""
     turn: str = field(default="", metadata=LATER)
-    """Of a compiled program: the question that it answers."""
+    """For a compiled program: the request that it answers."""
     end: bool = field(default=False, metadata=LATER)
-    """Of a compiled program: it ends as it was asked to."""
+    """For a compiled program: it ends as requested."""
 
 
 class SubjectProcess:
-    """The process that holds a function of a Python file. Started at the first question.
+    """The process with a function of a Python file. Started at the first request.
 
     `root` is the system's folder. `fault` is set once no answer counts any more: the program left processes behind.
-    Raises `level.Unavailable` where it must be sealed and cannot be.
+    Raises `level.Unavailable` if it must be sealed and cannot be.
     """
 
     def __init__(self, path: Path, function: str, patience: float, root: Path | None = None) -> None:
@@ -59,9 +59,9 @@ class SubjectProcess:
         self.isolation: Isolation = available()
         self.fault = ""
         self.silent = ""
-        """Why there is no answer that says nothing of the program: time on the wall, or a kill from outside."""
+        """A reason for a missing answer that is no fault of the program: wall-clock time, or a kill from outside."""
         self.code: int | None = None
-        """How its process ended, where it ended by itself."""
+        """How its process ended, if it ended by itself."""
         self.process: subprocess.Popen[bytes] | None = None
         self._events: dict[tuple[str, str], None] = {}
         self._to = self._from = -1
@@ -69,15 +69,15 @@ class SubjectProcess:
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
 
     def ask(self, inputs: Mapping[str, Any]) -> Any:
-        """What the program returned, as the host's data. Raises SubjectFailed."""
+        """The program's return value, as the host's data. Raises SubjectFailed."""
         reply = self.ask_all([inputs])[0]
         if isinstance(reply, SubjectFailed):
             raise reply
         return reply
 
     def ask_all(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
-        """For each case what the program returned, or the SubjectFailed that it ended in; where the process itself
-        fails, nothing for the cases after. Many at a time cost less: each question wakes another process."""
+        """For each case the program's return value or its SubjectFailed; if the process itself fails, later cases have
+        no answer. Many cases in one request cost less: each request wakes another process."""
         try:
             replies = self._exchange(cases)
         except SubjectFailed as failure:
@@ -87,18 +87,19 @@ class SubjectProcess:
         return [self._reply(reply) for reply in replies]
 
     def observed(self) -> tuple[Observed, ...]:
-        """What it has looked at so far, the interpreter first."""
+        """Its inputs so far, the interpreter first."""
         return (interpreter(), as_here(Seen.MODULES), *recorded(self._events))
 
     def close(self) -> str:
-        """End it, with all that it started. Why no answer counts, or why its end says nothing of it (`silent`)."""
+        """End it with all that it started. Returns why no answer counts, or why its end is no fault of the program
+        (`silent`)."""
         self._stop()
         return self.fault or self.silent
 
     # -- inside ------------------------------------------------------------------------------------------
 
     def _one_by_one(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
-        """The answers up to the first case that has none: which of many it was that ended the process."""
+        """The answers up to the first case without one, which is the case that ended the process."""
         replies: list[Any] = []
         for inputs in cases:
             replies.append(self.ask_all([inputs])[0])
@@ -142,21 +143,21 @@ class SubjectProcess:
         return json.dumps(list(cases)).encode() + b"\n"
 
     def _in_turn(self, message: Message) -> bool:
-        """Whether a message is the answer to what was asked last."""
+        """Whether a message answers the last request."""
         return True
 
     def _command(self, there: int, back: int) -> list[str]:
-        """What is run. It reads from descriptor `there` and writes to `back`."""
+        """The command. It reads from descriptor `there` and writes to `back`."""
         host = Path(__file__).with_name("host.py").resolve()
         command = [sys.executable, "-P", "-B", str(host), str(self.path), self.function, str(self.root)]
         return [*command, str(there), str(back)]
 
     def _around(self, command: list[str]) -> list[str]:
-        """The command that is started in its place."""
+        """The command that is started instead."""
         return command
 
     def _end(self, why: str) -> SubjectFailed:
-        """Stop it, and say why: the fault that was found, or else `why`."""
+        """Stop it; returns the fault that was found, or else `why`."""
         self._stop()
         if process.ended_by_others():
             self.silent = "the subject's process was killed from outside"
@@ -219,7 +220,7 @@ class SubjectProcess:
             raise self._end(f"the subject cannot be loaded: {ready.error or 'no reason given'}")
 
     def _message(self) -> Message:
-        """What its process says next. Raises SubjectFailed."""
+        """The next message of its process. Raises SubjectFailed."""
         try:
             message = from_text(Message, self._line())
         except Unreadable:
@@ -235,7 +236,7 @@ class SubjectProcess:
             if not part:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     assert self.process is not None
-                    self.process.wait(self.patience)  # what it ended with says by whom
+                    self.process.wait(self.patience)  # its exit code shows who ended it
                 raise self._end("the subject's process has ended")
             self._buffer += part
             if len(self._buffer) > 16_000_000:

@@ -1,5 +1,5 @@
-"""What a foreign tool, or a compiled program under test, opens, executes and looks for: a trace of its system calls by
-strace. Without strace nobody knows, and what it answers is re-run each time."""
+"""Records what a foreign tool, or a compiled program under test, opens, executes and looks for, by a trace of its
+system calls (strace). Without strace this is unknown, and its answers are re-run each time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pathlib import Path
 from avow.isolation.watching import way
 
 _STEPS = frozenset({"clone", "clone3", "fork", "vfork", "fchdir"})
-"""Calls that say in which folder a process is."""
+"""Calls that set a process' working folder."""
 _OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
 _LOOKS = frozenset(
     {"stat", "lstat", "newfstatat", "statx", "access", "faccessat", "faccessat2", "readlink", "readlinkat"}
@@ -29,16 +29,16 @@ _CHANGES = frozenset(
 )
 _LINKS = frozenset({"symlink", "symlinkat"})
 _BOTH = _LINKS | {"rename", "renameat", "renameat2", "link", "linkat"}
-"""Calls that name two paths, and change both: what is linked to can be written by its new name."""
+"""Calls that name and change two paths: a linked file can be written by its new name."""
 _WRITES = re.compile(rb"\bO_(?:WRONLY|RDWR|CREAT|TRUNC|APPEND)\b")
 
 INSTALL = "sudo apt install strace"
-"""The one command that brings it."""
+"""The command that installs it."""
 
 
 @functools.cache
 def traces() -> bool:
-    """Whether strace works here: found out by running it, as a container may forbid it."""
+    """Whether strace works here: tested by running it, as a container may forbid it."""
     if sys.platform != "linux" or shutil.which("strace") is None:
         return False
     try:
@@ -50,7 +50,7 @@ def traces() -> bool:
 
 
 def remedy() -> str:
-    """What a person can do where nothing was traced."""
+    """The remedy if nothing was traced."""
     if traces():
         return "its trace has no end: run it again"
     if sys.platform != "linux":
@@ -67,8 +67,8 @@ def _strace(place: str) -> list[str]:
 
 
 class Trace:
-    """The trace of one process and all that it starts. It lies in memory: on a disk that is full for a while it would
-    have gaps, and nobody could tell."""
+    """The trace of one process and all that it starts. It is kept in memory: on a temporarily full disk it would have
+    undetectable gaps."""
 
     def __init__(self) -> None:
         handle = os.memfd_create("avow-trace")
@@ -79,8 +79,9 @@ class Trace:
         return [*_strace(self._place), *command]
 
     def read_all(self, program: str, folder: Path) -> tuple[tuple[str, str], ...] | None:
-        """(event, path) pairs of what was asked for from the start of the program, which began in `folder`, but for
-        what it made itself and what the machine is (``/proc``, devices). None where the trace has no end. Read once."""
+        """(event, path) pairs of the accesses since the start of the program, whose working folder was `folder`,
+        without files that it made itself and the machine's own (``/proc``, devices). None if the trace is incomplete.
+        Read once."""
         with self._file as file:
             lines = list(_whole(file.read().split(b"\n")))
         begins = (k for k, (_, line) in enumerate(lines) if line.startswith(b"execve(") and _names(line, program))
@@ -91,8 +92,8 @@ class Trace:
 
 
 class _Places:
-    """The folder that each process is in. A started one begins in that of who started it; whatever a line says of it
-    (``AT_FDCWD</folder>``) is so."""
+    """Each process' working folder. A child starts in its parent's; a folder that a line shows (``AT_FDCWD</folder>``)
+    is taken as the current one."""
 
     def __init__(self, lines: Iterable[tuple[int, bytes]], first: int, folder: str) -> None:
         self._now: dict[int, str] = {first: folder}
@@ -108,7 +109,7 @@ class _Places:
                 self._parents.setdefault(int(child[1]), process)
 
     def of(self, process: int) -> str | None:
-        """None: nothing tells. Sandboxes count processes otherwise than who watches them."""
+        """None: unknown. Process ids in a sandbox differ from those outside."""
         if process not in self._now:
             parent = self._parents.pop(process, None)
             place = self._begins.get(process) or (self.of(parent) if parent is not None else None)
@@ -118,7 +119,7 @@ class _Places:
         return self._now[process]
 
     def see(self, process: int, line: bytes) -> None:
-        """The next line: where its process is from now on."""
+        """Update the process' working folder from the next line."""
         if child := _STARTED.match(line):
             self.of(int(child[1]))
         elif said := _FROM.match(line):
@@ -163,7 +164,7 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
         if call in _BOTH:
             old, new = _both(call, line, at or "")
             if well and call not in _LINKS and not own(old):
-                events["read", old] = None  # by its new name it is as little made here
+                events["read", old] = None  # under its new name it is not made here either
             elif well:
                 made.add(new)
         elif call in _CHANGES or call == "creat" or (call in _OPENS and _WRITES.search(rest)):
@@ -175,9 +176,9 @@ def _looked_at(lines: Sequence[tuple[int, bytes]], folder: str) -> tuple[tuple[s
         elif f"{path}/".startswith(_OF_THE_MACHINE):
             pass
         elif path.startswith(tempfile.gettempdir()) and re.search(_JAVA % process, path):
-            pass  # a Java asks whether somebody wants to speak to it
+            pass  # Java checks for an attaching debugger
         elif call in _OPENS | _LOOKS:
-            # what was made here may be a link; that may be gone when we look
+            # a file made here may be a link that is gone by now
             name = (_opened(rest) if call in _OPENS else None) or os.path.realpath(path) if own(path) else path
             if not own(name):
                 kind = "link" if call.startswith("readlink") else "state" if call in _LOOKS else "read"
@@ -191,7 +192,7 @@ _OPENED = re.compile(rb"\) = \d+<(/(?:[^>\\]|\\.)*)>$")
 
 
 def _opened(rest: bytes) -> str | None:
-    """What a call that opens says that it opened, behind all links."""
+    """The path that an opening call reports, with all links resolved."""
     found = _OPENED.search(rest.rstrip())
     return _text(found[1]) if found is not None else None
 
@@ -206,8 +207,8 @@ _OF_THE_MACHINE = ("/proc/", "/sys/", "/dev/", "/etc/ld.so.cache/", "/etc/ld.so.
 
 
 def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
-    """(process, call), calls that were interrupted by others' joined again, in the order in which they ended; nothing
-    where a process ended."""
+    """(process, call) pairs, with interrupted calls joined, in the order in which they ended; an empty call at a
+    process' end."""
     open_: dict[int, bytes] = {}
     for line in lines:
         number, _, rest = line.partition(b" ")
@@ -242,7 +243,7 @@ def _both(call: str, line: bytes, folder: str) -> list[str]:
 
 
 def _interpreters(events: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """The programs that the kernel starts for scripts: no call tells of them."""
+    """The interpreters that the kernel starts for scripts: no call shows them."""
     for event, path in events:
         if event == "read" and os.access(path, os.X_OK) and Path(path).is_file():
             with open(path, "rb") as file:  # noqa: PTH123
@@ -252,6 +253,6 @@ def _interpreters(events: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]
 
 
 def _text(quoted: bytes) -> str:
-    """A string as strace writes it, as Python writes it."""
+    """Decodes a string in strace's notation."""
     raw, _ = codecs.escape_decode(quoted)
     return os.fsdecode(raw)

@@ -22,22 +22,22 @@ _OUTSIDE = {
         *("os.truncate", "os.setxattr", "os.removexattr", "os.symlink"),
     ),
 }
-"""What cannot be recorded as the content of a file → the audit events that report it."""
+"""Inputs that cannot be recorded as a file's content → the audit events that report them."""
 _EVENTS = {event: what for what, events in _OUTSIDE.items() for event in events}
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 def way(path: str) -> str:
-    """An absolute path in its usual form. One that goes back from a link by ``..`` stays as it is: what a folder lies
-    in is not where a link to it lies."""
+    """An absolute path in its usual form. One that goes back from a link by ``..`` is kept: a link's parent is not the
+    parent of its target."""
     usual = os.path.normpath(path)
     return path if "/../" in f"{path}/" and os.path.realpath(usual) != os.path.realpath(path) else usual
 
 
 def watch(scratch: str) -> Callable[[], list[tuple[str, str]]]:
-    """From now on, note what is looked at. The answer gives the (event, path) pairs that are new since it was called
-    last: ``read`` or ``list`` with an absolute path, or ``outside`` with words for what cannot be recorded. What lies
-    in the folder `scratch` is the program's own."""
+    """Record accesses from now on. The returned function gives the (event, path) pairs since its last call: ``read`` or
+    ``list`` with an absolute path, or ``outside`` with words for an input that cannot be recorded. Files in the folder
+    `scratch` are the program's own."""
     new: list[tuple[str, str]] = []
     known: set[tuple[str, str]] = set()
 

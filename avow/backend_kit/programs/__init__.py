@@ -1,5 +1,5 @@
-"""A node's own program, asked and judged step by step: what every method needs that looks at the program itself.
+"""Runs a node's own program and judges it step by step, for every method that tests the program itself.
 
-`cpython` asks a Python class in isolation; `samples` draws inputs at which something may change; `judging` says
-exactly, in the contract's words, what came of a step.
+`cpython` runs a Python class in isolation; `samples` draws inputs at which something may change; `judging` evaluates a
+step exactly against the contract.
 """

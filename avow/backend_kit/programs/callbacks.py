@@ -32,7 +32,7 @@ from avow.system.topics import whole_name
 
 SECOND = 10**9
 STEP = SECOND // 10
-"""Between most messages that are generated."""
+"""The time between most generated messages."""
 
 LARGEST = {"float32": float.fromhex("0x1.fffffep+127"), "float64": sys.float_info.max}
 
@@ -49,12 +49,12 @@ class Event:
     at: int
     data: Any
     after: int = 0
-    """Of a publication: how many messages had been delivered before."""
+    """For a publication: how many messages had been delivered before it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What came of a run. `wrong`: what the class raised, and at which message (from 1; 0: before any)."""
+    """The result of a run. `wrong`: the exception of the class, and at which message (from 1; 0: before any)."""
 
     said: tuple[Event, ...]
     heard: Mapping[str, str]
@@ -63,14 +63,14 @@ class Run:
     after: int = 0
 
     def beside(self, heard: Sequence[Event]) -> Iterator[Event]:
-        """What was heard and what was said, in the order in which it came about."""
+        """Messages received and published, in order of occurrence."""
         for number in range(len(heard) + 1):
             yield from heard[number - 1 : number] if number else ()
             yield from (event for event in self.said if event.after == number)
 
 
 Given = tuple[tuple[Event, ...], int, int]
-"""What a run is of: messages, from when and until when, in nanoseconds."""
+"""The input of a run: messages, begin and end, in nanoseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,21 +83,21 @@ class Driver:
     subject: Subject
     known: Definitions
     topics: Run
-    """What it hears and says before any message has come."""
+    """Its subscriptions and publications before the first message."""
 
     @property
     def carried(self) -> frozenset[str]:
-        """The topics that it hears or says."""
+        """The topics that it subscribes to or publishes."""
         return frozenset((*self.topics.heard, *self.topics.spoken))
 
     @property
     def inputs(self) -> frozenset[str]:
-        """The topics on which others speak to it: what it says itself it hears by itself."""
+        """The topics on which other nodes publish to it: it receives its own publications without help."""
         return frozenset(self.topics.heard) - frozenset(self.topics.spoken)
 
     def run(self, events: Iterable[Event], start: int, end: int) -> Run:
-        """Twice, in processes of their own. Raises Rejected where ROS' own is asked for that is not driven, where the
-        two differ, or where what came of it hangs on what no recording has."""
+        """Runs the class twice, in separate processes. Raises Rejected if the class uses a part of ROS that is not
+        supported, if the two runs differ, or if the result depends on inputs that no recording has."""
         given = [(tuple(events), start, end)]
         first, second = (_runs(self.source, self.subject, given)[0] for _ in range(2))
         if first != second:
@@ -105,11 +105,11 @@ class Driver:
         return first[0]
 
     def runs(self, given: Sequence[Given]) -> tuple[tuple[Run, ...], Told]:
-        """Of a new object each, in one process; how it was run. Raises Rejected likewise."""
+        """Runs with a new object each, in one process; also returns its isolation. Raises Rejected likewise."""
         return _runs(self.source, self.subject, given)
 
     def fits(self) -> Iterator[Diagnostic]:
-        """Topics of the contract that the class does not hear or say, or with other messages."""
+        """Topics of the contract that the class does not use, or uses with other message types."""
         for topic in self.node.topics:
             if topic.port is None:
                 continue
@@ -126,8 +126,7 @@ class Driver:
                 yield Diagnostic("DRIVE102", text, topic.span)
 
     def coded(self, topic: str, event: Mapping[str, Any], where: str) -> Any:
-        """A recorded event's message as data; a field that is left out holds what a new message has. Raises
-        Rejected."""
+        """A recorded event's message as data; a missing field has the default of a new message. Raises Rejected."""
         kind = self.topics.heard.get(topic) or self.topics.spoken[topic]
         try:
             return code(Nested(kind), fields_of(event), self.known)
@@ -141,8 +140,8 @@ class Driver:
         return found
 
     def said_as(self, topic: str, data: Any, event: Mapping[str, Any]) -> bool:
-        """Whether a publication is what was recorded, in the fields that the recording has; one that has
-        none says nothing."""
+        """Whether a publication equals the recorded one in the recorded fields; a recording without fields matches
+        any."""
         fields = fields_of(event)
         if not fields and data["d"]:
             return False
@@ -151,7 +150,8 @@ class Driver:
         return json.dumps(said) == json.dumps(_plain_fields(recorded, fields))
 
     def generated(self, messages: int, seed: int | str) -> Iterator[Event]:
-        """So many messages on what it hears, from the numbers and words of contract, program and parameters."""
+        """So many messages on its subscriptions, made from the numbers and words of contract, program and
+        parameters."""
         chance = random.Random(seed)
         topics = sorted(self.inputs)
         clauses = (*self.node.assumptions, *self.node.guarantees)
@@ -169,7 +169,7 @@ class Driver:
             yield Event(topic, at, made)
 
     def words(self) -> list[str]:
-        """What a text of the contract's types may be."""
+        """The possible texts of the contract's types."""
         return sorted({word for port in (*self.node.inputs, *self.node.outputs) for word in _words(port.sort)})
 
     @property
@@ -178,7 +178,7 @@ class Driver:
 
     @property
     def text(self) -> str:
-        """The program's own, of which only constants are looked at."""
+        """The program's code, for its constants only."""
         return read_text(self.subject.file, "utf-8", errors="replace")
 
 
@@ -229,7 +229,7 @@ def driver(system: System, name: str) -> Driver:
 def _runs(
     source: Source, subject: Subject, given: Sequence[Given], *, quiet: bool = False
 ) -> tuple[tuple[Run, ...], Told]:
-    """Runs in a process of their own. `quiet`: only what it hears and says."""
+    """Runs in a separate process. `quiet`: only subscriptions and publications."""
     asked = [
         json.dumps({"start": start, "end": end, "events": [[e.topic, e.at, e.data] for e in events]})
         for events, start, end in given
@@ -258,7 +258,7 @@ def _made(reply: Mapping[str, Any]) -> Run:
 
 
 class Silent(Rejected):
-    """There is no answer for a reason that says nothing of the class: the machine was slow, or ended it."""
+    """There is no answer for a reason that is no fault of the class: a slow machine, or a kill from outside."""
 
 
 def _refused(source: Source, text: str) -> Rejected:
@@ -278,7 +278,8 @@ def unusable(text: str) -> Rejected:
 
 
 def _messages(node: Node, file: Path, known: Definitions, kind: Driving) -> dict[str, Any]:
-    """The types of the contract's topics, and of the packages that the source's folder names, with what they hold."""
+    """The message types of the contract's topics and of the packages that the source's folder names, with their
+    fields."""
     text = "".join(read_text(path, "utf-8", errors="replace") for path in sorted(file.parent.glob("*.py")))
     wanted = [canonical(topic.ros_type) for topic in node.topics]
     wanted += [name for name in known.messages if name.partition("/")[0] in text]
@@ -315,7 +316,7 @@ def _wire(wire: Wire) -> Any:
 
 
 def code(wire: Wire, value: Any, known: Definitions) -> Any:
-    """A value of JSON as the wire carries it. Raises ValueError, TypeError, KeyError, OverflowError."""
+    """A JSON value in the wire's form. Raises ValueError, TypeError, KeyError, OverflowError."""
     match wire:
         case Nested(name=name):
             message = known.get(name)
@@ -354,7 +355,7 @@ def code(wire: Wire, value: Any, known: Definitions) -> Any:
                 raise ValueError(f"{value!r} is no {name}")
             return {"i": str(value)}
         case Scalar(name=name):
-            # a decimal of a trace is kept as its digits, in bytes
+            # a decimal in a trace is kept as its digits, in bytes
             if isinstance(value, bool) or not isinstance(value, int | float | bytes):
                 raise ValueError(f"{value!r} is no {name}")
             return {"f": _as_float(float(value), name).hex()}
@@ -365,7 +366,7 @@ def _as_float(number: float, name: str) -> float:
 
 
 def fresh(wire: Wire, known: Definitions) -> Any:
-    """What a field of a new message holds."""
+    """The default of a field in a new message."""
     match wire:
         case Nested():
             return code(wire, {}, known)
@@ -380,7 +381,7 @@ def fresh(wire: Wire, known: Definitions) -> Any:
 
 
 def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
-    """The value of JSON that a recording has."""
+    """The JSON value in a recording."""
     match wire:
         case Nested(name=name):
             message = known.get(name)
@@ -399,7 +400,7 @@ def shown(wire: Wire, data: Any, known: Definitions, kind: Driving) -> Any:
 
 
 def _plain_fields(data: Any, like: Any) -> Any:
-    """Of a message's data only the fields that a recorded event has."""
+    """A message's data, restricted to the fields of a recorded event."""
     if isinstance(like, dict) and isinstance(data, dict) and "d" in data:
         return [[name, _plain_fields(value, like[name])] for name, value in data["d"] if name in like]
     if isinstance(like, list) and isinstance(data, dict) and "l" in data and len(like) == len(data["l"]):
@@ -413,25 +414,25 @@ def _words(sort: Any) -> tuple[str, ...]:
             return members
         case DataSort(constructors=constructors):
             return tuple(constructor.name for constructor in constructors)
-        case _:  # numbers are drawn apart, and no other sort has words
+        case _:  # numbers are drawn separately, and no other sort has words
             return ()
 
 
 def _with_floats(made: Any, before: Any) -> Any:
-    """A message with the floats of an earlier one of its type: a robot comes where it was told to go."""
+    """A message with the floats of an earlier one of its type: a robot arrives where it was sent."""
     match made, before:
         case {"d": fields}, {"d": others}:
             pairs = zip(fields, others, strict=True)
             return {"d": [[name, _with_floats(mine, old)] for (name, mine), (_, old) in pairs]}
         case {"f": _}, {"f": _}:
             return before
-        case _:  # what is no float
+        case _:  # not a float
             return made
 
 
 @dataclass(slots=True)
 class _Drawing:
-    """Draws messages, at times that lie as far apart as the numbers say, in seconds."""
+    """Draws messages, at intervals taken from the numbers, in seconds."""
 
     numbers: Pool
     words: list[str]
@@ -448,7 +449,7 @@ class _Drawing:
         return max(0, round(self.chance.choice(near) * SECOND) + self.chance.choice((-1, 0, 0, 1)))
 
     def message(self, wire: Wire, at: int) -> Any:
-        """A message whose header has the time at which it comes."""
+        """A message whose header has its time of arrival."""
         match wire:
             case Nested(name=name):
                 message = self.known.get(name)
@@ -474,7 +475,7 @@ class _Drawing:
                 return {"f": (_as_float(drawn, name) if abs(drawn) <= LARGEST[name] else 0.0).hex()}
 
     def number(self) -> float:
-        """One of the numbers, or a little beside one, or as far from the last as they say."""
+        """One of the numbers, or one slightly different, or one at such a distance from the last."""
         turn = self.chance.random()
         found = self.chance.choice(self.numbers.floats)
         if turn < 0.3:

@@ -1,6 +1,6 @@
-"""CPython's word: the declared class, run in isolation by a process that nothing of it can reach.
+"""Runs the declared class in isolation, by a process that the class cannot access.
 
-As a script (``python cpython.py CHANNEL FILE``) it asks a class the cases in a file, and says what came back.
+As a script (``python cpython.py CHANNEL FILE``) it runs a class on the cases in a file and reports the replies.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Subject:
     params: Mapping[str, Any]
     memory: Mapping[str, str]
     attributes: tuple[str, ...]
-    """Whose values after `__init__` are wanted."""
+    """The attributes whose values after `__init__` are requested."""
     ros: Mapping[str, Any] | None = None
-    """Of a callback class: what stands in for ROS (`avow.drive.callbacks`)."""
+    """For a callback class: the substitute for ROS (`avow.drive.callbacks`)."""
 
     @property
     def spec(self) -> str:
@@ -50,7 +50,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What the process is asked, in a file."""
+    """The request to the process, in a file."""
 
     root: str
     file: str
@@ -62,20 +62,20 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What came back: a reply a case (None: none), or `fault`, for which nothing of it counts."""
+    """The replies, one for each case (None: no reply), or a `fault`, in which case no reply counts."""
 
     replies: tuple[Any, ...]
     fault: str
     observed: tuple[Observed, ...]
     isolation: Isolation
     deed: bool = False
-    """The fault is something that no subject may do."""
+    """The program did something that invalidates its answers."""
     silent: bool = False
-    """The fault is the machine's: time on the wall, or a kill from outside. It says nothing of the class."""
+    """The fault is the machine's: wall-clock time, or a kill from outside. It is no fault of the class."""
 
 
 def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
-    """One step from that memory."""
+    """One step from that state."""
     return json.dumps(
         {
             "memory": {name: coded(value) for name, value in memory.items()},

@@ -1,4 +1,4 @@
-"""The contract's word on what CPython answered: exact, whatever the program computes with."""
+"""Judges the answers of a program by the contract, in exact arithmetic."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from avow.language.terms import Term
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A clause, ready to be judged often."""
+    """A clause, compiled for repeated evaluation."""
 
     name: str
     term: Term
@@ -50,8 +50,8 @@ class Formula:
         return judge(self.term, values, effort=JUDGE_EFFORT)
 
     def compared(self, values: Mapping[str, Value], name: str, special: float) -> bool | None:
-        """As `holds`, where a value (of a sequence the first item) is NaN or an infinity: compared as IEEE 754 does.
-        None where that cannot be told."""
+        """As `holds`, if a value (or the first item of a sequence) is NaN or an infinity: compared as in IEEE 754. None
+        if that cannot be decided."""
         held = values[name]
         put: Any = SequenceValue((special, *held.items[1:])) if isinstance(held, SequenceValue) else special  # type: ignore[arg-type]
         try:
@@ -61,7 +61,7 @@ class Formula:
 
 
 def triggers(clause: Clause) -> tuple[Formula, ...]:
-    """The conditions under which a clause demands something: one that no case met was not tried."""
+    """The conditions under which a clause demands something: a clause whose condition no case met was not tested."""
 
     def ready(condition: Condition) -> Formula:
         return Formula.made(show_term(condition.formula, "unicode").replace("\n", " "), condition.formula)
@@ -70,11 +70,11 @@ def triggers(clause: Clause) -> tuple[Formula, ...]:
 
 
 class NoValue(ValueError):  # noqa: N818 - it says what it is
-    """What came back is no value of the port's type."""
+    """The answer is no value of the port's type."""
 
 
 def exact(value: Any) -> Value:
-    """An input as the contract has it."""
+    """An input in the contract's form."""
     match value:
         case bool():
             return value
@@ -89,7 +89,7 @@ def exact(value: Any) -> Value:
 
 
 def returned(name: str, value: Any, sort: Sort) -> Value:
-    """An output as the contract has it. Raises NoValue."""
+    """An output in the contract's form. Raises NoValue."""
     match sort, value:
         case BoolSort(), bool():
             return value
@@ -107,7 +107,7 @@ def returned(name: str, value: Any, sort: Sort) -> Value:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """One case and what came of it: values by qualified name, or in `wrong` why there are none."""
+    """One case and its result: values by qualified name, or in `wrong` why there are none."""
 
     values: Mapping[str, Value]
     wrong: str = ""
@@ -117,12 +117,12 @@ class Seen:
 
 
 def to_return(outputs: Iterable[str]) -> str:
-    """What a step has to return, in words; `outputs`: those that are not held in memory."""
+    """What a step has to return, in words; `outputs`: those that are not kept in state."""
     return ", ".join(sorted(outputs)) or "{}, since all outputs are held in memory"
 
 
 def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: Any) -> Seen:
-    """The reply to a case of one step, in the contract's words."""
+    """The reply to a case of one step, in the contract's form."""
     values: dict[str, Value] = {f"in.{name}": exact(value) for name, value in case.items()}
     (answer,) = reply["steps"]
     if "error" in answer:
@@ -145,8 +145,8 @@ def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: 
 
 
 def started(node: Node, assumed: Iterable[Formula], memory: Mapping[str, Any], maker: str) -> Counterexample | None:
-    """What is wrong with what a program makes of memory (by the ports' names): it is none, or not what is assumed of
-    memory alone. `maker`: what made it."""
+    """What is wrong with a program's state (by the ports' names): a malformed value, or one that breaks an assumption
+    about state alone. `maker`: the code that made it."""
     try:
         values = {f"in.{name}": returned(name, value, node.input(name).sort) for name, value in memory.items()}
     except NoValue as wrong:

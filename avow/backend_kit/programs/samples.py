@@ -1,5 +1,5 @@
-"""Inputs on which a class is run beside its translation: at and beside every number that contract, program and
-parameters write down, one double to either side, as far apart as these say, and at the ends of what a double holds."""
+"""Inputs for comparing a class with its translation: at every number in contract, program and parameters, one double to
+either side of it, at such distances from each other, and at the ends of a double's range."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from avow.language.terms import Term
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """What is drawn from."""
+    """The values that cases are drawn from."""
 
     floats: tuple[float, ...]
     steps: tuple[float, ...]
@@ -33,7 +33,7 @@ class Pool:
 
 
 def numbers_of(formulas: Iterable[Term]) -> frozenset[Fraction]:
-    """The numbers that formulas write down."""
+    """The numbers in formulas."""
     found = set[Fraction]()
     for formula in formulas:
         for part in subterms(formula):
@@ -56,7 +56,7 @@ def leaves(data: Any) -> list[Fraction]:
 
 
 def written(text: str) -> list[Fraction]:
-    """The numbers that a Python program writes down, calculated ones among them."""
+    """The numbers in a Python program, including computed constants."""
     tree = ast.parse(text)
     values = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
     values += worked_out(compile(tree, "", "exec", dont_inherit=True))
@@ -125,7 +125,7 @@ class Drawing:
         wild = self.chance.random() < 0.08
         base = self.chance.choice(self.pool.floats)
         turn = self.chance.random()
-        if related and turn < 0.3:  # a number with all its digits: differences of such are rounded
+        if related and turn < 0.3:  # a number with all its digits, so that differences are rounded
             base *= self.chance.random()
         elif related and turn < 0.6:
             base = abs(self.chance.choice((1.0, 2.0, 3.0, 7.0, 10.0, 1e3, 1e6)) + self.chance.choice((0.0, base)))
@@ -172,7 +172,7 @@ class Drawing:
 
 
 def beside(case: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Cases whose numbers are the doubles around those of an exact case: a solver's numbers need not be doubles."""
+    """Cases whose numbers are the doubles around those of an exact case, as a solver's numbers need not be doubles."""
 
     def ends(value: Any) -> list[Any]:
         if isinstance(value, Fraction):
@@ -189,8 +189,8 @@ def beside(case: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def shifted(case: Mapping[str, Any], chance: random.Random) -> Iterator[dict[str, Any]]:
-    """Cases whose numbers lie as far apart as those of an exact case, elsewhere: what a solver says of rounding holds
-    of some doubles with such differences, seldom of the nearest."""
+    """Cases at other positions with the same distances as an exact case: a solver's statement about rounding holds for
+    some doubles with such differences, rarely for the nearest."""
     numbers = {name: value for name, value in case.items() if isinstance(value, Fraction)}
     if not numbers or any(abs(value) > 10**12 for value in numbers.values()):
         return
@@ -202,7 +202,7 @@ def shifted(case: Mapping[str, Any], chance: random.Random) -> Iterator[dict[str
 
 
 def around(constant: Fraction) -> tuple[float, float]:
-    """The largest double that is not above, the smallest that is not below; both the same where it is one."""
+    """The largest double that is not above and the smallest that is not below; equal if the number is a double."""
     try:
         near = float(constant)
     except OverflowError:
