@@ -64,9 +64,9 @@ class Carried:
     ros2: bool = False
 
 
-def enveloped(message: Mapping[str, Any], topic: str, time: float, by: str = "") -> Event:
-    """A message as an event: its fields, its topic, when it came, and, if it is known, who published it. Fields that
-    bear those two names are not lost."""
+def enveloped(message: Mapping[str, Any], topic: str, time: float | bytes, by: str = "") -> Event:
+    """A message as an event: its fields, its topic, when it came (seconds, or their digits), and, if it is known, who
+    published it. Fields that bear those two names are not lost."""
     event = {**message, "topic": topic, "time": time}
     if "topic" in message or "time" in message:
         event[WHOLE] = message
@@ -164,7 +164,7 @@ def messages(
             event = plain(reader.deserialize(raw, kind)) if heard else {}
             if topic in parted:
                 topic, event = calls.part(topic, event)
-            yield enveloped(event, topic, time / 1e9, by), len(raw)
+            yield enveloped(event, topic, b"%d.%09d" % divmod(time, 10**9), by), len(raw)
 
 
 @contextmanager

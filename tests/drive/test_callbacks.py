@@ -283,13 +283,16 @@ def test_a_bag_is_a_recording_too(tmp_path: Path, form: str) -> None:
     from rosmonitoring.test_bags import write_bag
 
     readings = [{"data": 10.0}, {"data": 250.0}, {"data": float("nan")}]
-    bag = write_bag(tmp_path / "b", form, "std_msgs/msg/Float64", readings)
+    start = 1_732_448_384_123_456_789
+    bag = write_bag(tmp_path / "b", form, "std_msgs/msg/Float64", readings, start=start)
     text = ROS1.replace('"r"', '"v"').replace("# HERE", "assert message.data != 10.0 or type(message.data) is float")
     folder = system(tmp_path / "w", "rospy", text)
     (folder / "system.rcl").write_text(CONTRACT.replace("float64 r", "float64 v"), encoding="utf-8")
     done = drive(folder, "watch", bag, "-o", tmp_path / "made.jsonl")
     assert done.return_value == 0, (done.output, done.exception)
     assert "watch: 3 messages heard, 8 published" in done.output
+    heard = [line for line in (tmp_path / "made.jsonl").read_text().splitlines() if '"/v"' in line]
+    assert [f'"time": {start // 10**9 + k}.123456789' in line for k, line in enumerate(heard, 1)] == [True] * 3
     assert drive(folder, "watch", tmp_path / "made.jsonl", "--replay").return_value == 0
 
 

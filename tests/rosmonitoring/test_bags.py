@@ -11,6 +11,7 @@ import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import known_types, origin, setup
+from avow.backends.rosmonitoring.pairing import time_of
 from avow.backends.rosmonitoring.told import readable
 from avow.backends.rosmonitoring.traces import read_trace
 from avow.base.diagnostics import Rejected
@@ -29,8 +30,10 @@ node n {{
 CUSTOM = "std_msgs/Header header\nfloat32 level\nstring note\n"
 
 
-def write_bag(path: Path, form: str, kind: str, values: list[dict[str, Any]], definition: str = "") -> Path:
-    """A bag of one topic /v: `form` is ros1, sqlite3 or mcap."""
+def write_bag(
+    path: Path, form: str, kind: str, values: list[dict[str, Any]], definition: str = "", start: int = 0
+) -> Path:
+    """A bag of one topic /v, with a message each second from `start` nanoseconds on: `form` is ros1, sqlite3 or mcap."""
     path = path.with_suffix(".bag") if form == "ros1" else path
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
@@ -55,13 +58,13 @@ def write_bag(path: Path, form: str, kind: str, values: list[dict[str, Any]], de
         with Writer1(path) as writer:
             connection = writer.add_connection("/v", kind, typestore=store)
             for k, fields in enumerate(values, start=1):
-                writer.write(connection, k * 10**9, store.serialize_ros1(message(fields), kind))
+                writer.write(connection, start + k * 10**9, store.serialize_ros1(message(fields), kind))
     else:
         plugin = StoragePlugin.MCAP if form == "mcap" else StoragePlugin.SQLITE3
         with Writer2(path, version=9, storage_plugin=plugin) as writer2:
             connection2 = writer2.add_connection("/v", kind, typestore=store)
             for k, fields in enumerate(values, start=1):
-                writer2.write(connection2, k * 10**9, store.serialize_cdr(message(fields), kind))
+                writer2.write(connection2, start + k * 10**9, store.serialize_cdr(message(fields), kind))
     return path
 
 
@@ -92,6 +95,15 @@ def test_a_custom_type_is_read_by_the_bags_own_definition(
     )
     system = make_system(RCL.format(kind="my/Level"))
     assert judge(system, bag) == [Fraction(1, 2), Fraction(13421773, 134217728)]
+
+
+@pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])
+@pytest.mark.parametrize("start", [0, 1, 1_732_448_384_123_456_789, 4_000_000_000_999_999_999])
+def test_times_are_those_of_the_bag_to_the_nanosecond(form: str, start: int, tmp_path: Path) -> None:
+    start = min(start, 2**32 * 10**9 - 10**10) if form == "ros1" else start
+    bag = write_bag(tmp_path / "run", form, "std_msgs/msg/Bool", [{"data": True}] * 3, start=start)
+    times = [time_of(recorded.event) * 10**9 for recorded in read_trace(bag)]
+    assert times == [start + k * 10**9 for k in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])
