@@ -65,23 +65,18 @@ class Demand:
         """The demand as a phrase: ``proved or checked, by 2 independent methods``."""
         if not self.one_of:
             return "nothing is asked"
-        parts = [asked_of(self)]
-        if self.methods > 1:
-            parts.append(f"by {self.methods} {'independent ' if self.independent else ''}methods")
-        if self.links:
-            parts.append(f"tie {' or '.join(self.links)}")
-        if self.of:
-            parts.append(f"of a {' or '.join(self.of)}")
-        if self.numbers:
-            parts.append(f"in {' or '.join(self.numbers)} numbers")
-        if self.unconditional:
-            parts.append("without hypotheses")
-        if self.isolation is not Isolation.NONE:
-            parts.append(f"isolation {self.isolation} or better")
-        if self.reviewers > 1:
-            parts.append(f"reviews by {self.reviewers} persons")
-        parts += [f"{word} not older than {days} days" for word, days in self.max_age_days]
-        return ", ".join(parts)
+        parts = {
+            asked_of(self): True,
+            f"by {self.methods} {'independent ' if self.independent else ''}methods": self.methods > 1,
+            f"tie {' or '.join(self.links)}": self.links,
+            f"of a {' or '.join(self.of)}": self.of,
+            f"in {' or '.join(self.numbers)} numbers": self.numbers,
+            "without hypotheses": self.unconditional,
+            f"isolation {self.isolation} or better": self.isolation is not Isolation.NONE,
+            f"reviews by {self.reviewers} persons": self.reviewers > 1,
+            **{f"{word} not older than {days} days": True for word, days in self.max_age_days},
+        }
+        return ", ".join(part for part, asked in parts.items() if asked)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +233,8 @@ class _PolicyReader:
             return Demand()
         self.faults += _unknown(data, _DEMAND_KEYS, self.located, path)
         return Demand(
-            one_of=self.statuses(data.get("one_of", ()), (*path, "one_of")),
+            # another demand is one of support, of whatever status
+            one_of=self.statuses(data.get("one_of") or (_GIVEN if {*data} - {"one_of"} else ()), (*path, "one_of")),
             methods=self.count(data.get("methods", 1), (*path, "methods")),
             independent=self.flag(data.get("independent", False), (*path, "independent")),
             max_age_days=self.ages(data.get("max_age_days", {}), (*path, "max_age_days")),
@@ -253,12 +249,10 @@ class _PolicyReader:
         )
 
     def level(self, data: object, path: tuple[str | int, ...]) -> Isolation:
-        given = self.words(data, tuple(Isolation), path) if isinstance(data, str) else ()
-        if given:
-            return Isolation(given[0])
         if not isinstance(data, str):
             self.fault(f"isolation is one of {', '.join(Isolation)}", path)
-        return Isolation.NONE
+        given = self.words(data, tuple(Isolation), path) if isinstance(data, str) else ()
+        return Isolation(given[0]) if given else Isolation.NONE
 
     def statuses(
         self, data: object, path: tuple[str | int, ...], allowed: tuple[str, ...] = _GIVEN
@@ -267,13 +261,11 @@ class _PolicyReader:
         return tuple(Status(word) for word in self.words(given, allowed, path))
 
     def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
-        good = []
-        for at, word in enumerate(self.texts(data, path)):
-            if word in allowed:
-                good.append(word)
-            else:
+        found = self.texts(data, path)
+        for at, word in enumerate(found):
+            if word not in allowed:
                 self.fault(f"'{word}' is none of {', '.join(allowed)}", (*path, at), suggest(word, allowed))
-        return tuple(good)
+        return tuple(word for word in found if word in allowed)
 
     def texts(self, data: object, path: tuple[str | int, ...]) -> tuple[str, ...]:
         items = [data] if isinstance(data, str) else data

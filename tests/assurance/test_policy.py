@@ -16,7 +16,7 @@ from avow.assurance.policy import Demand, costs, profile, profile_names, read_po
 from avow.base.diagnostics import Rejected, Span
 from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
-from avow.evidence.record import SIGNED_BY, Evidence
+from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Finding, Located, Requirement
 
@@ -169,6 +169,28 @@ def test_age_reviewers_links_hypotheses() -> None:
     assert "tie is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
     assert "rests on hypotheses" in gate(the_case(strict, replace(PROOF, hypotheses=("h",))))[1]
     assert TODAY.isoformat() == "2026-11-21"
+
+
+@pytest.mark.parametrize(
+    ("asked", "met"),
+    [
+        ({"methods": 2}, (PROOF, TEST)),
+        ({"independent": True}, (TEST,)),
+        ({"max_age_days": 30}, (REVIEW,)),
+        ({"reviewers": 2}, (REVIEW,)),
+        ({"ties": ["generated"]}, (PROOF,)),
+        ({"of": ["source"]}, (replace(PROOF, of=Object.SOURCE),)),
+        ({"numbers": ["float64"]}, (replace(PROOF, numbers="float64"),)),
+        ({"unconditional": True}, (PROOF,)),
+        ({"isolation": "processes"}, (replace(TEST, details={ISOLATION: "processes"}),)),
+    ],
+)
+def test_each_demand_counts_without_the_names_of_statuses(asked: dict[str, Any], met: tuple[Evidence, ...]) -> None:
+    policy = {"guarantees": {"high": asked}}
+    assert gate(the_case(policy, *met))[0]
+    assert not gate(the_case(policy))[0]
+    assert "nothing is asked" not in read_policy(located(policy)).demand("high").text()
+    assert gate(the_case({"guarantees": {"high": {}}}))[0]
 
 
 def test_what_is_asked_is_said_in_the_words_of_the_page() -> None:
