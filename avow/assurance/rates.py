@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import field
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from avow.assurance.naming import short
-from avow.base.codec import Unreadable, from_json
+from avow.base.codec import LATER, Unreadable, from_json
 from avow.base.plain import count, decimal, listed
 from avow.base.records import dataclass
-from avow.evidence.record import RATE, Evidence
+from avow.base.verdict import Verdict
+from avow.evidence.record import COMPOSES, RATE, Evidence
 from avow.evidence.status import Status, weigh
 from avow.kernel.check import Refused
-from avow.kernel.rates import Leaf, Stratum, composed
+from avow.kernel.rates import Leaf, Stratum, Trial, composed
 
 if TYPE_CHECKING:
     from avow.assurance.model import ObligationView
@@ -23,6 +26,11 @@ LEAST_CONFIDENCE = Fraction(9, 10)
 """Below it, a rate is no evidence that a policy's limit is kept."""
 
 _SAMPLED = (Status.TESTED, Status.MONITORED)
+
+_TRIALS = {
+    Trial.STEP: "of steps that meet the conditions of the sampled claims: nothing is said of others, or of missions",
+    Trial.RUN: "of whole runs, as long as those in the data and made as they were: nothing is said of others",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +44,13 @@ class RateView:
     """Of all leaves together."""
     leaves: tuple[Leaf, ...]
     """Sampled claims, by id, that have a rate."""
-    unrated: tuple[str, ...] = ()
-    """Sampled claims without one: property tests, monitored runs."""
+    why: str = field(default="", metadata=LATER)
+    """Why no rate can be given."""
+
+    @property
+    def trial(self) -> Trial:
+        """What is counted, where there is a rate: all leaves count the same."""
+        return self.leaves[0].strata[0].trial
 
     @property
     def brief(self) -> str:
@@ -45,45 +58,65 @@ class RateView:
         if not self.bound or Fraction(self.bound) >= 1:
             return "with no bound on failures"
         sure = percent(self.confidence, ROUND_FLOOR)
-        return f"at most {percent(self.bound, ROUND_CEILING)} of trials fail, at {sure} confidence"
+        return f"at most {percent(self.bound, ROUND_CEILING)} of {self.trial}s fail, at {sure} confidence"
 
     @property
     def words(self) -> str:
         """One line, without a full stop."""
         if not self.bound:
-            names = listed([short(name) for name in self.unrated], 3)
-            return f"failure rate: none can be given; shown by tests without a rate: {names}"
+            return f"failure rate: none can be given: {self.why}"
         if Fraction(self.bound) >= 1:
             return f"failure rate: none below 100 % is shown by {count(len(self.leaves), 'sampled claim')} together"
-        each = "a trial is one that the sampled claims below count, not a mission, and its rate says nothing of others"
         if len(self.leaves) < 2:
-            return f"failure rate: {self.brief} ({each})"
+            return f"failure rate: {self.brief} ({_TRIALS[self.trial]})"
         how = f"union bound over {len(self.leaves)} sampled claims, joint confidence by Bonferroni"
-        return f"failure rate: {self.brief} ({how}; {each})"
+        return f"failure rate: {self.brief} ({how}; {_TRIALS[self.trial]})"
 
 
-def rate_of(claims: Iterable[str], views: Mapping[str, ObligationView]) -> RateView | None:
-    """The rate of what rests on these claims; None where none of them is sampled."""
+@dataclass(frozen=True, slots=True)
+class _Composes:
+    """As `avow.calculus.trials.composes` writes it."""
+
+    at_once: bool
+    beyond: tuple[str, ...]
+
+
+def rate_of(own: Iterable[str], claims: Iterable[str], views: Mapping[str, ObligationView]) -> RateView | None:
+    """The rate of a requirement by its own claims and all that it rests on; None where nothing of that is sampled."""
     leaves, unrated = [], []
     for name in claims:
         if (view := views.get(name)) is None:
             continue
         samples = [s for record in view.records if weigh(record).support is not None and (s := sample(record))]
-        failed = [s for s in samples if any(stratum.failures for stratum in s)]
-        if view.status in _SAMPLED or failed:
+        if view.status in _SAMPLED or any(stratum.failures for strata in samples for stratum in strata):
             if samples:
-                leaves.append(Leaf(name, max(samples, key=_worst)))
+                leaves.append(Leaf(name, max(samples, key=lambda strata: max(Fraction(s.bound) for s in strata))))
             else:
                 unrated.append(name)
-    if unrated:
-        return RateView("", "", tuple(leaves), tuple(unrated))
-    if not leaves:
+    if not leaves and not unrated:
         return None
+    proof = next((found for name in own for record in views[name].records if (found := _composes(record))), None)
+    why = ""
+    if unrated:
+        why = f"shown by tests without a rate: {listed([short(name) for name in unrated], 3)}"
+    elif proof is None:
+        why = "no proof of a formula composes one from the samples"
+    elif beyond := [short(leaf.claim) for leaf in leaves if short(leaf.claim) in proof.beyond]:
+        why = f"trials of {listed(beyond, 3)} need not meet its condition: a guarantee under that condition is wanted"
+    else:
+        try:
+            rate = composed(leaves, at_once=proof.at_once)
+            return RateView(_decimal(rate.bound), _decimal(rate.confidence), tuple(leaves))
+        except Refused as refused:
+            why = functools.reduce(lambda text, leaf: text.replace(leaf.claim, short(leaf.claim)), leaves, str(refused))
+    return RateView("", "", tuple(leaves), why)
+
+
+def _composes(record: Evidence) -> _Composes | None:
     try:
-        rate = composed(leaves)
-    except Refused:  # a record says more than its sample shows: it gives no rate
-        return RateView("", "", (), tuple(leaf.claim for leaf in leaves))
-    return RateView(_decimal(rate.bound), _decimal(rate.confidence), tuple(leaves))
+        return from_json(_Composes, record.details[COMPOSES]) if record.verdict is Verdict.PROVED else None
+    except (KeyError, Unreadable):
+        return None
 
 
 def misstated(rate: RateView) -> str:
@@ -91,7 +124,7 @@ def misstated(rate: RateView) -> str:
     if not rate.bound:
         return ""
     try:
-        true = composed(rate.leaves)
+        true = composed(rate.leaves, at_once=True)
     except Refused as why:
         return str(why)
     told = (Fraction(rate.bound), Fraction(rate.confidence))
@@ -122,10 +155,6 @@ def percent(part: str, rounding: str = ROUND_HALF_EVEN) -> str:
     """``25.8 %`` of ``0.258``, to three digits."""
     value = Context(prec=3, rounding=rounding).create_decimal(Decimal(part) * 100)
     return f"{value.normalize():f} %"
-
-
-def _worst(strata: Sequence[Stratum]) -> Fraction:
-    return max(Fraction(stratum.bound) for stratum in strata)
 
 
 def _decimal(value: Fraction) -> str:

@@ -69,7 +69,7 @@ def held(
     if view.status in (Status.REFUTED, Status.CONTRADICTORY):
         level = Level.REFUTED
     bounded = any(views[name].status is not Status.PROVED for name in view.obligations)
-    rate = rate_of(closed.claims, views)
+    rate = rate_of(view.obligations, closed.claims, views)
     awaits = level is Level.NOT_SHOWN and not fails
     return replace(
         view,
@@ -124,10 +124,6 @@ def _failing_of(
     return None
 
 
-def _word(status: Status | None) -> str:
-    return status.value if status else "not shown"
-
-
 def _answer(
     requirement: Requirement,
     standing: Standing,
@@ -153,7 +149,7 @@ def _answer(
         return f"{standing.status.value.capitalize()}: see {where}."
     if standing.below:
         below = worst_first(standing.below, statuses)
-        causes = [f"{short(name)} is {_word(statuses.get(name))}" for name in below]
+        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in below]
         return f"Not shown: {listed(causes, 3)}."
     if not standing.direct:
         return "Not shown."

@@ -201,9 +201,7 @@ def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled])
         parts: list[Part] = ["⊢", "("]
         for k, provider in enumerate(dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)):
             parts += ["∧", *_applied("G", provider)] if k else list(_applied("G", provider))
-        if len(parts) == 2:
-            parts.append("⊤")
-        parts += ["⇒", *_applied("A", consumer), ")"]
+        parts += [*["⊤"] * (len(parts) == 2), "⇒", *_applied("A", consumer), ")"]
         yield Line(tuple(parts), "; ".join(_condition_remark(c, settled.get(c)) for c in conditions))
 
 
@@ -233,9 +231,7 @@ def _conclusion(part: Derivation) -> Line:
     parts[-1] = "·"
     for k, node in enumerate(_few(assumed)):
         parts += ["∧", *_applied("A", node)] if k else list(_applied("A", node))
-    if not assumed:
-        parts.append("⊤")
-    parts.append("⇒")
+    parts += ["⇒"] if assumed else ["⊤", "⇒"]
     for k, node in enumerate(_few(part.guaranteed)):
         parts += ["∧", "◇", *_applied("G", node)] if k else ["◇", *_applied("G", node)]
     clauses = [str(name) for name in part.assumed]

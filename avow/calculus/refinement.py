@@ -214,15 +214,13 @@ def _ports(concrete: Node, abstract: Node) -> tuple[Diagnostic, ...]:
     inputs = {port.name: port for port in abstract.inputs}
     outputs = {port.name: port for port in concrete.outputs}
     for port in concrete.inputs:
-        given = inputs.get(port.name)
-        if given is None:
+        if (given := inputs.get(port.name)) is None:
             message = f"{concrete.name} wants an input {port.name!r} that {_the(abstract, concrete)} does not have"
             faults.append(Diagnostic("PLAN126", message, port.span))
         elif not _same(given.sort, port.sort):
             faults.append(_other_type(concrete, port, abstract, given))
     for port in abstract.outputs:
-        made = outputs.get(port.name)
-        if made is None:
+        if (made := outputs.get(port.name)) is None:
             message = f"{concrete.name} has no output {port.name!r}, which {_the(abstract, concrete)} gives"
             faults.append(Diagnostic("PLAN126", message, concrete.span))
         elif not _same(made.sort, port.sort):

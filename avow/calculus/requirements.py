@@ -36,7 +36,9 @@ from avow.calculus.model_checking import cannot_run, explored, judge_property
 from avow.calculus.questions import Answer, as_far_as_shown, certified, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.scenario import CannotRun
+from avow.calculus.trials import composes
 from avow.calculus.variables import Frame, Observed, system_term
+from avow.evidence.record import COMPOSES
 from avow.formulas.formula import digest, free_variables, negation
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Term
@@ -73,6 +75,9 @@ class FormulaQuestion:
         frame, assumed = composition.frame, composition.assumed(self.name)
         known = self.known(frame, _every_guarantee(frame))
         why = _formula_says_nothing(frame, self.formula, known, assumed, bounds)
+        if answer.established is not None:
+            more = composes(frame, system_term(frame, self.formula), answer.established)
+            answer = replace(answer, details={**answer.details, COMPOSES: more})
         return _says_nothing(answer, why or self.unused_support(frame, answer, assumed))
 
     def unused_support(self, frame: Frame, answer: Answer, assumed: Mapping[str, Term]) -> str:
@@ -341,9 +346,8 @@ def _every_guarantee(frame: Frame) -> tuple[str, ...]:
 
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:
-    names = dict.fromkeys(label.removesuffix(" one step before") for label in labels)
     known = frozenset(_every_guarantee(frame))
-    return [name for name in names if name in known]
+    return [name for name in dict.fromkeys(label.removesuffix(" one step before") for label in labels) if name in known]
 
 
 def _meaning(formula: Property) -> str:

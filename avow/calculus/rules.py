@@ -83,9 +83,8 @@ class _Builder:
         """Inputs of a node that the providers do not give, each with where it comes from."""
         given = frozenset(providers)
         found: list[str] = []
-        for port in (
-            self.frame.system.contract.node(node).inputs if node in self.frame.cells else self.frame.node(node).inputs
-        ):
+        of = self.frame.system.contract if node in self.frame.cells else self.frame
+        for port in of.node(node).inputs:
             edge = self.frame.graph.by_target.get(Endpoint(node, port.name))
             if edge is None:
                 found.append(f"{node}.{port.name} (environment)")
@@ -105,10 +104,8 @@ class _Builder:
             edges = [edge for _, edge in sources if edge is not None and edge.source.node in given]
             environment = self.environment(node, [port for port, edge in sources if edge is None])
             beyond = [edge for _, edge in sources if edge is not None and edge.source.node not in self.selected]
-            if self.carry and beyond:
-                kept.append(ClauseName(node, clause.name))
-                continue
-            if sources and not edges and not (environment and all(edge is None for _, edge in sources)):
+            outside = environment and all(edge is None for _, edge in sources)
+            if (self.carry and beyond) or (sources and not edges and not outside):
                 kept.append(ClauseName(node, clause.name))
                 continue
             direct = tuple(dict.fromkeys(edge.source.node for edge in edges))

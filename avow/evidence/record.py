@@ -33,6 +33,10 @@ ISOLATION = "isolation"
 RATE = "rate"
 """Among the details of a sample: its strata (`avow.kernel.rates.Stratum`), from which rates are composed."""
 
+COMPOSES = "composes"
+"""Among the details of a requirement's proof: of what samples its failure rate may be composed
+(`avow.calculus.trials`)."""
+
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records that say the same may count and the other not."""
 

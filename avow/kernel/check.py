@@ -39,7 +39,8 @@ class Needed:
 @dataclass(frozen=True, slots=True)
 class Established:
     """A claim established, up to its hypotheses. `goal`: its digest; `shown`: (node, digest) of those shown on the way;
-    `key`: of what it was established from; `vacuous`: its premises contradict; `solvers`: how many answered each."""
+    `key`: of what it was established from; `vacuous`: its premises contradict; `solvers`: how many answered each;
+    `at_once`: at each step from what holds at that step."""
 
     goal: str
     hypotheses: tuple[Needed, ...]
@@ -47,6 +48,7 @@ class Established:
     key: str
     vacuous: bool
     solvers: int
+    at_once: bool = False
 
 
 class Answered(NamedTuple):
@@ -81,7 +83,9 @@ class Kernel:
             new = set(entries[i].named()) - part
             part |= new
             own += [j for j in new if not alone or self._claim(entries[j]).kind is Claimed.REQUIREMENT]
-        given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
+        rests = [entries[i] for i in part]
+        given = [e for e in rests if e.how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
+        apart = any(e.base or e.how is How.DEFINED or any(u.back for q in e.questions for u in q.uses) for e in rests)
         needed = {Needed(e.how, e.node, e.digest, tuple(sorted(entries[c].digest for c in e.conds))) for e in given}
         if self._claim(entries[goal]).kind is Claimed.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
             raise Refused("a requirement rests on what only a derived contract may assume")
@@ -95,6 +99,7 @@ class Kernel:
             key=sha256(json.dumps(told)),
             vacuous=any(answer.vacuous for answer in answered),
             solvers=min((answer.solvers for answer in answered), default=1),
+            at_once=not apart,
         )
 
     @cached_property

@@ -4,18 +4,23 @@ A sample has one or more strata (conditions under which trials were made). In a 
 "the probability of failure is at most p" holds at confidence c if so few failures have probability 1 - c or less where
 the true probability is p (C. J. Clopper and E. S. Pearson, 1934). Of several strata the greatest bound counts. A claim
 that rests on several sampled claims fails at most as often as these together (the union bound, whatever depends on
-what), and the doubts 1 - c add up as well (Bonferroni).
+what), and the doubts 1 - c add up as well (Bonferroni). A trial is a step, or a whole run of any number of steps:
+neither rate bounds the other, so all trials have to be of one kind. A claim that may fail for what failed at an earlier
+step has a rate of whole runs only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context, Decimal
+from enum import StrEnum
 from fractions import Fraction
 
+from avow.base import codec
 from avow.kernel.check import Refused
 
+Trial = StrEnum("Trial", {"STEP": "step", "RUN": "run"})
 _UP = Context(prec=50, rounding=ROUND_CEILING, Emin=-(10**15), Emax=10**15)
 """All numbers of `tail` are positive and rounded up, so its result is never too small."""
 
@@ -29,6 +34,7 @@ class Stratum:
     failures: int
     bound: str
     confidence: str
+    trial: Trial = field(default=Trial.STEP, metadata=codec.LATER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +80,15 @@ def shows(failures: int, trials: int, bound: Fraction, confidence: Fraction) -> 
     return sensible and (bound >= 1 or tail(failures, trials, bound) <= 1 - confidence)
 
 
-def composed(leaves: Iterable[Leaf]) -> Rate:
-    """The rate of a claim that fails only where one of the leaves does. Raises Refused where a sample does not show its
-    bound. Where the doubts add up to 1 or more, nothing is known: the bound is 1."""
+def composed(leaves: Sequence[Leaf], *, at_once: bool) -> Rate:
+    """The rate of a claim that fails in a run only where a leaf does (`at_once`: at a step only where one does then).
+    Raises Refused where a sample does not show its bound, or where trials do not add up. Where the doubts add up to 1
+    or more, nothing is known: the bound is 1."""
     bound = doubt = Fraction(0)
+    trials = {each.trial: leaf.claim for leaf in leaves for each in leaf.strata}
+    if Trial.STEP in trials and (Trial.RUN in trials or not at_once):
+        why = "others are whole runs" if Trial.RUN in trials else "what fails at an earlier step may count"
+        raise Refused(f"a trial of {trials[Trial.STEP]} is a single step, and {why}")
     for leaf in leaves:
         if not leaf.strata:
             raise Refused(f"{leaf.claim} has no sample")

@@ -13,6 +13,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.plain import alike, exact
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
+from avow.kernel.rates import Trial
 from avow.language.sorts import BOOL, REAL, Sort
 
 from .binding import WORDS, Binding, Interpretation, Unfit, bound, interpretation
@@ -109,6 +110,7 @@ class Experiment:
     floor: Fraction
     """The least success rate that the runs must show, whatever is claimed."""
     strata: str
+    trial: Trial
     protocol: str
     left_out: tuple[str, ...] = ()
     """Failing runs that the plan says are rightly no longer among the data, and why."""
@@ -166,6 +168,7 @@ class _Reader:
             at_least,
             floor,
             self.options.get("strata", ""),
+            Trial.RUN if self.options.get("steps") else Trial.STEP,
             " ".join(self.options.get("protocol", "").split()),
             tuple(str(name) for name in left_out.get("runs", ())),
             " ".join(left_out.get("because", "").split()),

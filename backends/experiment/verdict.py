@@ -106,8 +106,8 @@ def _sample(claim: Claim, found: Sequence[tuple[Run, Judged]], experiment: Exper
     each = Fraction(-(-shared * 10**12 // 1), 10**12)  # a decimal, rounded up
     strata = []
     for (stratum, n), (trials, failures) in counts.items():
-        bound = upper_bound(failures, trials, each)
-        strata.append(Stratum(_name(claim, experiment, stratum, n), trials, failures, _decimal(bound), _decimal(each)))
+        bound, name = upper_bound(failures, trials, each), _name(claim, experiment, stratum, n)
+        strata.append(Stratum(name, trials, failures, _decimal(bound), _decimal(each), experiment.trial))
     counted = [(run, one) for run, one in found if not one.excused]
     return _Sample(
         tuple(strata),
@@ -192,6 +192,7 @@ def _row(stratum: Stratum) -> dict[str, Any]:
         "failures": stratum.failures,
         "bound": stratum.bound,
         "confidence": stratum.confidence,
+        "trial": stratum.trial.value,
     }
 
 

@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 
-from assurance.sample import case, evidence, guarantee, node_plan, system
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.case import conclude_again
 from avow.assurance.model import Case
+from avow.assurance.rates import misstated
 from avow.base.codec import from_json, to_json
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
-from avow.evidence.record import RATE, Evidence
+from avow.evidence.obligation import Kind
+from avow.evidence.record import COMPOSES, RATE, Evidence
 from avow.report import formats
 from avow.report.explained import explained
 from avow.report.short import terminal_lines
@@ -25,16 +27,25 @@ def sampled(of: str, bound: str = "0.086", trials: int = 34, **more: Any) -> Evi
     return evidence(of, Verdict.TESTED, "experiment", details={RATE: strata, **more})
 
 
-def three(*records: Evidence, policy: Any = None, criticality: str = "medium") -> Case:
-    """A requirement that rests on one guarantee of each of three nodes."""
+OWN = obligation("system", Kind.REQUIREMENT, "R", clauses=("a.g", "b.g", "c.g"))
+COMPOSED = {"at_once": True, "beyond": []}
+
+
+def three(
+    *records: Evidence, policy: Any = None, criticality: str = "medium", proof: dict[str, Any] | None = COMPOSED
+) -> Case:
+    """A requirement that rests on one guarantee of each of three nodes; `proof`: how its proof composes them."""
     names = ("a", "b", "c")
+    formula = None if proof is None else "a.x > 0"
     subject = system(
         {name: ["g"] for name in names},
         plans=[node_plan(name, criticality, "experiment", "hypothesis", "hoare") for name in names],
-        requirements=[Requirement("R", "All is well.", None, None, tuple(f"{name}.g" for name in names))],
+        requirements=[Requirement("R", "All is well.", formula, None, tuple(f"{name}.g" for name in names))],
         policy=policy,
     )
-    return case(subject, [guarantee(name, "g") for name in names], records)
+    own = [] if proof is None else [evidence(OWN, Verdict.PROVED, "compose", details={COMPOSES: proof})]
+    obligations = [*(guarantee(name, "g") for name in names), *([OWN] if own else [])]
+    return case(subject, obligations, [*records, *own])
 
 
 ALL = (sampled("a.g"), sampled("b.g"), sampled("c.g"))
@@ -44,9 +55,9 @@ def test_three_nodes_at_8_6_percent_give_25_8_percent_at_joint_confidence() -> N
     requirement = three(*ALL).requirements[0]
     assert requirement.rate is not None
     assert (requirement.rate.bound, requirement.rate.confidence) == ("0.258", "0.85")
-    assert "at most 25.8 % of trials fail, at 85 % confidence" in requirement.answer
+    assert "at most 25.8 % of steps fail, at 85 % confidence" in requirement.answer
     assert len(requirement.rate.leaves) == 3
-    assert not requirement.rate.unrated
+    assert not requirement.rate.why
 
 
 def test_a_leaf_that_is_proved_takes_no_part() -> None:
@@ -69,7 +80,7 @@ def test_a_leaf_that_is_sampled_without_a_rate_leaves_none(method: str) -> None:
     requirement = three(sampled("a.g"), sampled("b.g"), other).requirements[0]
     assert requirement.rate is not None
     assert not requirement.rate.bound
-    assert "none can be given; shown by tests without a rate: c.g" in requirement.answer
+    assert "none can be given: shown by tests without a rate: c.g" in requirement.answer
 
 
 @pytest.mark.parametrize("wrong", [{"bound": "0.08"}, {"trials": 33}, {"bound": "-1"}, {"bound": "x"}])
@@ -77,6 +88,47 @@ def test_a_record_that_says_more_than_its_sample_shows_gives_no_rate(wrong: dict
     requirement = three(sampled("a.g", **wrong), *ALL[1:]).requirements[0]
     assert requirement.rate is not None
     assert not requirement.rate.bound
+
+
+def of_runs(*records: Evidence) -> tuple[Evidence, ...]:
+    """The same samples, of whole runs."""
+    for record in records:
+        record.details[RATE][0]["trial"] = "run"
+    return records
+
+
+RUNS = [sampled(f"{n}.g") for n in "abc"]
+
+
+@pytest.mark.parametrize(
+    ("records", "proof", "why"),
+    [
+        (ALL, None, "no proof of a formula composes one"),  # prose, and properties of runs
+        (ALL, COMPOSED | {"at_once": False}, "a trial of c.g is a single step"),
+        (ALL, COMPOSED | {"beyond": ["b.g"]}, "trials of b.g need not meet its condition"),
+        ((*of_runs(*RUNS[:2]), ALL[2]), COMPOSED, "a trial of c.g is a single step, and others are whole runs"),
+        (RUNS, None, "no proof of a formula composes one"),
+    ],
+)
+def test_no_rate_stands_where_trials_are_none_of_the_requirement(
+    records: tuple[Evidence, ...], proof: dict[str, Any] | None, why: str
+) -> None:
+    found = three(*records, proof=proof, policy={"max_failure_rate": {"medium": 0.9}})
+    (requirement,) = found.requirements
+    assert requirement.rate is not None
+    assert not requirement.rate.bound
+    assert why in requirement.answer
+    passed, said = gate(found)
+    assert not passed
+    assert why in said
+
+
+def test_whole_runs_compose_whatever_step_a_failure_counts_at() -> None:
+    for proof in (COMPOSED, COMPOSED | {"at_once": False}):
+        requirement = three(*of_runs(*(sampled(f"{n}.g") for n in "abc")), proof=proof).requirements[0]
+        assert "at most 25.8 % of runs fail, at 85 % confidence" in requirement.answer
+        assert requirement.rate is not None
+        assert not misstated(requirement.rate)
 
 
 def gate(found: Case) -> tuple[bool, str]:
@@ -92,7 +144,7 @@ def test_the_policy_limits_the_rate_by_criticality() -> None:
     for limit in ({"medium": 0.3}, {"low": 0.3}, {"medium": 0.4, "low": 0.3}):
         passed, why = gate(three(*sure, policy={"max_failure_rate": limit}))
         assert not passed
-        assert "at most 39 % of trials fail" in why
+        assert "at most 39 % of steps fail" in why
         assert "at most 30 % is allowed" in why
     assert gate(three(*sure, policy={"max_failure_rate": {"high": 0.3}}))[0]  # nothing is as critical
 
@@ -124,11 +176,11 @@ def test_every_format_that_says_how_a_requirement_stands_says_its_rate() -> None
     found = three(*ALL)
     for name, content in formats(found):
         if isinstance(content, str) and name not in SAYS_NO_STANDING:
-            rate = '"bound": "0.258"' if name == "report.json" else "at most 25.8 % of trials fail, at 85 % confidence"
+            rate = '"bound": "0.258"' if name == "report.json" else "at most 25.8 % of steps fail, at 85 % confidence"
             plain = " ".join(content.replace("\\%", "%").replace("\\", "").replace("&nbsp;", " ").split())
             assert rate in plain, name
-    assert any("at most 25.8 % of trials fail" in line for line in terminal_lines(found))
-    assert any("at most 25.8 % of trials fail" in line for _, lines in explained(found, "R") for line in lines)
+    assert any("at most 25.8 % of steps fail" in line for line in terminal_lines(found))
+    assert any("at most 25.8 % of steps fail" in line for _, lines in explained(found, "R") for line in lines)
 
 
 def test_the_samples_in_a_report_are_the_certificate() -> None:

@@ -86,3 +86,45 @@ def test_runs_that_never_meet_the_condition_leave_the_guarantee_vacuous(tmp_path
     found = [o for o in case["obligations"] if o["obligation"]["kind"] == "guarantee"]
     assert [o["status"] for o in found] == ["vacuous"] * 3
     assert case["exit_code"] == 1
+
+
+STOPS = """\
+node brake { inputs( speed : REAL ) outputs( distance : REAL ) topics( t/S speed matches(in.speed) )
+  guarantee stops "It stops within its speed" ( in.speed >= 0 -> out.distance <= in.speed ) }
+"""
+STEPS = "run,v,d\n" + "".join(f"{n},1,{d}\n" for n in range(40) for d in (1, 0.5))
+ROWS = "run,v,d\n" + "".join(f"{n},1,1\n" for n in range(40))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("steps", "formula", "said"),
+    [
+        (False, "brake.speed >= 0 -> brake.distance <= brake.speed", "% of steps fail"),
+        (True, "brake.speed >= 0 -> brake.distance <= brake.speed", "% of runs fail"),
+        (True, "historically(brake.speed >= 0 -> brake.distance <= brake.speed)", "% of runs fail"),
+        (False, "historically(brake.speed >= 0 -> brake.distance <= brake.speed)", "brake.stops is a single step"),
+        (False, "5 <= brake.speed <= 6 -> brake.distance <= 6", "trials of brake.stops need not meet its condition"),
+    ],
+)
+def test_a_rate_is_of_what_was_tried(tmp_path: Path, steps: bool, formula: str, said: str) -> None:
+    place = tmp_path / "contracts/line"
+    place.mkdir(parents=True)
+    (tmp_path / "dodo.py").write_text("")
+    (place / "system.rcl").write_text(STOPS)
+    (place / "d.csv").write_text(STEPS if steps else ROWS)
+    plan = {
+        "environment": {"brake.speed": {"because": "nothing is assumed"}},
+        "requirements": {"R": {"text": "It stops.", "formula": formula, "supported_by": ["brake"]}},
+        "nodes": {
+            "brake": {
+                "methods": [
+                    {"experiment": {"data": "d.csv", "steps": steps, "mapping": {"in.speed": "v", "out.distance": "d"}}}
+                ]
+            }
+        },
+    }
+    (place / "plan.yaml").write_text(json.dumps(plan))
+    avow("verify", cwd=tmp_path)
+    (requirement,) = json.loads((tmp_path / "reports/line/report.json").read_text())["requirements"]
+    assert said in requirement["answer"]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avow.kernel.check import Refused
-from avow.kernel.rates import Leaf, Stratum, composed, shows, tail
+from avow.kernel.rates import Leaf, Stratum, Trial, composed, shows, tail
 
 PERCENT = st.integers(1, 99).map(lambda n: Fraction(n, 100))
 
@@ -40,17 +40,17 @@ def leaf(name: str, *strata: tuple[int, int, str, str]) -> Leaf:
 
 
 def test_three_nodes_at_8_6_percent() -> None:
-    rate = composed(leaf(name, (34, 0, "0.086", "0.95")) for name in "abc")
+    rate = composed([leaf(name, (34, 0, "0.086", "0.95")) for name in "abc"], at_once=True)
     assert (rate.bound, rate.confidence) == (Fraction("0.258"), Fraction("0.85"))
 
 
 def test_the_worst_stratum_counts_and_its_doubts_add_up() -> None:
-    rate = composed([leaf("a", (200, 0, "0.03", "0.975"), (20, 0, "0.2", "0.975"))])
+    rate = composed([leaf("a", (200, 0, "0.03", "0.975"), (20, 0, "0.2", "0.975"))], at_once=True)
     assert (rate.bound, rate.confidence) == (Fraction("0.2"), Fraction("0.95"))
 
 
 def test_where_doubts_add_up_to_one_nothing_is_known() -> None:
-    rate = composed(leaf(str(i), (1000, 0, "0.01", "0.95")) for i in range(20))
+    rate = composed([leaf(str(i), (1000, 0, "0.01", "0.95")) for i in range(20)], at_once=True)
     assert (rate.bound, rate.confidence) == (1, 0)
 
 
@@ -69,9 +69,45 @@ def test_where_doubts_add_up_to_one_nothing_is_known() -> None:
     ],
 )
 def test_a_bound_that_its_sample_does_not_show_is_refused(wrong: Leaf) -> None:
-    composed([leaf("b", (34, 0, "0.086", "0.95"))])
+    composed([leaf("b", (34, 0, "0.086", "0.95"))], at_once=True)
     with pytest.raises(Refused):
-        composed([leaf("b", (34, 0, "0.086", "0.95")), wrong])
+        composed([leaf("b", (34, 0, "0.086", "0.95")), wrong], at_once=True)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_rate_holds_of_the_trials_that_it_names(seed: int, at_once: bool) -> None:
+    """Random runs of several steps, all known, in which leaves fail at some steps: a claim fails at a step where one of
+    them does then (`at_once`) or did before. What `composed` says from the leaves' true rates is no less than the
+    claim's, and trials of two kinds are never added."""
+    source = random.Random(seed)
+    lengths = [source.randint(1, 6) for _ in range(source.randint(2, 5))]
+    fails = [[[source.random() < 0.15 for _ in range(n)] for n in lengths] for _ in range(source.randint(1, 3))]
+
+    def claim(run: int, step: int) -> bool:
+        since = step if at_once else 0
+        return any(any(leaf[run][since : step + 1]) for leaf in fails)
+
+    of_claim = [[claim(run, step) for step in range(n)] for run, n in enumerate(lengths)]
+
+    def rate(found: list[list[bool]], trial: Trial) -> Fraction:
+        trials = [any(run) for run in found] if trial is Trial.RUN else [each for run in found for each in run]
+        return Fraction(sum(trials), len(trials))
+
+    def known(of: list[list[bool]], trial: Trial) -> Leaf:
+        bound = Fraction(math.ceil(rate(of, trial) * 1000) + 1, 1000)
+        return Leaf("l", (Stratum("", 100_000, 0, str(float(min(bound, Fraction(1)))), "0.99", trial),))
+
+    for trial in Trial:
+        leaves = [known(leaf, trial) for leaf in fails]
+        if trial is Trial.STEP and not at_once:
+            with pytest.raises(Refused, match="single step"):
+                composed(leaves, at_once=False)
+        else:
+            found = composed(leaves, at_once=at_once)
+            assert found.bound >= rate(of_claim, trial)
+    with pytest.raises(Refused, match="whole run"):
+        composed([known(fails[0], Trial.STEP), known(fails[-1], Trial.RUN)], at_once=at_once)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -88,7 +124,7 @@ def test_the_union_bound_holds_of_any_joint_distribution(seed: int) -> None:
     rates = [Fraction(sum(w for w, o in zip(weights, outcomes, strict=True) if o[i]), total) for i in range(leaves)]
     bounds = [Fraction(math.ceil(r * 1000) + 1, 1000) for r in rates]
     sampled = [leaf(str(i), (100_000, 0, str(float(b)), "0.99")) for i, b in enumerate(bounds)]
-    assert composed(sampled).bound >= truth
+    assert composed(sampled, at_once=True).bound >= truth
 
 
 def least_bound(failures: int, trials: int, confidence: Fraction) -> Fraction:
@@ -117,7 +153,7 @@ def test_the_composed_bound_covers_as_often_as_its_confidence_says(seed: int) ->
             leaf(str(i), (n, k, str(float(bounds[i][k])), "0.9"))
             for i, (k, n) in enumerate(zip(sample, trials, strict=True))
         ]
-        rate = composed(leaves)
+        rate = composed(leaves, at_once=True)
         joint = rate.confidence
         covered += chance if rate.bound >= union else 0
     assert covered >= joint == 1 - len(true) * (1 - confidence)

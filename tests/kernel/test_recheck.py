@@ -41,7 +41,7 @@ def test_recheck(tmp_path: Path) -> None:
     assert invoke(command, str(tmp_path / "system"), str(report)) == (code, told)
     sample = {"name": "", "trials": 34, "failures": 0, "bound": "0.086", "confidence": "0.95"}
     for bound, wanted in (("0.086", 0), ("0.085", 1)):
-        rate = {"bound": bound, "confidence": "0.95", "leaves": [{"claim": "a", "strata": [sample]}], "unrated": []}
+        rate = {"bound": bound, "confidence": "0.95", "leaves": [{"claim": "a", "strata": [sample]}]}
         whole = {"kernel": {"certificates": {"requirement R": to_json(certificate)}}, "requirements": [{"id": "R"}]}
         whole["requirements"][0]["rate"] = rate
         report.write_text(json.dumps(whole))

@@ -33,7 +33,7 @@ CUSTOM = "std_msgs/Header header\nfloat32 level\nstring note\n"
 def write_bag(
     path: Path, form: str, kind: str, values: list[dict[str, Any]], definition: str = "", start: int = 0
 ) -> Path:
-    """A bag of one topic /v, with a message each second from `start` nanoseconds on: `form` is ros1, sqlite3 or mcap."""
+    """A bag of one topic /v, a message a second after `start` nanoseconds; `form`: ros1, sqlite3 or mcap."""
     path = path.with_suffix(".bag") if form == "ros1" else path
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
