@@ -268,7 +268,7 @@ def _first_values(
     views: Sequence[ObligationView], closed: Mapping[str, Closed], statements: Statements
 ) -> Iterator[_Raw]:
     """The `initial` values of delayed connections that a proof uses: the calculus takes them from the plan, and no
-    method looks at what a program begins with."""
+    method looks at what a program begins with, but for what the node's own class keeps itself."""
     for view in views:
         labels = [label for record in view.records for label in used(record.details) if _is_first_value(label)]
         if labels and view.status.supports:

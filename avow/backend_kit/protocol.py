@@ -13,7 +13,7 @@ import inspect
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
@@ -24,11 +24,16 @@ from avow.base.tools import Tool
 from avow.base.verdict import Counterexample, Isolation, Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import RETRY
+from avow.formulas.formula import substitute
 from avow.formulas.values import Value
 from avow.isolation.level import Unavailable
 from avow.isolation.observed import Observed
-from avow.language.contract import Clause, Contract, Node
-from avow.system.plan import Driving, Method, Source, System
+from avow.language.contract import Clause, ClauseKind, Contract, Node
+from avow.language.subterms import ports_of
+from avow.language.terms import Role
+from avow.system.formulas import initial_condition
+from avow.system.graph import dataflow
+from avow.system.plan import Driving, Edge, Method, Source, System
 
 __all__ = [
     "COMMON_OPTIONS",
@@ -86,6 +91,25 @@ class Job:
     def source(self) -> Source | None:
         """The node's program according to the plan."""
         return self.system.plan.node(self.node.name).source
+
+    @property
+    def remembered(self) -> tuple[Edge, ...]:
+        """The connections over which the node gets back what its program keeps under `memory`."""
+        source = self.source
+        if source is None or not source.memory:
+            return ()
+        return tuple(e for e in dataflow(self.system).feeding(self.node.name) if e.target.port in source.memory)
+
+    @property
+    def begins(self) -> tuple[Clause, ...]:
+        """The plan's first values of what the program itself keeps, as assumptions about these inputs."""
+        found = []
+        for edge in self.remembered:
+            term, port = initial_condition(self.system, edge), edge.target.port
+            if term is not None:
+                held = {v: replace(v, role=Role.INPUT, name=port) for v in ports_of(term) if v.role is Role.OUTPUT}
+                found.append(Clause(ClauseKind.ASSUMPTION, f"initial {port}", 0, substitute(term, held)))
+        return tuple(found)
 
     @property
     def options(self) -> Mapping[str, Any]:

@@ -38,8 +38,10 @@ class Named:
     texts: tuple[bytes, ...]
 
     @classmethod
-    def of(cls, options: str, files: Iterable[Path]) -> Named:
-        return cls((options.encode(), *map(_read, files)))
+    def of(cls, tool: Backend, job: Job, options: str, files: Iterable[Path]) -> Named:
+        """With the first values of what the program keeps, where the method sees the program."""
+        begins = (edge.initial or "" for edge in (job.remembered if tool.uses_source else ()))
+        return cls((" ".join((options, *begins)).encode(), *map(_read, files)))
 
     def __call__(self, name: str) -> bool:
         word = re.compile(rb"(?<!\w)" + re.escape(name.encode()) + rb"(?!\w)")
@@ -86,7 +88,7 @@ def method_options(method: Method) -> str:
 
 def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | None = None) -> str:
     """As text; `options` are the method's, as they enter its key; `files` are its files, where they are at hand."""
-    named = Named.of(options, tool.files(job) if files is None else files)
+    named = Named.of(tool, job, options, tool.files(job) if files is None else files)
     constants = sorted([name, digest(value)] for name, value in named.constants(job.contract))
     definitions = named.definitions((*job.contract.definitions, *job.node.definitions))
     constants += sorted(
@@ -105,6 +107,7 @@ def surroundings(tool: Backend, job: Job, options: str, files: Iterable[Path] | 
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
         kind = [] if declared.kind is Driving.STEP else [declared.kind.value]
         parts.append(["source", *texts, *kind, sorted(declared.memory.items())])
+        parts += sorted([clause.name, digest(clause.formula)] for clause in job.begins)
     if tool.uses_criticality:
         parts.append(["criticality", job.system.plan.node(job.node.name).criticality])
     return json.dumps(parts)

@@ -97,11 +97,11 @@ def method_slice(
     """`files`: the method's, if available. `sentences`: include the clauses' sentences, which generated files show and
     no answer may depend on."""
     plan = job.system.plan
-    named = Named.of(method_options(job.method), tool.files(job) if files is None else files)
+    named = Named.of(tool, job, method_options(job.method), tool.files(job) if files is None else files)
     graph, own = dataflow(job.system), job.node.name
     upstream = upstream_of(tool, job)
     looks = connected(tool, job)
-    edges = graph.feeding(own) if looks else ()
+    edges = graph.feeding(own) if looks else job.remembered if tool.uses_source else ()
     edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
     sources = {edge.source.node for edge in edges}
     told_of_itself = told_too(tool, job) if own in sources else frozenset[str]()

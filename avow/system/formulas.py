@@ -131,6 +131,13 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
         if edge.delayed and first.setdefault(edge.source, edge).initial != edge.initial:
             message = f"{edge.source} has more than one initial value; all its delayed edges carry the same"
             faults.append(Diagnostic("PLAN112", message, edge.span))
+    for entry in system.plan.nodes:
+        for port in entry.source.memory if entry.source is not None else ():
+            given = graph.by_target.get(Endpoint(entry.node, port))
+            if given is not None and (given.source != given.target or not given.delayed):
+                message = f"nodes.{entry.node}.memory: in.{port} is what the program keeps, but {given} feeds it"
+                hint = f"connect {entry.node}.{port} to itself with `delayed: true`, or take it out of `memory`"
+                faults.append(Diagnostic("PLAN110", message, given.span or entry.span, hint=hint))
     for requirement in system.plan.requirements:
         try:
             if requirement.formula is not None:

@@ -71,6 +71,8 @@ class Bench:
 
     reading: Reading
     assumed: tuple[Formula, ...] = field(init=False)
+    begins: tuple[Formula, ...] = field(init=False)
+    """What memory has to meet before the first step."""
     guarded: dict[str, Guarded] = field(init=False)
     broken: dict[str, Broken] = field(default_factory=dict)
     """Guarantee → the first run that breaks it."""
@@ -90,6 +92,7 @@ class Bench:
     def __post_init__(self) -> None:
         job = self.reading.job
         self.assumed = tuple(map(Formula.of, job.node.assumptions))
+        self.begins = (*self.assumed, *map(Formula.of, job.begins))
         self.guarded = {}
         for o in job.obligations:
             found = triggers(job.clause(o))
@@ -140,7 +143,7 @@ class Bench:
             self.crash = self.crash or Broken(run[:1], (Seen({}),), f"making the node ends with {reply.crash}")
             return
         held = self._held(answers[0], "held")
-        wrong = started(node, self.assumed, held, "the constructor")
+        wrong = started(node, self.begins, held, "the constructor")
         if wrong is not None:
             self.begun = self.begun or wrong
             return

@@ -115,6 +115,7 @@ def _question(job: Job) -> Question:
         outputs=tuple(p for p in job.node.outputs if p.variable.qualified not in unit.left_out),
         left_out=tuple(sorted(unit.left_out)),
         assumptions=job.node.assumptions,
+        begins=job.begins if unit.driven else (),
         guarantees=guarantees,
         untranslated=export.untranslated(job, unit),
         kept=tuple(tuple(case if isinstance(case, list) else [case]) for cases in job.kept.values() for case in cases),

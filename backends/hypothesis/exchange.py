@@ -42,6 +42,7 @@ class Question:
     outputs: tuple[Port, ...]
     left_out: tuple[str, ...]
     assumptions: tuple[Clause, ...]
+    begins: tuple[Clause, ...]
     guarantees: tuple[Clause, ...]
     untranslated: frozenset[str]
     """Guarantees that the generated test does not assert."""

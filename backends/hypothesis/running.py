@@ -95,6 +95,7 @@ class Bench:
         self.doubles = asked.numbers != EXACT
         records = Records()
         self.assumptions = tuple(judged(c.name, c.formula, records) for c in asked.assumptions)
+        self.begins = tuple(judged(c.name, c.formula, records) for c in asked.begins)
         self.guarantees = {c.name: guarantee(c.name, c.formula, records) for c in asked.guarantees}
         self.keeper = Keeper(records.cells)
         self.runs_counted = bool(records.cells)
@@ -195,6 +196,8 @@ class Bench:
                 self._memory = self.unit.begin()
             except SubjectFailed as error:
                 self._crashed(str(error), [])
+            if any(begun.holds(valuation(self._memory, {})) is False for begun in self.begins):
+                self._crashed("__init__ leaves other values than the plan's `initial` ones", [(self._memory, {})])
 
     def _end_run(self) -> None:
         if self.trace and self.shrinking is None:

@@ -101,6 +101,7 @@ class Work:
         job, reading = self.job, self.reading
         formulas = {o.id: Formula.of(job.clause(o)) for o in job.obligations}
         assumed = tuple(map(Formula.of, job.node.assumptions))
+        begins = (*assumed, *map(Formula.of, job.begins))
         cases = self.cases(assumed)
         if cases is None:
             return self.alike(Verdict.UNKNOWN, self.refusals())
@@ -112,7 +113,7 @@ class Work:
         if reading.step is None:
             return tuple(self.refuted(o) or Outcome(o.id, Verdict.UNKNOWN, self.refusals()) for o in job.obligations)
         made = {port: reading.step.start[attribute] for port, attribute in reading.step.memory.items()}
-        if (begun := started(job.node, assumed, made, "__init__")) is not None:
+        if (begun := started(job.node, begins, made, "__init__")) is not None:
             wrong = Outcome("", Verdict.REFUTED, begun.text(), begun)
             return tuple(self.refuted(o) or replace(wrong, obligation=o.id) for o in job.obligations)
         if job.options.get("nan") == "possible" and self.reals():
