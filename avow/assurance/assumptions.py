@@ -107,7 +107,6 @@ def assumptions(
     closed = {**required, _WHOLE: whole}
     raw = [
         *_reasons(views, closed, statements),
-        *_constants(facts, closed, statements),
         *_of_methods(views, relied, closed, statements),
         *_accepted(facts, views, closed),
         *_assumptions(facts, closed),
@@ -168,20 +167,6 @@ def _reasons(views: Sequence[ObligationView], closed: Mapping[str, Closed], stat
             goal, _, what = o.name.partition(".")
             sort, place = Sort.PLATFORM, o.name if what in _PLATFORM else f"{goal}.entered"
         yield _Raw(sort, place, text, statements.at(place, text), o.id, _in(closed, o.id))
-
-
-def _constants(facts: Facts, closed: Mapping[str, Closed], statements: Statements) -> Iterator[_Raw]:
-    """Inputs that the plan declares to be the same at every step: no claim says so, and the calculus uses it. What an
-    entry says is about its assumption, where it has one: that the input does not change needs a reason of its own."""
-    for entry in facts.environment:
-        if entry.constant:
-            place = f"environment.{entry.port}" + (".constant" if entry.assume else "")
-            reading = tuple(f"{facts.system}/{node}/{Kind.GUARANTEE}/" for node in entry.nodes)
-            holders = {
-                name for name, found in closed.items() if any(claim.startswith(reading) for claim in found.claims)
-            }
-            text = f"{entry.port} is the same at every step"
-            yield _Raw(Sort.WORLD, place, text, statements.at(place), place, holders.__contains__)
 
 
 def _of_methods(

@@ -34,6 +34,8 @@ from avow.kernel.check import Established, Needed
 from avow.kernel.statements import Claimed
 from avow.language.definitions import show_clause
 from avow.language.printer import show_term
+from avow.language.subterms import ports_of
+from avow.language.terms import Role
 from avow.sanity.claims import node_key, triggers
 from avow.solving.limits import effort_told
 from avow.system.plan import System
@@ -80,7 +82,8 @@ def settle_each(composition: Composition, obligations: Sequence[Obligation], bou
         else:
             answer = task.ask(composition, bounds)
             goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
-            outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
+            required = obligation.name if obligation.kind is Kind.REQUIREMENT else ""
+            outcome = answer.outcome(obligation.id, resting.behind(answer, goal, required))
         yield replace(outcome, details={**outcome.details, **effort_told(bounds.effort)})
 
 
@@ -195,6 +198,16 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
             formula=show_term(assumed.formula),
             span=next(e for e in frame.system.plan.environment if e.port == assumed.port).span,
         )
+    for entry in frame.system.plan.environment:
+        if entry.constant:
+            yield _task(
+                frame,
+                f"environment.{entry.constancy}",
+                f"the environment gives {entry.port} the same value at every step",
+                ("constant", entry.port, together, readers),
+                questions.EnvironmentQuestion(entry.stays or f"{entry.port} is the same at every step"),
+                span=entry.span,
+            )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
     for name, ports in composition.left_to_environment():
         node = frame.node(name.node)
@@ -337,7 +350,7 @@ class _Resting:
     composition: Composition
     obligations: Mapping[str, Obligation]
 
-    def behind(self, answer: Answer, goal: str | None) -> tuple[Hypothesis, ...]:
+    def behind(self, answer: Answer, goal: str | None, required: str = "") -> tuple[Hypothesis, ...]:
         """What an answer about a side condition of a derivation rests on, or about a requirement (`goal` None)."""
         found: dict[Hypothesis, None] = {}
         if answer.everything:
@@ -349,7 +362,23 @@ class _Resting:
             if goal is None:
                 shown = (self.named(Claimed.ASSUMPTION, mark, node) for node, mark in answer.established.shown if node)
                 found |= dict.fromkeys(self.discharging(*name.split(".")) for name in shown)
+            found |= dict.fromkeys(self.constants(answer.established, required))
         return tuple(found)
+
+    def constants(self, established: Established, required: str) -> Iterator[Hypothesis]:
+        """That the inputs of which a proof's clauses speak do not change, where the plan says so."""
+        frame, known = self.composition.frame, self.composition.certificates.known
+        about = frame.required.get(required)
+        spoken = [] if about is None else [v.name.rsplit(".", 1) for v in ports_of(about) if "." in v.name]
+        marks = {digest for _, digest in established.shown} | {need.digest for need in established.hypotheses}
+        for said in (said for mark in (*marks, established.goal) for said in known.by_digest.get(mark, ())):
+            if said.kind in (Claimed.GUARANTEE, Claimed.ASSUMPTION):
+                formula = frame.system.contract.node(said.node).clause(said.name).formula
+                spoken += [[said.node, v.name] for v in ports_of(formula) if v.role is Role.INPUT]
+        read = {frame.entry(node, port) for node, port in spoken if node in frame.graph.nodes}
+        for entry in frame.system.plan.environment:
+            if entry.constant and entry.port in read:
+                yield self.composed(f"environment.{entry.constancy}")
 
     def everything(self) -> Iterator[Hypothesis]:
         """Every guarantee, what discharges every assumption, and what makes their values belong together."""
@@ -358,6 +387,8 @@ class _Resting:
             yield from (h for clause in node.guarantees for h in self.guarantee(node.name, clause.name))
             yield from (self.discharging(node.name, clause.name) for clause in node.assumptions)
         yield from (self.composed(f"environment.{assumed.port}") for assumed in frame.assumed)
+        constants = (entry for entry in frame.system.plan.environment if entry.constant)
+        yield from (self.composed(f"environment.{entry.constancy}") for entry in constants)
         yield from self.together(frame.graph.nodes, None, optional=True)
 
     def needed(self, need: Needed, goal: str | None) -> Iterable[Hypothesis]:

@@ -38,9 +38,7 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
     text = edge.initial
     as_value = f"out.{port.name} == ({text})"
     about_it = f"out.{port.name}" in text
-    attempts = [text] if about_it else [as_value, text]
-    if port.sort == BOOL and not about_it:
-        attempts = [as_value]
+    attempts = [text] if about_it else [as_value] if port.sort == BOOL else [as_value, text]
     failures: list[Rejected] = []
     for attempt in attempts:
         try:
@@ -53,9 +51,7 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
             return term
         failures.append(Rejected(_speaks_of(edge, foreign[0])))
     what = "; ".join(d.message for d in failures[0].diagnostics)
-    message = (
-        f"{text!r} is neither a value of {edge.source} ({port.type_name}) nor a formula about out.{port.name}: {what}"
-    )
+    message = f"{text!r} is no value of {edge.source} ({port.type_name}), nor a formula about out.{port.name}: {what}"
     raise Rejected(Diagnostic("PLAN112", message, edge.initial_span))
 
 
@@ -136,8 +132,7 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
             given = graph.by_target.get(Endpoint(entry.node, port))
             if given is not None and (given.source != given.target or not given.delayed):
                 message = f"nodes.{entry.node}.memory: in.{port} is what the program keeps, but {given} feeds it"
-                hint = f"connect {entry.node}.{port} to itself with `delayed: true`, or take it out of `memory`"
-                faults.append(Diagnostic("PLAN110", message, given.span or entry.span, hint=hint))
+                faults.append(Diagnostic("PLAN110", message, given.span or entry.span, hint="take it out of `memory`"))
     for requirement in system.plan.requirements:
         try:
             if requirement.formula is not None:

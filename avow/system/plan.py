@@ -88,9 +88,16 @@ class EnvironmentInput:
     span: Span | None = field(default=None, compare=False, repr=False)
     constant: bool = False
     """Whether its value is the same at every step (a map, a setting)."""
+    stays: str = ""
+    """Why it may be believed to be."""
     assume_span: Span | None = field(default=None, compare=False, repr=False)
     taken_in: bool = False
     """Whether another system's plan says it, which is a subsystem here (`avow.system.include`)."""
+
+    @property
+    def constancy(self) -> str:
+        """What the claim that it does not change is called, and the plan's place for its words."""
+        return f"{self.port}.constant" if self.assume else self.port
 
 
 @dataclass(frozen=True, slots=True)

@@ -239,6 +239,7 @@ class _PlanReader:
                 piece.said("because"),
                 piece.span,
                 constant is not None and constant.value is not False,
+                piece.said(*(("because",) if assume is None else ("constant", "because"))) or "",
                 assume.span if assume else None,
             )
 

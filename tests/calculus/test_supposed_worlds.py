@@ -108,3 +108,41 @@ def test_a_condition_that_no_run_of_the_environment_meets_is_found(name: str, tm
     assert all(outcome.vacuous and "n.g" in outcome.summary for outcome in found)
     free = asked({p: f"in.{p} == in.{p}" for p in assumed}, tmp_path / "free")
     assert not any(outcome.vacuous for outcome in free)
+
+
+CONSTANT = {
+    "that it changes": ("in.k != previous(in.k, in.k) -> out.y", True),
+    "that it changed once": ("once(changed(in.k)) -> out.y", True),
+    "that it is another than it was": ("(in.k > 3 and previous(in.k < 2, FALSE)) -> out.y", True),
+    "what it is": ("in.k > 3 -> out.y", False),
+    "that another input changes": ("changed(in.x) -> out.y", False),
+}
+
+
+@pytest.mark.parametrize("assumed", ["", "assume: 'in.k > 0', "])
+@pytest.mark.parametrize("name", CONSTANT)
+def test_that_an_input_is_constant_is_a_claim_of_its_own(name: str, assumed: str, tmp_path: Path) -> None:
+    guarantee, vacuous = CONSTANT[name]
+    text = node("n", "k : INTEGER, x : BOOL", "y : BOOL", f"G g: {guarantee}")
+    answers = outcomes(make(tmp_path, text, f"environment: {{in.k: {{{assumed}constant: true, because: so}}}}\n"))
+    found = answers["environment.in.k.constant" if assumed else "environment.in.k"]
+    assert found.vacuous is vacuous
+    assert found.verdict is Verdict.JUSTIFIED
+
+
+RESTS = {
+    "of itself": ("n.k == previous(n.k, n.k)", True),
+    "through a guarantee": ("n.y == previous(n.y, n.y)", True),
+    "not at all": ("n.z -> n.x", False),
+}
+
+
+@pytest.mark.parametrize("name", RESTS)
+def test_what_is_proved_from_an_input_that_is_constant_rests_on_that(name: str, tmp_path: Path) -> None:
+    formula, rests = RESTS[name]
+    text = node("n", "k : INTEGER, x : BOOL", "y : INTEGER, z : BOOL", "G g: out.y == in.k", "G h: out.z -> in.x")
+    plan = "environment: {in.k: {constant: true, because: so}}\n"
+    plan += f"requirements: {{R: {{text: it holds, formula: '{formula}'}}}}\n"
+    found = outcomes(make(tmp_path, text, plan))["R"]
+    assert found.verdict is Verdict.PROVED
+    assert any(h.name.endswith("environment.in.k") for h in found.rests_on) is rests

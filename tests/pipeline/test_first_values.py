@@ -49,6 +49,7 @@ CLANG = [
     pytest.mark.slow,
     pytest.mark.skipif(not (clang().present and traces()), reason="clang++ or strace is not here"),
 ]
+_MARKS: Mapping[str, list[pytest.MarkDecorator]] = {"fuzz": CLANG, "hypothesis": [pytest.mark.slow]}
 METHODS: Mapping[str, Mapping[str, int]] = {"python": {}, "hypothesis": {"cases": 60}, "fuzz": {"runs": 200}}
 FITS: dict[str, tuple[str, str, int]] = {
     "a number": ("2", "idle", 2),
@@ -94,9 +95,12 @@ def asked(folder: Path, method: str) -> Report:
 
 
 def with_each(cases: Iterable[str]) -> list[Any]:
-    """C++ is compiled for one of them."""
+    """C++ is compiled for one of them; a few seconds of tests in Python are enough for every run."""
     pairs = [(method, name) for name in cases for method in METHODS if method != "fuzz" or name == "a number"]
-    return [pytest.param(*pair, marks=CLANG if "fuzz" in pair else []) for pair in pairs]
+    return [
+        pytest.param(*pair, marks=_MARKS.get(pair[0], []) if pair != ("hypothesis", "a number") else [])
+        for pair in pairs
+    ]
 
 
 @pytest.mark.parametrize(("method", "name"), with_each(DIFFERS))
