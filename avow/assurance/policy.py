@@ -326,10 +326,15 @@ def _unknown(
     ]
 
 
+def packaged(name: str) -> Any:
+    """The data of a YAML file in this package."""
+    text = resources.files("avow.assurance").joinpath(name).read_text(encoding="utf-8")
+    return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+
+
 @cache
 def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
-    text = resources.files("avow.assurance").joinpath("profiles.yaml").read_text(encoding="utf-8")
-    data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # a file of ours, in the package
+    data = packaged("profiles.yaml")
     faults: list[Diagnostic] = []
     policies = {}
     for name, raw in data["profiles"].items():

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from importlib import resources
 from typing import TYPE_CHECKING
 
-import yaml
-
+from avow.assurance.policy import packaged
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Object
@@ -111,11 +109,6 @@ class StandardView:
         return ", ".join(f"{many} {state}" for state, many in found.items())
 
 
-def standards() -> Mapping[str, tuple[str, tuple[Objective, ...]]]:
-    """Name of a standard → its title and its objectives."""
-    return _data()
-
-
 def standard_view(
     name: str,
     level: str,
@@ -125,7 +118,7 @@ def standard_view(
     hazards: Sequence[HazardView],
 ) -> StandardView:
     """The objectives of a standard at a level, held against a case. `gates`: all but that of the standard itself."""
-    title, objectives = _data()[name]
+    title, objectives = standards()[name]
     queries = _Queries(gates, requirements, views, hazards)
     found = []
     for objective in objectives:
@@ -257,9 +250,8 @@ def _named(what: str, names: Sequence[str]) -> str:
 
 
 @cache
-def _data() -> Mapping[str, tuple[str, tuple[Objective, ...]]]:
-    text = resources.files("avow.assurance").joinpath("standards.yaml").read_text(encoding="utf-8")
-    data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # a file of ours, in the package
+def standards() -> Mapping[str, tuple[str, tuple[Objective, ...]]]:
+    """Name of a standard → its title and its objectives."""
     return {
         name: (
             raw["title"],
@@ -274,5 +266,5 @@ def _data() -> Mapping[str, tuple[str, tuple[Objective, ...]]]:
                 for o in raw["objectives"]
             ),
         )
-        for name, raw in data.items()
+        for name, raw in packaged("standards.yaml").items()
     }

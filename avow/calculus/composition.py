@@ -257,13 +257,19 @@ class Composition:
                 }
                 ports |= dict.fromkeys(entries.values())
                 clauses[label] = substitute(formula, entries)
-            for v in ports if any(map(histories, clauses.values())) else ():  # else each step may be as the first
-                if {f"in.{v.name}", v.name} & flat.constants and not isinstance(v.sort, FunctionSort):
-                    clauses[f"constant {v.name}"] = Not(History(Past.CHANGED, (v,), BOOL))
+            if any(map(histories, clauses.values())):  # else each step may be as the first
+                clauses |= {c.name: c.formula for c in self._unchanging({v.name: v for v in ports})}
             inputs = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in ports)
             assumed = (Clause(ClauseKind.ASSUMPTION, label, 0, f) for label, f in clauses.items())
             self._surroundings = Node("environment", inputs, (), (), tuple(assumed), ())
         return self._surroundings
+
+    def _unchanging(self, entries: Mapping[str, Variable]) -> Iterator[Clause]:
+        """For each of these inputs of the environment that is constant, that it never changes."""
+        for name, variable in entries.items():
+            if {f"in.{name}", name} & self.frame.constants and not isinstance(variable.sort, FunctionSort):
+                same = Not(History(Past.CHANGED, (variable,), BOOL))
+                yield Clause(ClauseKind.ASSUMPTION, f"constant {name}", 0, same)
 
     def lasting(self, bounds: Bounds) -> SanityResult:
         """Whether an environment can meet for ever all that is assumed of it."""
@@ -293,10 +299,7 @@ class Composition:
             ports = {v: own[v.name] for v in ports_of(clause.formula) if v.name in own}
             if ports and len(ports) == len(set(ports_of(clause.formula))):
                 assumed.append(replace(clause, formula=substitute(clause.formula, ports)))
-        for entry, variable in own.items():
-            if {f"in.{entry}", entry} & self.frame.constants and not isinstance(variable.sort, FunctionSort):
-                same = Not(History(Past.CHANGED, (variable,), BOOL))
-                assumed.append(Clause(ClauseKind.ASSUMPTION, f"constant {entry}", 0, same))
+        assumed += self._unchanging(own)
         over_runs = [clause.name for clause in (*assumed, *node.guarantees) if histories(clause.formula)]
         if not assumed or not over_runs:
             return ()

@@ -120,6 +120,9 @@ Sort = (
     | SetSort
 )
 
+NotScalar = StringSort | DataSort | OpaqueSort | FunctionSort | TupleSort | SequenceSort | SetSort
+"""Sorts whose values are no single truth value, number or element."""
+
 BOOL = BoolSort()
 REAL = RealSort()
 INTEGER = IntegerSort()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -31,9 +31,8 @@ from avow.calculus.composition import composed
 from avow.calculus.notation import Written, write_goal
 from avow.calculus.obligations import discharged_by
 from avow.evidence.continuity import continuity
-from avow.evidence.currency import as_of_now
 from avow.evidence.heads import index_path, read_index
-from avow.evidence.ledger import Ledger, ledger_of
+from avow.evidence.ledger import Entry, Ledger, ledger_of
 from avow.evidence.record import CASE, RETRY
 from avow.evidence.signing import private_key
 from avow.pipeline import check as checking
@@ -77,13 +76,14 @@ def render(state: State, surveyed: Survey) -> Result:
     """Build the case and write every format, unless the files in reports/ already say the same."""
     system, ledger = surveyed.system, _ledger(state, surveyed)
     acknowledge(state.workspace, ledger)
-    key = _key(state, surveyed)
+    basis = _basis(state, surveyed, ledger)
+    key = _key(state, surveyed, basis)
     known = read_note(Rendering, _stamp(state, surveyed))
     root = state.workspace.root
     if known is not None and known.key == key and all(is_intact(root / p, sha) for p, sha in known.files.items()):
         result = known.result
     else:
-        case = build(state, surveyed)
+        case = build(state, surveyed, basis)
         state.cases[surveyed.system.name] = key, case
         written = render_all(case, state.workspace.report(surveyed.system.name), signing_key())
         result = _summarise(state, surveyed, case)
@@ -126,25 +126,23 @@ def gate(state: State, surveyed: Survey) -> TaskError | bool:
 
 def case_of(state: State, surveyed: Survey) -> Case:
     """The case that the report was made from, if it is current; otherwise a new one. Raises Rejected."""
-    made = state.cases.get(surveyed.system.name)
-    return made[1] if made is not None and made[0] == _key(state, surveyed) else build(state, surveyed)
+    made, basis = state.cases.get(surveyed.system.name), _basis(state, surveyed, _ledger(state, surveyed))
+    return made[1] if made is not None and made[0] == _key(state, surveyed, basis) else build(state, surveyed, basis)
 
 
-def build(state: State, surveyed: Survey) -> Case:
+def build(state: State, surveyed: Survey, basis: _Basis) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
-    system, workspace = surveyed.system, state.workspace
-    ledger = ledger_of(workspace.ledger(system.name))
+    system, workspace, ledger = surveyed.system, state.workspace, basis.ledger
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
     files = (*plan.contract_files, plan.path, *plan.included)
-    entries = counting_now(ledger, workspace.root, system, state.run)
     texts = {workspace.relative(path): read_regular(path) for path in files}
     return conclude(
         facts_of_system(
             system,
             surveyed.catalogue.obligations,
-            entries,
-            keys={**surveyed.keys, **_given_up(state, surveyed, ledger)},
+            basis.entries,
+            keys=basis.keys,
             today=_today(),
             run=RunInfo(
                 state.run.id,
@@ -169,19 +167,33 @@ def build(state: State, surveyed: Survey) -> Case:
             graph_svg=_picture(system),
             sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
             baseline=newest_signed(workspace.signed, system.name)[0],
-            kernel=kernel_run(entries, workspace.root, system, state.run),
+            kernel=kernel_run(basis.entries, workspace.root, system, state.run),
             recorded=ledger.records(),
         )
     )
 
 
-def _given_up(state: State, surveyed: Survey, ledger: Ledger) -> dict[tuple[str, str], str]:
+@dataclass(frozen=True, slots=True)
+class _Basis:
+    """What a report is made of besides the texts: the ledger's entries as they count now, and the keys asked for."""
+
+    ledger: Ledger
+    entries: tuple[Entry, ...]
+    keys: Mapping[tuple[str, str], str]
+
+
+def _basis(state: State, surveyed: Survey, ledger: Ledger) -> _Basis:
+    root = state.workspace.root
+    entries = counting_now(ledger, root, surveyed.system, state.run)
+    return _Basis(ledger, entries, {**surveyed.keys, **_given_up(surveyed, entries, root)})
+
+
+def _given_up(surveyed: Survey, entries: Sequence[Entry], root: Path) -> dict[tuple[str, str], str]:
     """Refutations by a counterexample, of claims and files as they are now, by methods that the plan no longer has.
     Removing a method from the plan does not remove its refutation; repairing the program does."""
     found: dict[tuple[str, str], str] = {}
-    root = state.workspace.root
     planned, now = surveyed.keys, {o.id: o.digest for o in surveyed.catalogue.obligations}
-    for entry in as_of_now(ledger, state.workspace.root):
+    for entry in entries:
         record = entry.evidence
         pair = (record.obligation, record.method)
         refuted = CASE in record.details and now.get(record.obligation) == record.obligation_digest
@@ -215,22 +227,19 @@ def _today() -> date:
     return datetime.now().astimezone().date()
 
 
-def _key(state: State, surveyed: Survey) -> str:
+def _key(state: State, surveyed: Survey, basis: _Basis) -> str:
     """The report depends on the texts, the plan, all evidence, the day (reviews and accepted risks expire), and what is
     installed: a format that was left out is written once its tool is installed."""
-    ledger = _ledger(state, surveyed)
-    asked = {**surveyed.keys, **_given_up(state, surveyed, ledger)}
-    keys = sorted((*pair, key) for pair, key in asked.items())
+    ledger, entries = basis.ledger, basis.entries
+    keys = sorted((*pair, key) for pair, key in basis.keys.items())
     damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
     explain = os.environ.get(EXPLAIN, "")
-    root = state.workspace.root
-    entries = counting_now(ledger, root, surveyed.system, state.run)
     earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(state, surveyed)]
     key = signing_key()
     signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
-    kernel = kernel_run(entries, root, surveyed.system, state.run)
+    kernel = kernel_run(entries, state.workspace.root, surveyed.system, state.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     tools = [[tool.name, tool.version, tool.install] for tool in _tools()]
     told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]

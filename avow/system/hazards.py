@@ -21,7 +21,7 @@ from avow.base.files import inside, read_regular
 from avow.base.plain import bare
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
-from avow.system.plan import Hazard, Plan
+from avow.system.plan import Hazard, Located, Plan
 from avow.system.schema import violations
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -116,23 +116,12 @@ def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic
         for field in ("severity", "exposure", "kind"):
             values |= {field: values[field].lower()} if field in values else {}
         name = values.pop("id", "")
-        piece = _piece({name: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}}, span)
-        wrong = violations(piece.located(), _schema(), "the table")
+        entry = {name: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}}
+        wrong = violations(Located(entry, span), _schema(), "the table")
         faults += wrong
         if not wrong:
             found.append(_hazard(name, values, span))
     return tuple(found), tuple(faults)
-
-
-def _piece(data: Any, span: Span) -> Piece:
-    """Plain data as if all of it had been read at one place."""
-    match data:
-        case dict():
-            return Piece(span, entries={key: _piece(value, span) for key, value in data.items()})
-        case list():
-            return Piece(span, items=[_piece(value, span) for value in data])
-        case _:  # a text
-            return Piece(span, data, str(data))
 
 
 def _hazard(name: str, values: Mapping[str, Any], span: Span) -> Hazard:

@@ -120,6 +120,8 @@ def _port(port: Port, k: int, reading: Reading) -> str:
 
 
 def sort_name(sort: s.Sort) -> str:
+    if isinstance(sort, s.NotScalar):  # refused when the source is read
+        raise TypeError(f"{sort} is no machine value")
     match sort:
         case s.BoolSort():
             return "truth"
@@ -129,17 +131,6 @@ def sort_name(sort: s.Sort) -> str:
             return "element"
         case s.RealSort():
             return "real"
-        case (
-            s.StringSort()
-            | s.DataSort()
-            | s.OpaqueSort()
-            | s.FunctionSort()
-            | s.TupleSort()
-            | s.SequenceSort()
-            | s.SetSort()
-        ):
-            # refused when the source is read
-            raise TypeError(f"{sort} is no machine value")
         case _:
             assert_never(sort)
 

@@ -24,6 +24,8 @@ from .whole_file import Parts, Refusal, bound_names, plain_arguments
 
 def kind_of(sort: s.Sort) -> Kind | None:
     """What a value of the sort is in Python; None: nothing that a step may have."""
+    if isinstance(sort, s.NotScalar):
+        return None
     match sort:
         case s.BoolSort():
             return Kind.BOOL
@@ -33,17 +35,6 @@ def kind_of(sort: s.Sort) -> Kind | None:
             return Kind.INT
         case s.EnumSort():
             return Kind.TEXT
-        case (
-            s.StringSort()
-            | s.DataSort()
-            | s.OpaqueSort()
-            | s.FunctionSort()
-            | s.TupleSort()
-            | s.SequenceSort()
-            | s.SetSort()
-        ):
-            # held by no number, truth value or text
-            return None
         case _:
             assert_never(sort)
 

@@ -115,21 +115,9 @@ def constant(value: Value, sort: s.Sort) -> Symbol:
 
 def blank(sort: s.Sort) -> Symbol:
     """What stands in the places of a value that is not there."""
-    match sort:
-        case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.EnumSort():
-            return Scalar(Number(Fraction(0)))
-        case (
-            s.StringSort()
-            | s.DataSort()
-            | s.OpaqueSort()
-            | s.FunctionSort()
-            | s.TupleSort()
-            | s.SequenceSort()
-            | s.SetSort()
-        ):
-            raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
-        case _:
-            assert_never(sort)
+    if isinstance(sort, s.NotScalar):
+        raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
+    return Scalar(Number(Fraction(0)))
 
 
 def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
