@@ -47,7 +47,7 @@ from avow.assurance.findings import handle
 from avow.assurance.first_screen import answers, weakest_of, with_signature
 from avow.assurance.gap import independent, missing_tools
 from avow.assurance.gates import exit_code, gates, suggestion_for
-from avow.assurance.hazards import hazard_views
+from avow.assurance.mitigated import hazard_views
 from avow.assurance.model import (
     Case,
     Currency,
@@ -139,7 +139,7 @@ def conclude(facts: Facts) -> Case:
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)
     grade, reason = _grade(facts, proofs)
-    hazards = hazard_views(facts.hazards, requirements, views, relied, facts.nodes)
+    hazards = hazard_views(facts.hazards, requirements, by_id, relied, closure, supposed, titles, said.judge)
     found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh)
     standard = None
     if facts.policy.standard:

@@ -20,7 +20,11 @@ _WORDS = {
         "Nobody has read the sentence against the formula (`avow validate`).",
     ),
     "models": ("guarantee{s} shown of a model only", "of models", "What runs may differ from the model."),
-    "bounded": ("derived within bounds only", "bounded", "Nothing is said outside the finite scenario."),
+    "bounded": (
+        "requirement{s} within bounds only",
+        "bounded",
+        "Nothing is said outside the finite scenario or model that was searched.",
+    ),
     "unowned": (
         "assumption{s} without owner or date",
         "without owner",

@@ -85,7 +85,7 @@ def _because(case: Case, r: RequirementView) -> str:
         case Level.REFUTED:
             return "Refuted: the contracts allow a counterexample."
         case _:  # every other level is derived
-            within = " within the plan's finite scenario, and nothing outside it" if r.bounded else ""
+            within = ", within finite bounds that the evidence names" if r.bounded else ""
             return f"{str(r.level).capitalize()}: {MEANINGS[r.level]}. A tool derived it{within}."
 
 

@@ -43,6 +43,11 @@ class Relied:
     scenario: frozenset[str] = frozenset()
     """Those of them that are limits of the plan's scenario."""
 
+    @property
+    def bounded(self) -> bool:
+        """Whether nothing is said outside a finite scenario or model."""
+        return self.status is Status.CHECKED or any(h.kind is HypothesisKind.BOUND for h in self.record.rests_on)
+
 
 Opinion = Callable[[str, str], Judged]
 """(method, hypothesis) → what is thought of it."""

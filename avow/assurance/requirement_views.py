@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from avow.assurance.answers import Assumption, Level, Tone, WeakestEvidence
@@ -65,10 +65,11 @@ def held(
     mine = [s for s in supposed if view.id in s.needed_by]
     expired = any(s.expired for s in mine)
     fails = not view.status.supports or closed.failing or view.unknown_names or expired
-    level = Level.NOT_SHOWN if fails or not view.validated else _level(view, closed, views, relied)
+    level = level_of(closed.claims, views, relied) if view.formal else Level.ARGUED
+    level = Level.NOT_SHOWN if fails or not view.validated else level
     if view.status in (Status.REFUTED, Status.CONTRADICTORY):
         level = Level.REFUTED
-    bounded = any(views[name].status is not Status.PROVED for name in view.obligations)
+    bounded = any(views[n].status is not Status.PROVED for n in view.obligations) or is_bounded(closed.claims, relied)
     rate = rate_of(view.obligations, closed.claims, views)
     awaits = level is Level.NOT_SHOWN and not fails
     return replace(
@@ -95,15 +96,18 @@ def _with_level(view: RequirementView, level: Level, rate: RateView | None, *, a
     return " ".join(part for part in parts if part)
 
 
-def _level(
-    view: RequirementView, closed: Closed, views: Mapping[str, ObligationView], relied: Mapping[str, Relied]
-) -> Level:
-    """The least that lies below a requirement that holds. What a person answers for in the composition is among the
-    assumptions; agreement of a program with its model is said of the model."""
-    below = [(views[name].obligation.kind, relied[name]) for name in closed.claims if name in relied]
+def is_bounded(claims: Iterable[str], relied: Mapping[str, Relied]) -> bool:
+    """Whether some claim is shown only within a finite scenario or model."""
+    return any(relied[name].bounded for name in claims if name in relied)
+
+
+def level_of(claims: Iterable[str], views: Mapping[str, ObligationView], relied: Mapping[str, Relied]) -> Level:
+    """The least of claims that hold. What a person answers for in the composition is among the assumptions; agreement
+    of a program with its model is said of the model."""
+    below = [(views[name].obligation.kind, relied[name]) for name in claims if name in relied]
     leaves = [found for kind, found in below if kind in (Kind.GUARANTEE, Kind.REQUIREMENT)]
     statuses = {found.status for found in leaves}
-    if not view.formal or statuses & {Status.REVIEWED, Status.JUSTIFIED}:
+    if statuses & {Status.REVIEWED, Status.JUSTIFIED}:
         return Level.ARGUED
     if statuses & {Status.TESTED, Status.MONITORED}:
         return Level.TESTS

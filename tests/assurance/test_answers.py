@@ -25,7 +25,7 @@ from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Object, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
-from avow.system.plan import EnvironmentInput, Requirement, Statement, System
+from avow.system.plan import EnvironmentInput, Hazard, Requirement, Statement, System
 
 NODES = {"a": ["g", "h"], "b": ["g"]}
 GUARANTEES = [guarantee(node, name) for node, names in NODES.items() for name in names]
@@ -36,6 +36,10 @@ ALWAYS = [Statement(place, "It is so", "", *OWNED) for place in (PLATFORM, TOOLS
 PLANS = [node_plan(node, "low", *METHODS) for node in NODES]
 PROSE = Requirement("R", "It is safe.", None, None, ("a", "b"))
 FORMAL = Requirement("R", "It is safe.", "a.x > 0", None, ("a", "b"))
+HAZARDS = (
+    Hazard("H", "It burns", "critical", mitigated_by=("a", "b")),
+    *(Hazard(f"H-{m}", "It burns", "critical", mitigated_by=(f"a/{m}", f"b/{m}")) for m in ("hoare", "ajpf")),
+)
 OWN = obligation(SYSTEM_LEVEL, Kind.REQUIREMENT, "R", clauses=("a.g", "a.h", "b.g"))
 
 
@@ -44,10 +48,13 @@ def subject(requirement: Requirement, statements: Sequence[Statement] = (), **ot
     return replace(made, plan=replace(made.plan, statements=tuple(statements)))
 
 
-def build(records: Sequence[Evidence], statements: Sequence[Statement] = (), *, formal: bool) -> Case:
+def build(
+    records: Sequence[Evidence], statements: Sequence[Statement] = (), *, formal: bool, hazards: Sequence[Hazard] = ()
+) -> Case:
     more = [OWN] if formal else []
     derived = [evidence(OWN, method="compose")] if formal else []
     made = subject(FORMAL if formal else PROSE, statements)
+    made = replace(made, plan=replace(made.plan, hazards=tuple(hazards)))
     return case(made, [*GUARANTEES, *more], [*records, *derived])
 
 
@@ -151,7 +158,7 @@ def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_hol
 @LAW
 @given(records(), statements(), st.booleans())
 def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: list[Statement], formal: bool) -> None:
-    found = build(listed, said, formal=formal)
+    found = build(listed, said, formal=formal, hazards=HAZARDS)
     best = Level.SHOWN if formal else Level.ARGUED
     for target in GUARANTEES:
         own = [r for r in listed if r.obligation == target.id]
@@ -166,8 +173,22 @@ def test_no_verdict_is_above_what_lies_below_it(listed: list[Evidence], said: li
             least = Level.ARGUED if any(r.verdict is Verdict.REVIEWED for r in own) else Level.NOT_SHOWN
         best = max(best, least, key=list(Level).index)
     order = list(Level).index
-    assert order(found.requirements[0].level) >= order(best)
+    (asked,) = found.requirements
+    assert order(asked.level) >= order(best)
     assert order(found.answers.headline) >= order(best)
+    if asked.tone is Tone.GREEN:  # for all runs
+        proofs = {r.obligation for r in listed if r.verdict is Verdict.PROVED}
+        assert proofs >= {target.id for target in GUARANTEES}
+    if formal:  # guarantees mitigate no more than a requirement that follows from them
+        whole, *by_method = found.hazards
+        assert order(whole.level) >= order(asked.level)
+        assert whole.tone.rank <= asked.tone.rank
+        for hazard in by_method:
+            method = hazard.hazard.id.removeprefix("H-")
+            said_so = {r.obligation for r in listed if r.method == method and r.verdict.supports}
+            assert not hazard.level.holds or (asked.level.holds and said_so >= {target.id for target in GUARANTEES})
+            late = any(a.expired and a.key.startswith(f"assumptions.{method}.") for a in found.assumptions)
+            assert not (hazard.level.holds and late)
 
 
 def test_the_words_of_verdicts_are_those_of_the_docs() -> None:
@@ -271,6 +292,11 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
         "a",
         "10 cases, none failed (confidence not recorded: at most 30 % fail)",
     )
+    named = ("b", "b.g", "b/hoare")
+    hazards = tuple(Hazard(name, "It burns", "critical", mitigated_by=(name,)) for name in named)
+    made = replace(made, plan=replace(made.plan, hazards=hazards))
+    assert {hazard.level for hazard in case(made, listed, given_).hazards} == {Level.TESTS}
+    assert {hazard.level for hazard in case(made, listed, given_[1:]).hazards} == {Level.NOT_SHOWN}
     lost = case(made, listed, given_[1:]).requirements[0]
     assert lost.level is Level.NOT_SHOWN
     assert lost.failing == (GUARANTEES[0].id,)

@@ -1,0 +1,83 @@
+"""Each hazard with its mitigations: how far each mitigation is shown, and the weakest of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from avow.assurance.answers import Assumption, Level, Tone
+from avow.assurance.closure import Closure
+from avow.assurance.first_screen import tone_of
+from avow.assurance.hazards import WORST_FIRST, HazardView, Mitigation
+from avow.assurance.model import ObligationView, RequirementView
+from avow.assurance.relied import Opinion, Relied, relied_upon
+from avow.assurance.requirement_views import is_bounded, level_of
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+from avow.system.plan import Hazard
+
+
+def hazard_views(
+    hazards: Iterable[Hazard],
+    requirements: Sequence[RequirementView],
+    views: Mapping[str, ObligationView],
+    relied: Mapping[str, Relied],
+    closure: Closure,
+    supposed: Sequence[Assumption],
+    titles: Mapping[str, str],
+    opinion: Opinion,
+) -> tuple[HazardView, ...]:
+    """The hazards in their order. Guarantees as mitigations are judged as a requirement that rests on them, with all
+    that they rest on and assume; `relied`: claim → the record that it relies on; `titles`: the nodes'."""
+    known = {r.id: r for r in requirements}
+
+    def mitigation(name: str) -> tuple[Mitigation, Tone]:
+        if name in known:
+            r = known[name]
+            return Mitigation(name, r.words, r.level, r.obligations), r.tone
+        node, slash, method = name.partition("/")
+        owner, _, clause = (node if slash else name).partition(".")
+        own = [
+            view
+            for view in views.values()
+            if view.obligation.kind is Kind.GUARANTEE
+            and view.obligation.node == owner
+            and clause in ("", view.obligation.name)
+            and (not slash or method in {planned for planned, _ in view.planned})
+        ]
+        level, tone = judged(
+            [view.id for view in own], {v.id: _of_method(v, method, opinion) for v in own} if slash else relied
+        )
+        title = titles.get(owner, owner)
+        words = own[0].obligation.claim if clause and own else f"{title}: {method}" if slash else title
+        return Mitigation(name, words, level, tuple(view.id for view in own)), tone
+
+    def judged(own: Sequence[str], by: Mapping[str, Relied | None]) -> tuple[Level, Tone]:
+        """How far guarantees are shown by their records `by`, and by those of all that they rest on."""
+        closed = closure.of(own)
+        mine = [s for s in supposed if not set(closed.claims).isdisjoint(s.where)]
+        found = {**relied, **{name: by[name] for name in own if name in by}}
+        taken = {name: one for name, one in found.items() if one is not None}
+        if any(views[name].standing in (Status.REFUTED, Status.CONTRADICTORY) for name in own):
+            return Level.REFUTED, Tone.RED
+        if not own or closed.failing or any(name not in taken for name in own) or any(s.expired for s in mine):
+            return Level.NOT_SHOWN, Tone.RED
+        level = level_of(closed.claims, views, taken)
+        bounded = is_bounded(closed.claims, taken) or any(taken[name] != relied[name] for name in own)
+        return level, tone_of(level, mine, bounded=bounded)
+
+    found = []
+    for hazard in hazards:
+        pairs = list(map(mitigation, hazard.mitigated_by))
+        level = min((m.level for m, _ in pairs), key=WORST_FIRST.index, default=Level.NOT_SHOWN)
+        tone = min((tone for _, tone in pairs), key=lambda t: t.rank, default=Tone.RED)
+        found.append(HazardView(hazard, tuple(m for m, _ in pairs), level, tone))
+    return tuple(found)
+
+
+def _of_method(view: ObligationView, method: str, opinion: Opinion) -> Relied | None:
+    """The record of one method that may be relied upon for a guarantee; None where an assumption of it has expired."""
+    own = tuple(item for item in view.evidence if item.entry.evidence.method == method)
+    found = relied_upon(replace(view, evidence=own), opinion)
+    late = found is not None and any(opinion(method, text).expired for text in found.assumptions)
+    return None if late else found
