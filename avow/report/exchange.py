@@ -44,8 +44,10 @@ def _result_of(case: Case) -> str:
 
 
 def _passes(case: Case, view: ObligationView) -> bool:
-    """Whether a claim passes; that of a requirement does only where the requirement itself is shown."""
-    return view.standing.supports and all(r.level.holds for r in case.requirements if view.id in r.obligations)
+    """Whether a claim passes: not one with a person's reason in place of evidence, and that of a requirement only where
+    the requirement itself is shown."""
+    holds = all(r.level.holds for r in case.requirements if view.id in r.obligations)
+    return view.standing.supports and view.status is not Status.JUSTIFIED and holds
 
 
 # -- JUnit XML ------------------------------------------------------------------------------------------------------
@@ -70,15 +72,18 @@ def _gates_suite(case: Case) -> tuple[str, list[int]]:
             failures += 1
             inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'
         rows.append(_testcase(f"{case.system}.gates", gate.title, 0.0, inside))
-    result = f'<properties><property name="result" value="{_result_of(case)}"/></properties>\n'
+    known = (("result", _result_of(case)), ("verdict", case.answers.told))
+    result = "".join(f'<property name="{name}" value={_attribute(value)}/>' for name, value in known)
     counts = [len(rows), failures, 0, sum(gate.idle and gate.passed for gate in case.gates)]
-    return f'<testsuite name="gates" {_numbers(counts)}>\n{result}{"".join(rows)}</testsuite>\n', counts
+    head = f"{_numbers(counts)}>\n<properties>{result}</properties>\n"
+    return f'<testsuite name="gates" {head}{"".join(rows)}</testsuite>\n', counts
 
 
 def _requirements_suite(case: Case) -> tuple[str, list[int]]:
     rows, counts = [], [len(case.requirements), 0, 0, 0]
     for r in case.requirements:
-        inside, message = "", f"{r.stands}: {r.answer}"
+        message = f"{r.stands}: {r.answer}"
+        inside = f"<system-out>{escape(clean(message))}</system-out>"  # of one that passes: how far it is shown
         if r.level is Level.REFUTED and not case.strict:
             counts[1] += 1
             inside = f'<failure type="refuted" message={_attribute(message)}>{escape(clean(message))}</failure>'
@@ -154,6 +159,7 @@ def render_sarif(case: Case, *, findings_only: bool = False) -> str:
         "properties": {
             "system": case.system,
             "result": _result_of(case),
+            "verdict": case.answers.told,
             "title": case.title,
             "proofs": case.grade.word,
             "ledgerHead": case.ledger_head,
@@ -253,6 +259,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
         "predicateType": "https://in-toto.io/attestation/test-result/v0.1",
         "predicate": {
             "result": result,
+            **({} if node else {"verdict": case.answers.told}),
             **({"state": EARLIER} if case.earlier else {}),
             "configuration": [{"name": f"ledger/{case.system}", "digest": {"sha256": case.ledger_head}}],
             **groups,

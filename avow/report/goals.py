@@ -69,7 +69,9 @@ class Element:
     in_context_of: tuple[str, ...] = ()
     undeveloped: bool = False
     defeated: bool = False
-    """Of a goal: a counterexample is known."""
+    """Of a goal: a counterexample is known. Of a solution: it is one."""
+    unsupported: bool = False
+    """Of a goal: what is below it does not show it."""
     label: str = ""
     """How it is known elsewhere and how it stands: ``REQ1 [shown]``."""
     believed: str = ""
@@ -143,6 +145,7 @@ class _Argument:
             (context.name,),
             not strategies,
             label=case.answers.told,
+            unsupported=not case.answers.headline.holds,
         )
         return Module(f"system-{case.system}", case.title, (top, context, *strategies, *assumptions))
 
@@ -168,6 +171,7 @@ class _Argument:
             (*module.supposes, *(c.name for c in context)),
             not supported,
             r.status is Status.REFUTED,
+            not r.level.holds,
             f"{r.id} [{r.stands}]",
         )
         return Module(f"requirement-{r.id}", r.words, (goal, *([strategy] if below else []), *context, *solutions))
@@ -183,24 +187,10 @@ class _Argument:
         return f"{rules}, then {how} of {over}" if rules else f"{how[:1].upper()}{how[1:]} of {over}"
 
     def node(self, name: str, title: str, guarantees: Sequence[ObligationView]) -> Module:
-        goals, solutions = [], list[Element]()
-        for view in guarantees:
-            found = list(self.solutions(view))
-            solutions += found
-            goals.append(
-                Element(
-                    self.guarantees[view.id],
-                    Sort.GOAL,
-                    view.obligation.claim,
-                    tuple(s.name for s in found),
-                    undeveloped=not found,
-                    defeated=view.status is Status.REFUTED,
-                    label=f"{view.obligation.name} [{view.standing}]",
-                )
-            )
+        goals, solutions = self.claims(guarantees)
         below = tuple(goal.name for goal in goals)
-        text = f"{title} keeps each of its guarantees"
-        root = Element(self.nodes[name], Sort.GOAL, text, below, undeveloped=not below)
+        text, lacking = f"{title} keeps each of its guarantees", any(goal.unsupported for goal in goals)
+        root = Element(self.nodes[name], Sort.GOAL, text, below, undeveloped=not below, unsupported=lacking)
         return Module(f"node-{name}", title, (root, *goals, *solutions))
 
     # -- general questions ---------------------------------------------------------------------------------------------
@@ -281,6 +271,7 @@ class _Argument:
                     f"The hazard is mitigated: {hazard.text}",
                     tuple(dict.fromkeys(below)),
                     undeveloped=not below,
+                    unsupported=not view.level.holds,
                     label=f"{hazard.id} [{view.level}; {hazard.severity}]",
                 )
             )
@@ -299,7 +290,7 @@ class _Argument:
     ) -> Module:
         """`whole`: whether nothing is missing below the goal. `goals`: the elements directly below it, if not all."""
         below = tuple(element.name for element in (elements if goals is None else goals))
-        root = Element(self.new(Sort.GOAL), Sort.GOAL, text, below, undeveloped=not below)
+        root = Element(self.new(Sort.GOAL), Sort.GOAL, text, below, undeveloped=not below, unsupported=not whole)
         label = "" if whole else "partly shown" if below else "not shown"
         return Module(name, text, (replace(root, label=label), *elements))
 
@@ -309,15 +300,17 @@ class _Argument:
         for view in views:
             found = list(self.solutions(view))
             solutions += found
+            of, own = view.obligation, self.guarantees.get(view.id)
             goals.append(
                 Element(
-                    self.new(Sort.GOAL),
+                    own or self.new(Sort.GOAL),
                     Sort.GOAL,
-                    view.obligation.claim,
+                    of.claim,
                     tuple(s.name for s in found),
                     undeveloped=not found,
                     defeated=view.status is Status.REFUTED,
-                    label=f"{view.obligation.node}: {view.obligation.name} [{view.standing}]",
+                    unsupported=not view.standing.supports,
+                    label=f"{'' if own else f'{of.node}: '}{of.name} [{view.standing}]",
                 )
             )
         return goals, solutions
@@ -325,8 +318,12 @@ class _Argument:
     # -- evidence ------------------------------------------------------------------------------------------------------
 
     def solutions(self, view: ObligationView) -> Iterator[Element]:
+        """What supports or refutes a claim: a record that does neither is no evidence."""
         for item in view.counting:
             record = item.entry.evidence
+            weight = weigh(record)
+            if weight.support is None and not weight.refuted:
+                continue
             command = wording.rerun(view, record)
             artifact = Artifact(
                 item.entry.hash, record.started, record.tool_told, command, tuple(sorted(record.outputs.items()))
@@ -335,7 +332,8 @@ class _Argument:
                 self.new(Sort.SOLUTION),
                 Sort.SOLUTION,
                 record.summary,
-                label=f"{record.method} [{weigh(record).status.value}]",
+                defeated=weight.refuted,
+                label=f"{record.method} [{weight.status.value}]",
                 believed=self.believed(view, item),
                 defeaters=tuple(self.defeaters(view, item)),
                 artifact=artifact,

@@ -91,7 +91,8 @@ class _Writer:
                 self.relation(package, "AssertedInference", about, below.supported_by, element, reasoning=f"_{name}")
             elif below.sort is Sort.SOLUTION:
                 meta = self.claim_point(package, about, below)
-                self.relation(package, "AssertedEvidence", about, (name,), element, **meta)
+                counter = "true" if below.defeated else "false"
+                self.relation(package, "AssertedEvidence", about, (name,), element, isCounter=counter, **meta)
             else:
                 self.relation(package, "AssertedInference", about, (name,), element)
         if element.in_context_of:
@@ -109,9 +110,7 @@ class _Writer:
                 f"{kind}-{name}",
                 f"{kind} {name}",
                 assertionDeclaration="asserted",
-                isCounter="false",
-                **features,
-                **more,
+                **{"isCounter": "false", **features, **more},
             )
 
     def claim_point(self, package: ET.Element, about: str, solution: Element) -> dict[str, str]:
@@ -164,4 +163,4 @@ def _declared(element: Element) -> str:
         return "assumed"
     if element.defeated:
         return "defeated"
-    return "needsSupport" if element.undeveloped else "asserted"
+    return "needsSupport" if element.undeveloped or element.unsupported else "asserted"
