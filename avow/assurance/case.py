@@ -95,6 +95,11 @@ def as_of_earlier(case: Case) -> Case:
     return conclude(replace(facts_of_case(case), earlier=True))
 
 
+def as_of(case: Case, today: date) -> Case:
+    """The same facts on another day: assumptions, reviews and accepted risks expire."""
+    return case if case.today == today.isoformat() else conclude(replace(facts_of_case(case), today=today))
+
+
 def conclude(facts: Facts) -> Case:
     """Everything that follows from the facts. Pure: same facts, same case."""
     evidence, orphans = _evidence(facts)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import click
 
+from avow.assurance.case import as_of
 from avow.assurance.codec import read_case, to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
@@ -19,6 +20,7 @@ from avow.cli.options import json_option
 from avow.evidence.ledger import Ledger, readable
 from avow.evidence.obligation import Kind
 from avow.pipeline.report_check import outdated
+from avow.pipeline.run_info import today
 from avow.report.explained import explained, left_out
 from avow.report.terminal import show_obligation
 from avow.system.names import renamed
@@ -33,8 +35,8 @@ def command(name: str, as_json: bool) -> int:
     ID is an obligation's id, whole (system/node/kind/name) or in part, a guarantee as node.name, or the name of a
     requirement, an assumption (A1, or its key), a node, a gate, an assurance deficit, a derivation, a method, an
     element of the argument (G4 of gsn.yaml), a digest, a file, a diagnostic's code, or a word such as argued. The
-    answer is the report's. Where the report is stale (the ledger, the contract, the plan or a program says something
-    else now), the answer is *not shown*: exit code 1, or 2 where the ledger cannot be read.
+    answer is the report's, as of today. Where the report is stale (the ledger, the contract, the plan, the scenario or
+    a program says something else now), the answer is *not shown*: exit code 1, or 2 where the ledger cannot be read.
     """
     place = workspace()
     cases_here = _reported_cases(place)
@@ -131,7 +133,7 @@ def _id(obligation: dict[str, str]) -> str:
 
 
 def _reported_cases(place: Workspace) -> tuple[Case, ...]:
-    """Every report in the workspace that can be read. Raises Rejected where there is none."""
+    """Every report in the workspace that can be read, concluded as of today. Raises Rejected where there is none."""
     files = sorted(place.reports.glob("*/report.json")) if place.reports.is_dir() else []
     if not files:
         raise Rejected(Diagnostic("REPORT001", f"no report under {place.reports}", hint="run `avow verify` first"))
@@ -139,9 +141,11 @@ def _reported_cases(place: Workspace) -> tuple[Case, ...]:
     faults: list[Diagnostic] = []
     for file in files:
         try:
-            found.append(read_case(file))
+            found.append(as_of(read_case(file), today()))
         except Rejected as rejected:  # of an older version: no reason not to speak of the others
             faults += rejected.diagnostics
+        except (ValueError, KeyError, OverflowError) as error:
+            faults.append(Diagnostic("REPORT002", f"{file} cannot be concluded again: {error}"))
     if not found:
         raise Rejected(*faults)
     return tuple(found)

@@ -8,7 +8,7 @@ import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from doit.exceptions import TaskError
@@ -42,6 +42,7 @@ from avow.pipeline.node_index import INDEX, write_indexes
 from avow.pipeline.plan_check import left_out
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
+from avow.pipeline.run_info import today
 from avow.pipeline.settings import EXPLAIN, asked_seconds, signing_key
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
@@ -143,7 +144,7 @@ def build(state: State, surveyed: Survey, basis: _Basis) -> Case:
             surveyed.catalogue.obligations,
             basis.entries,
             keys=basis.keys,
-            today=_today(),
+            today=today(),
             run=RunInfo(
                 state.run.id,
                 datetime.now(UTC).isoformat(timespec="seconds"),
@@ -223,10 +224,6 @@ def _tools() -> tuple[ToolInfo, ...]:
     return tuple({f.tool: ToolInfo(f.tool, f.version, f.install) for f in findings()}.values())
 
 
-def _today() -> date:
-    return datetime.now().astimezone().date()
-
-
 def _key(state: State, surveyed: Survey, basis: _Basis) -> str:
     """The report depends on the texts, the plan, all evidence, the day (reviews and accepted risks expire), and what is
     installed: a format that was left out is written once its tool is installed."""
@@ -242,7 +239,7 @@ def _key(state: State, surveyed: Survey, basis: _Basis) -> str:
     kernel = kernel_run(entries, state.workspace.root, surveyed.system, state.run)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     tools = [[tool.name, tool.version, tool.install] for tool in _tools()]
-    told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
+    told = [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(today()), __version__, explain]
     return sha256(json.dumps([*told, tools]))
 
 

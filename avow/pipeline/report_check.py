@@ -22,6 +22,7 @@ from avow.base import codec
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, read_regular, sha256
+from avow.base.tuning.shown import DIFF_REASONS
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
@@ -29,6 +30,7 @@ from avow.evidence.currency import as_of_now, changed, changed_since, not_establ
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.kernel.certificate import Certificate
+from avow.pipeline.work import engine_works
 from avow.report import ATTESTATION, PDF, formats
 from avow.report.pdf import render_pdf
 from avow.solving.apart import Both
@@ -64,11 +66,31 @@ def stale(case: Case, root: Path) -> tuple[str, ...]:
 
 
 def outdated(case: Case, path: Path, root: Path) -> tuple[str, ...]:
-    """Why a report is not current: its ledger at `path` differs, or an input of the report or of its evidence has
-    changed. Raises OSError if the ledger cannot be read."""
-    files = {name for name, mark in case.digests if (root / name).exists() and _digest(root / name) != mark}
-    changed_now = sorted(files | set(stale(case, root)))
-    return (*differences(case, path, root), *(f"{name} has changed since the report was made" for name in changed_now))
+    """Why a report is not current: its ledger at `path` differs, an input of the report or of its evidence has changed,
+    or contract and plan, if they are here, have other claims. Raises OSError if the ledger cannot be read."""
+    here = _folder(case, root).is_dir()
+    files = {name for name, mark in case.digests if here and _digest(root / name) != mark}
+    found = [f"{name} has changed since the report was made" for name in sorted(files | set(stale(case, root)))]
+    return (*differences(case, path, root), *found, *(asked_otherwise(case, root) if here and not found else ()))
+
+
+def asked_otherwise(case: Case, root: Path) -> tuple[str, ...]:
+    """The claims about contract, plan and scenario that are others than those that the report answers, or are asked by
+    another version of the engines; at most a few. No method is asked: nothing is executed."""
+    try:
+        works = engine_works(load_system(_folder(case, root)))
+    except (OSError, Rejected) as error:
+        return (f"contract or plan cannot be read: {error}",)
+    planned = {(view.id, method): key for view in case.obligations for method, key in view.planned}
+    keys = {(name, work.method): key for work in works for name, key in work.keys.items()}
+    changed = sorted({name for (name, _), key in keys.items() - planned.items()})
+    return tuple(f"{name} is not what the report answers" for name in changed[:DIFF_REASONS])
+
+
+def _folder(case: Case, root: Path) -> Path:
+    """Where the system's plan is, or would be."""
+    made_of = sorted((Path(path).name != PLAN_FILE, path) for path, _ in case.digests)
+    return (root / made_of[0][1]).parent if made_of else root
 
 
 def differences(case: Case, path: Path, root: Path) -> tuple[str, ...]:
@@ -195,9 +217,8 @@ def _kernel(case: Case, root: Path) -> Iterable[str]:
     """Checks what the report credits to the kernel, from its certificates and the contracts here."""
     if not case.kernel.established:
         return
-    made_of = sorted((Path(path).name != PLAN_FILE, path) for path, _ in case.digests)
     try:
-        composition = compose(load_system((root / made_of[0][1]).parent if made_of else root))
+        composition = compose(load_system(_folder(case, root)))
         if composition.frame.system.name != case.system:
             yield f"report.json: it names the contract of another system than {case.system}"
             return

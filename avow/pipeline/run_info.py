@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,3 +59,8 @@ def new_run(remote: Remote | None = None) -> Run:
     """A run that begins now, in this process."""
     now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3]
     return Run(f"{now}-{os.getpid()}", os.environ.get(FRESH, "") not in ("", "0"), remote=remote)
+
+
+def today() -> date:
+    """The day by which what expires is judged."""
+    return datetime.now().astimezone().date()

@@ -260,20 +260,24 @@ class Catalogue:
         raise KeyError((node, method))
 
 
+def engine_works(system: System) -> tuple[Work, ...]:
+    """The works of the core's own engines."""
+    composition = composed(system)
+    return (
+        _language_work(system),
+        *(_sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
+        compose_work(composition),
+    )
+
+
 def catalogue(system: System, offered: Offered = None, shelf: Shelf | None = None) -> Catalogue:
     """`offered`: as for `method_work`. `shelf`: a cache of what follows from the nodes' texts. Raises Rejected
     for an unknown backend, and where the plan's formulas are wrong."""
 
     if shelf is not None:
         recall(system.contract, shelf)
-    composition = composed(system)
     texts = texts_digest(system)
-    works = (
-        _language_work(system),
-        *(_sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
-        compose_work(composition),
-        *_method_works(system, offered),
-    )
+    works = (*engine_works(system), *_method_works(system, offered))
     asked = asked_seconds()
     works = tuple(
         replace(work, texts=texts, limits=replace(work.limits, seconds=asked, asked=True) if asked else work.limits)

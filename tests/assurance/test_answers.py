@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
 from avow.assurance.answers import ABOUT, MEANINGS, PLATFORM, START, TOOLS, Assumption, Level, Sort, Tone
-from avow.assurance.case import conclude_again
+from avow.assurance.case import as_of, conclude_again
 from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.deficits import _WORDS
 from avow.assurance.deficits import words_of as deficit_words
@@ -213,6 +213,7 @@ def test_past_its_last_day_an_assumption_opens_what_needs_it() -> None:
     assert good.answers.verdict == "Shown"
     late = on("2026-11-20")
     assert late.requirements[0].level is Level.NOT_SHOWN
+    assert as_of(good, TODAY + timedelta(days=1)).requirements[0].level is Level.NOT_SHOWN
     assert late.answers.verdict == "Not shown: 1 of 1 requirement"
     assert late.exit_code == 1
     (gate,) = [g for g in late.gates if g.id == "requirements"]

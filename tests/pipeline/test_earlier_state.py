@@ -91,6 +91,35 @@ def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path,
     assert len(page.read_text()) == pytest.approx(len(whole), abs=200)  # run and time differ
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("n.rcl", None),
+        ("more.rcl", "node m { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }\n"),
+        ("rows.csv", "x\n2\n"),
+        ("rows.csv", None),
+        ("plan.yaml", None),
+        ("", ""),
+    ],
+)
+def test_no_answer_is_of_what_is_no_more_asked(workspace: Path, name: str, text: str | None) -> None:
+    folder = workspace / "contracts" / "t"
+    (folder / "rows.csv").write_text("x\n1\n")
+    (folder / "plan.yaml").write_text(
+        "system: t\npolicy: reproduction\nscenario: {rows: rows.csv, domains: {in.x: rows.x}}\n"
+    )
+    avow(workspace, "verify", "t")
+    code, told = avow(workspace, "explain", "t/n/sanity/realizable")
+    assert (code, "proved" in told) == (0, True)
+    if text is None:
+        (folder / name).unlink()
+    elif name:
+        (folder / name).write_text(text)
+    code, told = avow(workspace, "explain", "t/n/sanity/realizable")
+    assert (code, "proved" in told, "not shown" in told) == ((0, True, False) if not name else (1, False, True))
+
+
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_the_audit_names_a_generated_file_that_was_edited(workspace: Path) -> None:
@@ -102,7 +131,7 @@ def test_the_audit_names_a_generated_file_that_was_edited(workspace: Path) -> No
     avow(workspace, "verify")
     contract.write_text(contract.read_text().replace("<= 1", "<= 2"))
     assert avow(workspace, "audit", "s")[0] == 0  # files of an earlier state were not edited
-    for name in ("index.md", "hypothesis/contract.json"):
+    for name in ("index.md", "hypothesis/test_n.py"):
         path = workspace / "artifacts" / "s" / "n" / name
         whole = path.read_text()
         path.write_text(whole.replace("out.y", "out.z"))

@@ -6,11 +6,12 @@ import json
 import os
 import re
 import shutil
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import pytest
-from assurance.sample import PLAN_TEXT, RCL_TEXT, case, evidence, rover_parts
+from assurance.sample import PLAN_TEXT, RCL_TEXT, TODAY, case, evidence, rover_parts
 from click.testing import CliRunner, Result
 
 from avow.assurance.compare import compare, of_case, of_ledger
@@ -46,6 +47,9 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def root(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(template, tmp_path / "w")
     monkeypatch.chdir(tmp_path / "w")
+    # the rover is made by hand: its files are no contract and no plan
+    monkeypatch.setattr("avow.pipeline.report_check.asked_otherwise", lambda *_: ())
+    monkeypatch.setattr("avow.cli.explain.today", lambda: TODAY)
     return tmp_path / "w"
 
 
@@ -198,6 +202,15 @@ def test_after_an_edit_a_report_answers_not_shown(root: Path, edited: str) -> No
         code, text = run(explain, name)
         assert (code, f"{edited} has changed since" in text) == (1, True)
         assert not {"proved", "checked", "tested", "argued"} & set(re.findall(r"\w+", text))
+
+
+def test_an_answer_is_as_of_today(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What has expired since the report was made is not shown."""
+    names: list[int] = []
+    for day in (TODAY, date(2100, 1, 1)):
+        monkeypatch.setattr("avow.cli.explain.today", lambda day=day: day)
+        names.append(run(explain, "accepted")[1].count("was accepted by"))
+    assert names[0] < names[1]
 
 
 @pytest.mark.parametrize("how", ["fifo", "folder", "cut", "gone", "edited"])
