@@ -68,6 +68,10 @@ def trace(case: Case) -> tuple[Row, ...]:
     derivations = {derivation_claim(d.derivation.name): d for d in case.derivations}
     requirements = {requirement_claim(r.id): r for r in case.requirements}
     views = {view.id: view for view in case.obligations}
+    mitigating: dict[str, dict[str, None]] = {}
+    for hazard in case.hazards:
+        for name in (name for m in hazard.mitigations for name in (m.name, *m.claims)):
+            mitigating.setdefault(name, {})[hazard.hazard.id] = None
     for requirement in case.requirements:
         before = len(rows)
         seen: set[str] = set()
@@ -93,9 +97,8 @@ def trace(case: Case) -> tuple[Row, ...]:
         if len(rows) == before:
             rows.append(Row(remark="orphan: nothing supports this requirement"))
         rows += [Row(remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names]
-        hazards = ", ".join(v.hazard.id for v in case.hazards if requirement.id in v.hazard.mitigated_by)
-        named = {"source": requirement.source, "hazards": hazards, "requirement": requirement.id}
-        rows[before:] = [replace(row, level=requirement.level, **named) for row in rows[before:]]
+        named = {"source": requirement.source, "level": requirement.level, "requirement": requirement.id}
+        rows[before:] = [replace(row, **named) for row in rows[before:]]
     for view in case.guarantees:
         if view.id not in reached:
             rows += _rows(view, "", "orphan: serves no requirement")
@@ -114,7 +117,12 @@ def trace(case: Case) -> tuple[Row, ...]:
         )
         for entry in case.orphans
     ]
-    return tuple(rows)
+    rows = [
+        replace(row, hazards=", ".join(mitigating.get(row.requirement, {}) | mitigating.get(row.obligation, {})))
+        for row in rows
+    ]
+    bare = [view.hazard.id for view in case.hazards if not view.mitigations]
+    return (*rows, *(Row(hazards=name, remark="orphan: nothing mitigates this hazard") for name in bare))
 
 
 def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[Row]:

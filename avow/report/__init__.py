@@ -2,7 +2,7 @@
 
     render_all(case, folder)            writes index.html argument.html claims.html report.json report.md comment.md
                                         report.sarif findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg
-                                        sacm.xml traceability.html traceability.csv
+                                        sacm.xml traceability.html traceability.csv traceability.reqif
     pdf.write_pdf(case, folder)         writes report.pdf, on demand: Typst needs longer than all others together
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
@@ -20,7 +20,7 @@ from avow.assurance.model import Case
 from avow.assurance.traceability import Row, to_csv, trace
 from avow.base.files import sha256, write
 from avow.evidence.envelope import seal_lines
-from avow.report import answers_page, exchange, gsn, gsn_svg, markdown, page, sacm, short
+from avow.report import answers_page, exchange, gsn, gsn_svg, markdown, page, reqif, sacm, short
 
 ATTESTATION = "attestation.jsonl"
 PDF = "report.pdf"
@@ -63,8 +63,8 @@ def _formats(case: Case) -> Iterator[tuple[str, str]]:
     yield "gsn.yaml", gsn.render_gsn(case)
     yield "gsn.svg", gsn_svg.draw(case)
     yield "sacm.xml", sacm.render_sacm(case)
-    yield "sacm.xml", sacm.render_sacm(case)
     yield "traceability.csv", to_csv((*told, *rows))
+    yield "traceability.reqif", reqif.render_reqif(case, rows)
     yield "traceability.html", page.render_traceability(case, rows)
 
 

@@ -20,7 +20,18 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.language.contract import Clause, ClauseKind, Contract, Node
 from avow.language.terms import TRUE
-from avow.system.plan import EnvironmentInput, Finding, Located, Method, NodePlan, Plan, Requirement, System, Validation
+from avow.system.plan import (
+    EnvironmentInput,
+    Finding,
+    Hazard,
+    Located,
+    Method,
+    NodePlan,
+    Plan,
+    Requirement,
+    System,
+    Validation,
+)
 
 TODAY = date(2026, 11, 21)
 SPAN = Span("contracts/rover/plan.yaml", 1, 1, 1, 1)
@@ -100,6 +111,7 @@ def system(
     accepted: Sequence[Finding] = (),
     environment: Sequence[EnvironmentInput] = (),
     title: str = "A rover",
+    hazards: Sequence[Hazard] = (),
 ) -> System:
     located = Located(policy, SPAN)
     return System(
@@ -121,6 +133,7 @@ def system(
             tuple(accepted),
             (),
             (),
+            hazards=tuple(hazards),
         ),
         Contract((), (), (), tuple(Node(n, (), (), (), (), tuple(clause(g) for g in gs)) for n, gs in nodes.items())),
     )

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, node_plan, obligation, rover_case, system
+from reqif.parser import ReqIFParser
 
 from avow.assurance.model import Gate
 from avow.assurance.naming import short
@@ -24,7 +25,8 @@ from avow.report.markdown import render_markdown
 from avow.report.page import render_page
 from avow.report.wording import bound_text, gate_line, tone, tool_command
 from avow.sanity.claims import Property
-from avow.system.plan import Requirement, Validation
+from avow.system.plan import Hazard, Requirement, Validation
+from report.test_reqif import values as reqif_values
 
 
 @pytest.mark.parametrize("about", Property)
@@ -94,10 +96,13 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
     own = obligation("system", Kind.REQUIREMENT, "Q", clauses=("agent.g2",))
     records = [record, evidence(second, of=Object.SOURCE), evidence(own, method="compose")]
     plans = [node_plan("agent", "low", "hoare", "review")]
-    found = make_case(system({"agent": ["g1", "g2"]}, plans=plans, requirements=asked), [first, second, own], records)
+    hazards = [Hazard("H1", "It burns", "critical", mitigated_by=("R",)), Hazard("H2", "It drifts", "marginal")]
+    subject = system({"agent": ["g1", "g2"]}, plans=plans, requirements=asked, hazards=hazards)
+    found = make_case(subject, [first, second, own], records)
     made = {name: text for name, text in formats(found) if isinstance(text, str)}
     claims = {view.id: view.standing.value for view in found.obligations}
     levels = {r.id: r.level.value for r in found.requirements}
+    dangers = {view.hazard.id: view.level.value for view in found.hazards}
     passing = {v.id for v in found.obligations if v.standing.supports and v.status is not Status.JUSTIFIED} - (
         set() if found.requirements[1].level.holds else {own.id}
     )
@@ -107,9 +112,13 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
         view.obligation.name: claims[view.id] for view in found.obligations
     }
     assert {r["id"]: r["level"] for r in data["requirements"]} == levels
+    assert {h["hazard"]["id"]: h["level"] for h in data["hazards"]} == dangers
     rows = list(csv.DictReader(io.StringIO(made["traceability.csv"])))
-    assert {r["obligation"]: r["obligation status"] for r in rows} == claims
-    assert {r["requirement"]: r["requirement status"] for r in rows} == levels
+    assert {r["obligation"]: r["obligation status"] for r in rows if r["obligation"]} == claims
+    assert {r["requirement"]: r["requirement status"] for r in rows if r["requirement"]} == levels
+    objects = reqif_values(ReqIFParser.parse_from_string(made["traceability.reqif"])).values()
+    for kind, wanted in (("Claim", claims), ("Requirement", levels), ("Hazard", dangers)):
+        assert {told["ReqIF.ForeignID"]: told["Status"] for of, told in objects if of == kind} == wanted
     reasons = {r["tool"] for r in rows if r["verdict"] == "justified"}
     assert reasons <= {"a person"}, "a person's reason is no tool's"
     results = json.loads(made["report.sarif"])["runs"][0]["results"]
@@ -145,14 +154,20 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
             assert status == "refuted" or Status(status).supports
     for view in found.guarantees:
         assert any(text.startswith(f"{view.obligation.name} [{claims[view.id]}]") for text in texts)
-    for name, level in levels.items():
+    for name, level in (levels | dangers).items():
         assert any(text.startswith(f"{name} [{level}") for text in texts)
+    sacm = [str(name.get("content")) for name in ElementTree.fromstring(made["sacm.xml"]).iter("name")]
+    labels = [f"{view.obligation.name} [{claims[view.id]}]" for view in found.guarantees]
+    for label in (*labels, *(f"{name} [{level}" for name, level in (levels | dangers).items())):
+        assert sum(text.startswith(label) for text in sacm) == 1, label
     shown = {name: " ".join(_TAGS.sub(" ", made[name]).split()) for name in ("argument.html", "claims.html", "gsn.svg")}
     for name, level in levels.items():
         assert f"{name}: {level}" in shown["gsn.svg"]
         for page in ("argument.html", "claims.html"):
             assert re.search(rf"\b{name} \S+ {level}\b", shown[page]), (page, name, level)
         assert level in made["comment.md"]
+    for name, level in dangers.items():
+        assert re.search(rf"{name}\b.{{,200}}{level}", _TAGS.sub(" ", made["index.html"]), re.DOTALL), name
     for view in found.guarantees:
         row = next(line for line in made["report.md"].splitlines() if line.startswith(f"| {short(view.id)} "))
         assert f"| {claims[view.id]} |" in row

@@ -1,0 +1,93 @@
+"""Traceability as ReqIF (OMG, version 1.2): the paths of `avow.assurance.traceability` as objects and relations.
+
+A hazard *is mitigated by* requirements and claims, a requirement *rests on* claims, a claim *is shown by* evidence. An
+identifier is a digest of what it names, so a tool that imports a later export updates its objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from xml.sax.saxutils import quoteattr
+
+from markupsafe import Markup
+
+from avow.assurance.model import Case
+from avow.assurance.traceability import Row
+from avow.base.files import sha256
+from avow.report.page import environment
+from avow.report.wording import clean
+
+TEXT = "ReqIF.Text"
+KINDS: Mapping[str, tuple[str, ...]] = {
+    "Hazard": (TEXT, "Status", "Severity", "Exposure", "Source", "Remark"),
+    "Requirement": (TEXT, "Status", "Formula", "Source", "Remark"),
+    "Derived property": ("Status", "Remark"),
+    "Claim": (TEXT, "Status", "Formula", "Remark"),
+    "Evidence": (TEXT, "Verdict", "Method", "Link", "Tool", "Tool output", "SHA-256", "Re-run"),
+}
+"""Each kind of object with its attributes, beside ReqIF.ForeignID."""
+RELATIONS = ("is mitigated by", "rests on", "is shown by")
+_Name = tuple[str, str]
+"""(kind, what it is called)."""
+
+
+def render_reqif(case: Case, rows: Sequence[Row]) -> str:
+    """The traceability of a case, and a specification that lists each requirement with what it rests on."""
+    objects: dict[_Name, dict[str, str]] = {}
+    links: dict[tuple[str, _Name, _Name], str] = {}
+    views = {view.id: view for view in case.obligations}
+    summaries = {item.entry.hash[:12]: item.entry.evidence.summary for view in views.values() for item in view.evidence}
+    for own, status in ((view.hazard, view.level) for view in case.hazards):
+        levels = {"Severity": own.severity, "Exposure": own.exposure, "Source": own.source}
+        objects["Hazard", own.id] = {TEXT: own.text, "Status": status, **levels}
+    for r in case.requirements:
+        objects["Requirement", r.id] = {TEXT: r.words, "Status": r.level, "Formula": r.formal, "Source": r.source}
+    for row in rows:
+        requirement, claim, evidence = ("Requirement", row.requirement), ("Claim", row.obligation), row.evidence
+        path = (claim, ("Derived property", row.derivation), requirement, ("Hazard", row.hazards))
+        about = next(name for name in path if name[1])
+        if about == claim and claim not in objects:
+            view = views.get(row.obligation)
+            known = {TEXT: view.obligation.claim, "Formula": view.obligation.formula} if view else {}
+            objects[claim] = {**known, "Status": row.status}
+        objects.setdefault(about, {"Status": row.status})
+        if about == claim and row.requirement:
+            links["rests on", requirement, claim] = row.derivation
+        if evidence:
+            told = (summaries.get(evidence, ""), row.verdict, row.method, row.link, row.tool)
+            cells = (*told, row.output, row.digest, row.rerun)
+            objects["Evidence", evidence] = dict(zip(KINDS["Evidence"], cells, strict=True))
+            links["is shown by", claim, ("Evidence", evidence)] = ""
+        said = objects[about].get("Remark", "")
+        if row.remark not in said:
+            objects[about]["Remark"] = f"{said}; {row.remark}" if said else row.remark
+    for hazard in case.hazards:
+        for m in hazard.mitigations:
+            named = [("Requirement", m.name), *(("Claim", name) for name in m.claims)]
+            source = "Hazard", hazard.hazard.id
+            links |= {("is mitigated by", source, name): m.name for name in named if name in objects}
+    below: dict[_Name, list[_Name]] = {}
+    for _, source, target in links:
+        below.setdefault(source, []).append(target)
+    return (
+        environment()
+        .get_template("traceability.reqif.j2")
+        .render(
+            case=case,
+            kinds=KINDS,
+            relations=RELATIONS,
+            objects=objects,
+            links=links,
+            below=below,
+            id=lambda *parts: Markup(f'"{identifier(*parts)}"'),
+            ref=lambda *parts: Markup(identifier(*parts)),
+            q=lambda text: Markup(quoteattr(clean(text))),  # quoted as XML, with the marks around it
+            clean=clean,
+            when=f"{case.today}T00:00:00Z",
+        )
+    )
+
+
+def identifier(*parts: str) -> str:
+    """An xsd:ID for what the parts name."""
+    return f"_{sha256(chr(0).join(parts))[:32]}"
