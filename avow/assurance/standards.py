@@ -1,4 +1,4 @@
-"""Objectives of standards, and what of a case serves each: DO-178C with DO-333, ISO 26262, UL 4600, IEC 61508.
+"""Objectives of standards, and what of a case serves each: DO-178C with DO-333, ISO 26262, UL 4600, IEC 61508, ECSS.
 
 The data are in `standards.yaml`. A policy that names a standard asks for the objectives that a case can serve. The
 others are listed as outside of Avow, with what they need. Serving an objective is no statement of compliance.
