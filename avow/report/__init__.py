@@ -3,6 +3,7 @@
     render_all(case, folder)            writes index.html argument.html claims.html report.json report.md comment.md
                                         report.sarif findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg
                                         sacm.xml traceability.html traceability.csv traceability.reqif
+                                        qualification.html
     pdf.write_pdf(case, folder)         writes report.pdf, on demand: Typst needs longer than all others together
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
@@ -20,7 +21,7 @@ from avow.assurance.model import Case
 from avow.assurance.traceability import Row, to_csv, trace
 from avow.base.files import sha256, write
 from avow.evidence.envelope import seal_lines
-from avow.report import answers_page, exchange, gsn, gsn_svg, markdown, page, reqif, sacm, short
+from avow.report import answers_page, exchange, gsn, gsn_svg, markdown, page, qualification, reqif, sacm, short
 
 ATTESTATION = "attestation.jsonl"
 PDF = "report.pdf"
@@ -66,6 +67,7 @@ def _formats(case: Case) -> Iterator[tuple[str, str]]:
     yield "traceability.csv", to_csv((*told, *rows))
     yield "traceability.reqif", reqif.render_reqif(case, rows)
     yield "traceability.html", page.render_traceability(case, rows)
+    yield "qualification.html", qualification.render_qualification(case)
 
 
 def write_index(cases: Sequence[Case], folder: Path, earlier: Sequence[str] = ()) -> Path:

@@ -16,6 +16,7 @@ from avow.assurance.traceability import trace
 from avow.report.answers_page import render_answers, render_argument, render_index
 from avow.report.comparison import render_comparison
 from avow.report.page import asset, render_page, render_traceability
+from avow.report.qualification import render_qualification
 from report.hostile import hostile_case
 
 STYLE = asset("style.css")
@@ -135,6 +136,8 @@ def pages() -> dict[str, str]:
         "empty": render_page(empty),
         "index": render_index([rover, hostile, empty]),
         "traceability": render_traceability(rover, trace(rover)),
+        "qualification": render_qualification(rover),
+        "hostile qualification": render_qualification(hostile),
         "comparison": render_comparison("a", "b", changes),
     }
 
