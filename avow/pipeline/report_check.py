@@ -31,7 +31,7 @@ from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.kernel.certificate import Certificate
 from avow.pipeline.work import engine_works
-from avow.report import ATTESTATION, PDF, formats
+from avow.report import ATTESTATION, PDF, formats, left_over
 from avow.report.pdf import render_pdf
 from avow.solving.apart import Both
 from avow.system.load import PLAN_FILE, load_system
@@ -153,7 +153,10 @@ def _where(stated: object, again: object) -> str:
 
 
 def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
-    for name, content in formats(case):
+    made = dict(formats(case))
+    for name in left_over(folder, made):
+        yield f"{name} is a page of no node in report.json"
+    for name, content in made.items():
         path = folder / name
         data = content.encode()
         try:

@@ -1,9 +1,9 @@
 """The assurance report: every format rendered from one `avow.assurance.model.Case`, so that they cannot disagree.
 
-    render_all(case, folder)            writes index.html argument.html claims.html report.json report.md comment.md
-                                        report.sarif findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg
-                                        sacm.xml traceability.html traceability.csv traceability.reqif
-                                        qualification.html
+    render_all(case, folder)            writes index.html argument.html claims.html system.html node-NAME.html
+                                        contracts.html report.json report.md comment.md report.sarif
+                                        findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg sacm.xml
+                                        traceability.html traceability.csv traceability.reqif qualification.html
     pdf.write_pdf(case, folder)         writes report.pdf, on demand: Typst needs longer than all others together
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
@@ -13,7 +13,7 @@ wrote.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from avow.assurance.answers import EARLIER
@@ -38,7 +38,14 @@ def render_all(case: Case, folder: Path, key: Path | None = None) -> tuple[Path,
         write(folder / name, content)
         written.append(folder / name)
     (folder / PDF).unlink(missing_ok=True)
+    for name in left_over(folder, (path.name for path in written)):
+        (folder / name).unlink()
     return tuple(written)
+
+
+def left_over(folder: Path, names: Iterable[str]) -> list[str]:
+    """Pages in a report's folder, of nodes that its system has no more."""
+    return sorted({path.name for path in folder.glob("node-*.html")} - set(names))
 
 
 def formats(case: Case) -> Iterator[tuple[str, str]]:
@@ -55,6 +62,7 @@ def _formats(case: Case) -> Iterator[tuple[str, str]]:
     yield "index.html", answers_page.render_answers(case, sha256(as_json))
     yield "argument.html", answers_page.render_argument(case, sha256(as_json))
     yield "claims.html", page.render_page(case, sha256(as_json))
+    yield from page.render_details(case)
     yield "report.md", markdown.render_markdown(case)
     yield "comment.md", short.comment(case)
     yield "report.sarif", exchange.render_sarif(case)

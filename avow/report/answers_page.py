@@ -21,7 +21,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.bowtie import bowtie
-from avow.report.page import asset, environment, svg_image
+from avow.report.page import asset, environment, known_pages, svg_image
 
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
@@ -63,6 +63,8 @@ def render_argument(case: Case, json_digest: str = "") -> str:
         json_digest,
         full_reason=full_reason,
         kept_apart=kept_apart,
+        shade=shade,
+        where=wording.where,
         modules=[_requirement(case, m) for m in requirement_modules(case)],
         node_modules=[_node(case, m) for m in node_modules(case)],
         said_of=lambda name: ((said := case.said(name)) and said.reason) or "",
@@ -79,7 +81,7 @@ def _render(template: str, case: Case, json_digest: str, **more: Any) -> str:
             case=case,
             style=Markup(asset("answers.css")),
             script=Markup(asset("answers.js")),
-            known={view.id for view in case.obligations},
+            known=known_pages(case),
             titles={node.name for node in case.nodes},
             json_digest=json_digest,
             **more,
@@ -124,27 +126,18 @@ def _requirement(case: Case, module: RequirementModule) -> dict[str, Any]:
 
 def _node(case: Case, module: NodeModule) -> dict[str, Any]:
     basis = basis_of(module.node, case)
-    cells = [_guarantee(case, view) for view in module.guarantees]
-    return {"node": module.node, "basis": basis, "guarantees": cells, "boxes": _boxes(cells, basis)}
-
-
-def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
-    said = case.said(view.id)
     return {
-        "view": view,
-        "word": view.standing.value,
-        "tone": shade(view),
-        "where": wording.where(view),
-        "reason": said.reason if said else "",
-        "records": view.records,
-        "history": len(view.evidence) - len(view.counting),
+        "node": module.node,
+        "basis": basis,
+        "guarantees": module.guarantees,
+        "boxes": _boxes(module.guarantees, basis),
     }
 
 
-def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone, tuple[str, str]]]:
-    if len(cells) <= NODE_BOXES:
-        return [(cell["tone"], (cell["word"], cell["view"].obligation.claim)) for cell in cells]
-    tones = {cell["word"]: cell["tone"] for cell in cells}
+def _boxes(views: Sequence[ObligationView], basis: NodeBasis) -> list[tuple[Tone, tuple[str, str]]]:
+    if len(views) <= NODE_BOXES:
+        return [(shade(view), (view.standing.value, view.obligation.claim)) for view in views]
+    tones = {view.standing.value: shade(view) for view in views}
     return [(tones.get(part.split(" ")[1], Tone.RED), (part, "")) for part in re.split("[,;] ", basis.words)]
 
 

@@ -69,7 +69,7 @@ def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
             Box(title, words, "away", f"argument.html#{anchor('node:' + node)}") for node, title, words in module.away
         ]
         if module.conditions:
-            below.append(Box("Composition", module.conditions, "sol", "claims.html#obligations"))
+            below.append(Box("Composition", module.conditions, "sol", "system.html#obligations"))
         if module.supposes:
             below.append(Box("assumes", ", ".join(module.supposes), "asm", "argument.html#assumptions"))
         yield Box(f"{r.id}: {r.level}", r.words, f"goal {r.tone}", link), module.strategy, below

@@ -1,4 +1,5 @@
-"""The HTML report: one file, no network, readable without a script, printable."""
+"""The report on every claim: an overview, and a page for each node, the whole system and the contracts. No network,
+readable without a script, printable."""
 
 from __future__ import annotations
 
@@ -6,9 +7,10 @@ import base64
 import io
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +37,7 @@ from avow.base.tuning.shown import (
     OBLIGATIONS_IN_FULL,
     ROWS_UNFOLDED,
 )
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
 from avow.report.maps import draw_map
@@ -90,6 +92,7 @@ def environment() -> Environment:
         "Status": Status,
         "Tone": Tone,
         "anchor": wording.anchor,
+        "page_of": wording.page_of,
         "ticks": _ticks,
         "banner_tone": wording.banner_tone,
         "bound_text": wording.bound_text,
@@ -122,53 +125,84 @@ def environment() -> Environment:
 
 
 def render_page(case: Case, json_digest: str = "") -> str:
-    """The whole page. Deterministic: same case, same bytes. `json_digest` is of the report.json that stands beside it:
-    with it no part of that file can be edited unseen, not even what no other format shows."""
-    known, single = {view.id for view in case.obligations}, set(case.single_method)
-    matrix, places = _matrix(case), source.places(case)
-    rows = sum(len(found) for _, _, found in matrix)
+    """The overview of every claim. Deterministic: same case, same bytes. `json_digest` is of the report.json that
+    stands beside it: with it no part of that file can be edited unseen, not even what no other format shows."""
+    single = set(case.single_method)
+    matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
-    views = sorted(case.obligations, key=_reading_order(case))
-    remarks = [item for item in case.open_items if item.kind == REMARK]
+    by_node = _by_node(case)
+    return _fill(
+        "claims.html.j2",
+        case,
+        line=wording.verdict_line(case),
+        groups=[(node, _stands(view.standing for view in views), views) for node, views in by_node.items()],
+        total=len(case.obligations),
+        counts=_counts(case.obligations),
+        matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
+        graph=svg_image(case.graph_svg),
+        open_items=listed,
+        resting=resting(case),
+        open_line=wording.open_line(case),
+        open_kinds=list(Counter(item.kind for item in listed).items()),
+        do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
+        findings={view.id: _found(view) for view in case.obligations},
+        advice=[item for item in case.open_items if item.advice and item.kind != REMARK],
+        remarks=[item for item in case.open_items if item.kind == REMARK],
+        single=[view for view in case.obligations if view.id in single],
+        justified=_justified(case),
+        used_methods=_used_methods(case),
+        statuses=[s for s in Status if any(view.standing is s for view in case.obligations)],
+        levels=techniques() if case.policy.name.startswith("sil") else (),
+        json_digest=json_digest,
+        kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in case.obligations)],
+        open_at_once=ROWS_UNFOLDED,
+    )
+
+
+def render_details(case: Case) -> Iterator[tuple[str, str]]:
+    """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts.
+
+    They name neither run nor date: a run that changes nothing of a node leaves its page as it is."""
+    by_node = {SYSTEM_LEVEL: list[ObligationView](), **_by_node(case)}
+    pages = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in by_node]
+    pages += [("contracts", "contracts.html")] if case.sources else []
+    shared = {
+        "pages": pages,
+        "full": _in_full([view for views in by_node.values() for view in views]),
+        "places": source.places(case),
+        "remarked": _by_item([item for item in case.open_items if item.kind == REMARK]),
+        "outline_of": _outlines(case),
+    }
+    for (title, name), views in zip_longest(pages, by_node.values()):
+        kind = {"system.html": "system", "contracts.html": "contracts"}.get(name, "node")
+        yield name, _fill("details.html.j2", case, title=title, kind=kind, views=views or [], **shared)
+
+
+def _fill(template: str, case: Case, **more: Any) -> str:
     return (
         environment()
-        .get_template("claims.html.j2")
+        .get_template(template)
         .render(
             case=case,
-            line=wording.verdict_line(case),
+            known=known_pages(case),
             style=Markup(asset("style.css")),  # our own files, in the package
             script=Markup(asset("script.js")),
-            views=views,
-            known=known,
-            counts=_counts(case.obligations),
-            matrix=matrix if rows <= GUARANTEE_ROWS else [],
-            condensed=_condensed(matrix) if rows > GUARANTEE_ROWS else [],
-            outline_of=_outlines(case),
-            graph=svg_image(case.graph_svg),
-            places=places,
-            failed=[gate for gate in case.gates if not gate.passed],
-            open_items=listed,
-            resting=resting(case),
-            open_line=wording.open_line(case),
-            open_kinds=list(Counter(item.kind for item in listed).items()),
-            do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
-            findings={view.id: _found(view) for view in case.obligations},
-            advice=[item for item in case.open_items if item.advice and item.kind != REMARK],
-            remarks=remarks,
-            remarked=_by_item(remarks),
-            single=[view for view in case.obligations if view.id in single],
-            justified=_justified(case),
-            nodes=list(dict.fromkeys(view.obligation.node for view in views)),
-            used_methods=_used_methods(case),
-            statuses=[s for s in Status if any(view.standing is s for view in views)],
-            levels=techniques() if case.policy.name.startswith("sil") else (),
-            full=_in_full(views),
-            brief=lambda view: _brief(view, places),
-            json_digest=json_digest,
-            kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
-            open_at_once=ROWS_UNFOLDED,
+            **more,
         )
     )
+
+
+def known_pages(case: Case) -> dict[str, str]:
+    """Each obligation, with the page that has all of it."""
+    return {view.id: wording.page_of(view.obligation.node) for view in case.obligations}
+
+
+def _by_node(case: Case) -> dict[str, list[ObligationView]]:
+    """Every obligation, in reading order: the nodes as the contract has them, then the whole system."""
+    found: dict[str, list[ObligationView]] = {}
+    for view in sorted(case.obligations, key=_reading_order(case)):
+        found.setdefault(view.obligation.node, []).append(view)
+    return found
 
 
 _SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")
@@ -276,27 +310,6 @@ def _in_full(views: Sequence[ObligationView]) -> set[str]:
     return set(telling[:OBLIGATIONS_IN_FULL])
 
 
-def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Markup:
-    """An obligation in a few lines; built by hand, as there may be ten thousand of them."""
-    o = view.obligation
-    status = view.standing
-    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status.value}</span>'
-    methods = escape(" ".join(method for method, _ in view.planned))
-    marks = f'data-node="{escape(o.node)}" data-kind="{o.kind}" data-status="{status}" data-methods="{methods}"'
-    said = "".join(
-        f"<li><b>{escape(e.method)}</b> {wording.worth(e)}: {escape(e.summary)}"
-        f"{f' <span class=quiet>({escape(wording.bound_text(e.bound))})</span>' if e.bound else ''}</li>"
-        for e in view.records
-    )
-    formula = f'<pre class="formula">{escape(o.formula)}</pre>' if o.formula else ""
-    return Markup(
-        f'<details class="ob" id="{wording.anchor(o.id)}" {marks}><summary>{chip} <b>{escape(short(o.id))}</b> '
-        f'<span class="claim">{escape(o.claim)}</span></summary><div class="body">{formula}<ul>{said}</ul>'
-        f'<p class="quiet">{source.location(o.span, places)} <code>avow explain {escape(o.id)}</code></p>'
-        "</div></details>\n"
-    )
-
-
 def _found(view: ObligationView) -> str:
     """What refutes a claim, in a line; empty where nothing does."""
     shown = next((e.counterexample for e in view.records if e.counterexample), None)
@@ -319,8 +332,14 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Statu
             of_kind = [v.status for v in views if v.obligation.kind is kind and v.advice is advice]
             if of_kind:
                 label = f"{kind}, as advice" if advice else kind.value
-                table.append((label, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
+                table.append((label, _stands(of_kind), len(of_kind)))
     return table
+
+
+def _stands(statuses: Iterable[Status]) -> list[tuple[Status, int]]:
+    """How many stand where, best first."""
+    found = Counter(statuses)
+    return [(status, found[status]) for status in Status if found[status]]
 
 
 def _used_methods(case: Case) -> list[str]:
@@ -338,16 +357,6 @@ def _matrix(case: Case) -> _Matrix:
         rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
     levels = {node.name: node.criticality for node in case.nodes}
     return [(node, levels.get(node, ""), found) for node, found in rows.items()]
-
-
-def _condensed(matrix: _Matrix) -> list[tuple[str, str, list[list[tuple[Status, int]]]]]:
-    """A row a node where there are too many guarantees: for each method, and for all together, how many stand where."""
-    table = []
-    for node, level, rows in matrix:
-        columns = [*zip(*(cells for _, cells in rows), strict=True), [view.standing for view, _ in rows]]
-        counts = [[(s, list(column).count(s)) for s in Status if s in column] for column in columns]
-        table.append((node, level, counts))
-    return table
 
 
 def _cell(view: ObligationView, method: str) -> Status | None:
@@ -404,6 +413,5 @@ def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
             if name not in seen:
                 seen.add(name)
                 stack += below.get(name, ())
-        found = Counter(statuses[name] for name in seen if name in statuses)
-        told[requirement.id] = [(status, found[status]) for status in Status if found[status]]
+        told[requirement.id] = _stands(statuses[name] for name in seen if name in statuses)
     return told

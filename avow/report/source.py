@@ -21,7 +21,7 @@ from avow.base.diagnostics import Span
 from avow.base.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 from avow.evidence.obligation import Kind
 from avow.language.pygments_lexer import RclLexer
-from avow.report.wording import MARKS, anchor, clean, tone
+from avow.report.wording import MARKS, anchor, clean, page_of, tone
 
 _COLOURS: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -59,7 +59,7 @@ def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
     number, lines = known.get(span.file, (0, 0))
     if not 1 <= span.line <= lines:
         return shown
-    return Markup(f'<a href="#{_line_anchor(number, span.line)}">{shown}</a>')  # escaped above
+    return Markup(f'<a href="contracts.html#{_line_anchor(number, span.line)}">{shown}</a>')  # escaped above
 
 
 def lines_of(case: Case, number: int) -> Markup:
@@ -87,19 +87,19 @@ def _pointing(case: Case) -> Iterator[tuple[Span, str]]:
     for r in case.requirements:
         if r.span is not None:
             shade = {Tone.GREEN: "good", Tone.AMBER: "fair", Tone.RED: "bad", Tone.GREY: "open"}[r.tone]
-            yield r.span, _note(f"requirement:{r.id}", shade, r.tone.mark, f"{r.id} {r.level}")
+            yield (
+                r.span,
+                _note(f"argument.html#{anchor('requirement:' + r.id)}", shade, r.tone.mark, f"{r.id} {r.level}"),
+            )
 
 
 def _mark(view: ObligationView) -> str:
     said = f"{view.obligation.name} {view.standing.value}"
-    return _note(view.id, tone(view.standing), MARKS[view.standing], said)
+    return _note(f"{page_of(view.obligation.node)}#{anchor(view.id)}", tone(view.standing), MARKS[view.standing], said)
 
 
-def _note(claim: str, shade: str, mark: str, text: str) -> str:
-    return (
-        f'<a class="came {shade}" href="#{anchor(claim)}"><span aria-hidden="true">{mark}</span> '
-        f"{escape(clean(text))}</a>"
-    )
+def _note(place: str, shade: str, mark: str, text: str) -> str:
+    return f'<a class="came {shade}" href="{place}"><span aria-hidden="true">{mark}</span> {escape(clean(text))}</a>'
 
 
 @cache

@@ -10,9 +10,10 @@ from urllib.parse import quote
 
 from avow.assurance import naming
 from avow.assurance.model import Case, EvidenceView, ObligationView
+from avow.base.files import sha256
 from avow.base.plain import count
 from avow.base.tuning.shown import DETAILS, FORMULA_COLUMNS
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
 
@@ -61,6 +62,13 @@ def tone(status: Status) -> str:
 def anchor(claim: str) -> str:
     """A fragment for a claim: readable, and safe in an attribute whatever the claim is called."""
     return quote(claim, safe="/._-", errors="replace")
+
+
+def page_of(node: str) -> str:
+    """The page with all of a node's claims; of the whole system's, those of no single node."""
+    if node == SYSTEM_LEVEL:
+        return "system.html"
+    return f"node-{node if re.fullmatch('[A-Za-z0-9_.-]+', node) else sha256(node)[:16]}.html"
 
 
 def rerun(view: ObligationView, evidence: Evidence) -> str:

@@ -163,7 +163,7 @@ def test_scores_are_in_the_report(tmp_path: Path) -> None:
     found = case(subject, [guarantee("n", "g")], [evidence("n.g", details={"mutation": mutation})])
     render_all(found, tmp_path)
     score = "3 of 4 mutants killed; not noticed: 18 becomes 19; not judged: low becomes mid"
-    for name in ("claims.html", "report.md"):
+    for name in ("node-n.html", "report.md"):
         assert score in (tmp_path / name).read_text(), name
     listed = json.loads((tmp_path / "report.json").read_text())["obligations"][0]["evidence"][0]["entry"]["evidence"]
     assert listed["details"]["mutation"] == mutation

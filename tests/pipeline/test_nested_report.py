@@ -70,7 +70,7 @@ def test_what_is_built_on_a_subsystem_rests_on_its_inside(workspace: Path) -> No
         "front": "tested",
         "whole": "tested",
     }, done.stdout
-    page = (workspace / "reports/robot/claims.html").read_text()
+    page = (workspace / "reports/robot/system.html").read_text()
     drawn = json.loads((workspace / "reports/robot/report.json").read_text())["graph_svg"]
     assert "inside sensor" in drawn, "the picture shows the inside"
     assert "sensor as a node" in page, "and the derivation the contract"

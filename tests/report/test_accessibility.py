@@ -15,7 +15,7 @@ from avow.assurance.compare import compare, of_case
 from avow.assurance.traceability import trace
 from avow.report.answers_page import render_answers, render_argument, render_index
 from avow.report.comparison import render_comparison
-from avow.report.page import asset, render_page, render_traceability
+from avow.report.page import asset, render_details, render_page, render_traceability
 from avow.report.qualification import render_qualification
 from report.hostile import hostile_case
 
@@ -132,6 +132,7 @@ def pages() -> dict[str, str]:
         "answers": render_answers(rover),
         "argument": render_argument(rover),
         "report": render_page(rover),
+        **dict(render_details(rover)),
         "hostile": render_page(hostile),
         "empty": render_page(empty),
         "index": render_index([rover, hostile, empty]),

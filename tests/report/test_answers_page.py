@@ -15,13 +15,13 @@ from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
 from avow.report.answers_page import render_answers, render_argument, worded
-from avow.report.page import render_page
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import markdown_head, terminal_lines
 from avow.system.plan import Requirement, Statement
 from report.chromium import measure
 from report.first_screen import counts, departures, words
 from report.hostile import hostile_case
+from report.pages import claim_pages
 from report.test_page import Page
 
 
@@ -80,10 +80,9 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_elements_nest_ids_are_unique_and_links_lead_somewhere(name: str) -> None:
     found = CASES[name]()
-    made = {"index.html": render_answers, "argument.html": render_argument, "claims.html": render_page}
-    pages = {name: Page(render(found)) for name, render in made.items()}
-    for here in ("index.html", "argument.html"):
-        page = pages[here]
+    made = {"index.html": render_answers(found), "argument.html": render_argument(found), **claim_pages(found)}
+    pages = {name: Page(text) for name, text in made.items()}
+    for here, page in pages.items():
         assert page.faults == []
         assert page.open == []
         assert {name for name in page.ids if page.ids.count(name) > 1} == set()

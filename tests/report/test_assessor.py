@@ -50,7 +50,7 @@ def test_a_vacuous_pass_is_called_so_in_every_format() -> None:
     assert "hoare: vacuous" in made["pdf"]
     assert '"hoare: proved"' not in made["pdf"]
     assert not re.search(r'class="(chip|mini) good"[^>]*>(<span[^>]*>✔</span>)? *proved', made["traceability.html"])
-    body = made["claims.html"].split('id="list"')[1].split("</section>")[0]
+    body = made["node-agent.html"].split('id="list"')[1].split("</section>")[0]
     assert "the tool said: proved" in body
     assert 'class="chip good" title="for all behaviours' not in body
 
@@ -149,7 +149,7 @@ def test_what_the_language_checker_remarks_is_in_the_report_brackets_first() -> 
     made = texts(found)
     for name in ("report.md", "claims.html", "pdf"):
         assert "another bracketing means something else" in made[name], name
-    assert "<b>Remark:</b>" in made["claims.html"].split('id="list"')[1]  # and beside the claim itself
+    assert "<b>Remark:</b>" in made["node-agent.html"].split('id="list"')[1]  # and beside the claim itself
     assert found.exit_code == remarked("lints_off: [RCL401, RCL402]\n").exit_code  # nothing fails for them
 
 
@@ -181,7 +181,7 @@ def test_what_a_method_remarks_of_its_input_is_in_the_report_once() -> None:
         (G1.id, "the program compares with 10", "HOARE410, models/p.imp:2; method hoare", True),
         (G1.id, "<b>bold</b>", "X; method hoare", True),
     ]
-    assert "<b>bold</b>" not in texts(found)["claims.html"]
+    assert "<b>bold</b>" not in texts(found)["claims.html"] + texts(found)["node-agent.html"]
     sources = {"contracts/rover/plan.yaml": "system: rover\nlints_off: [HOARE410]\n"}
     silent = case(SUBJECT, [G1, G2], records, sources=sources, digests={})
     assert [i.title for i in silent.open_items if i.kind == REMARK] == ["<b>bold</b>"]
@@ -227,7 +227,7 @@ def test_measured_runs_say_how_they_were_made() -> None:
     found = case(SUBJECT, [G1, G2], records)
     assert "agent.g1: measured under this protocol, and not beyond it: 47 runs in a simulation." in found.not_shown
     made = texts(found)
-    assert "how it was measured: 47 runs in a simulation." in made["claims.html"]
+    assert "how it was measured: 47 runs in a simulation." in made["node-agent.html"]
     assert "How it was measured: 47 runs in a simulation." in made["pdf"]
 
 

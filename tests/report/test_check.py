@@ -57,6 +57,8 @@ def test_an_honest_report_agrees(place: Path) -> None:
     some(
         [
             "index.html",
+            "claims.html",
+            "node-agent.html",
             "report.md",
             "report.sarif",
             "findings.sarif",
@@ -79,6 +81,13 @@ def test_an_edited_format_is_found(place: Path, name: str) -> None:
     assert any(name in line for line in found(place))
     path.unlink()
     assert any(name in line for line in found(place))
+
+
+def test_a_page_of_no_node_is_found(place: Path) -> None:
+    (place / "report/node-agent.html").rename(place / "report/node-agents.html")
+    told = "\n".join(found(place))
+    assert "node-agents.html is a page of no node in report.json" in told
+    assert "node-agent.html cannot be read" in told
 
 
 def test_an_embellished_conclusion_is_found(place: Path) -> None:

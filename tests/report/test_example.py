@@ -11,8 +11,8 @@ from avow.assurance.model import MapView
 from avow.base.verdict import Counterexample, Verdict
 from avow.report import example
 from avow.report.maps import map_picture
-from avow.report.page import render_page
 from avow.report.pdf import _counter
+from report.pages import claim_pages
 from report.test_page import Page
 
 
@@ -74,7 +74,7 @@ def test_two_answers_stand_side_by_side() -> None:
 def one(shown: Counterexample) -> str:
     target = guarantee("n", "g")
     record = evidence(target, Verdict.REFUTED, counterexample=shown)
-    return render_page(case(system({"n": ["g"]}), [target], [record]))
+    return claim_pages(case(system({"n": ["g"]}), [target], [record]))["node-n.html"]
 
 
 def test_the_page_shows_values_run_and_what_paper_leaves_out() -> None:

@@ -7,6 +7,7 @@ import random
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 from assurance.sample import case as make_case
@@ -17,12 +18,13 @@ from avow.assurance.argument import Arguments
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.verdict import Verdict
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.report import formats, gsn_svg, wording
+from avow.report import formats, gsn_svg, render_all, wording
 from avow.report.answers_page import render_index
 from avow.report.page import render_page, render_traceability
 from report.hostile import hostile_case
+from report.pages import all_claims, claim_pages
 
 VOID = {"meta", "img", "br", "input", "link", "hr"}
 
@@ -73,19 +75,9 @@ def found(request: pytest.FixtureRequest) -> Case:
     return CASES[request.param]()
 
 
-def test_elements_nest_ids_are_unique_and_links_lead_somewhere(found: Case) -> None:
-    page = Page(render_page(found))
-    assert page.faults == []
-    assert page.open == []
-    twice = {name for name in page.ids if page.ids.count(name) > 1}
-    assert twice == set()
-    for _, name, value in page.attributes:
-        if name == "href" and value.startswith("#"):
-            assert value[1:] in page.ids, value
-
-
 def test_nothing_is_fetched_and_nothing_foreign_runs(found: Case) -> None:
-    for text in (render_page(found), render_index([found]), render_traceability(found, trace(found))):
+    made = claim_pages(found).values()
+    for text in (*made, render_index([found]), render_traceability(found, trace(found))):
         page = Page(text)
         assert page.tags.count("script") <= 1
         assert not [a for a in page.attributes if a[1].startswith("on")]
@@ -97,7 +89,7 @@ def test_nothing_is_fetched_and_nothing_foreign_runs(found: Case) -> None:
 
 
 def test_templates_do_not_evaluate_what_they_show() -> None:
-    text = render_page(hostile_case())
+    text = all_claims(hostile_case())
     plain = re.sub(r"<[^<>]*>", "", text)  # pictures break lines within it, and so does colouring
     assert len(re.findall(r"\{\{ ?7\*7 \}\}", plain)) == plain.count("{% raw %}") > 0
     assert "alert(1)</script>" not in text
@@ -105,7 +97,7 @@ def test_templates_do_not_evaluate_what_they_show() -> None:
 
 def test_every_obligation_and_all_that_matters_is_there() -> None:
     found = rover_case()
-    text = render_page(found)
+    text = all_claims(found)
     page = Page(text)
     words = " ".join(page.text)
     plain = " ".join(words.split())  # long formulas are broken into lines
@@ -131,7 +123,6 @@ def test_the_sections_stand_in_the_prescribed_order() -> None:
         "answer",
         "open",
         "summary",
-        "argument",
         "obligations",
         "environment",
         "justifications",
@@ -159,14 +150,17 @@ def test_a_person_who_sees_no_colours_and_no_pictures_misses_nothing() -> None:
 
 
 @pytest.mark.nightly
-def test_ten_thousand_obligations_stay_a_page() -> None:
+def test_two_thousand_obligations_stay_pages_that_open() -> None:
     nodes = {f"n{n}": [f"g{k}" for k in range(100)] for n in range(20)}
     obligations = [guarantee(n, g) for n, gs in nodes.items() for g in gs]
-    text = render_page(make_case(system(nodes), obligations, [evidence(o) for o in obligations]))
-    page = Page(text)
-    assert page.faults == []
-    assert len(text) < 900 * len(obligations) + 500_000
-    assert all(wording.anchor(o.id) in set(page.ids) for o in obligations)
+    made = claim_pages(make_case(system(nodes), obligations, [evidence(o) for o in obligations]))
+    for text in made.values():
+        page = Page(text)
+        assert page.faults == []
+        assert len(text) < 600 * len(obligations)
+        ids = set(page.ids)
+        told = [o for o in obligations if made[wording.page_of(o.node)] is text or made["claims.html"] is text]
+        assert all(wording.anchor(o.id) in ids for o in told)
 
 
 def test_details_are_told_readably() -> None:
@@ -310,3 +304,28 @@ def test_a_bound_that_is_empty_is_not_named() -> None:
     assert bound_text({"tables": [], "steps": 2, "indices": (), "seed": 0, "exhaustive": False}) == (
         "steps 2, seed 0, not every state explored"
     )
+
+
+def test_a_page_is_another_one_only_if_something_of_its_node_is(tmp_path: Path) -> None:
+    """Neither a later run nor news of another node touches it; the page of a node that is gone goes."""
+    subject = system({"a": ["g"], "b": ["g"]})
+    claims = [guarantee("a", "g"), guarantee("b", "g")]
+    kept = evidence(claims[0])
+    first = make_case(subject, claims, [kept, evidence(claims[1])])
+    later = make_case(subject, claims, [kept, evidence(claims[1], Verdict.REFUTED)])
+    later = replace(later, today="2030-01-01", ledger_head="f" * 64, run=replace(later.run, id="another"))
+    was, now = claim_pages(first), claim_pages(later)
+    changed = {name for name in was if was[name] != now[name]}
+    assert changed == {"claims.html", "node-b.html"}
+    render_all(first, tmp_path)
+    assert (tmp_path / "node-b.html").read_text() == was["node-b.html"]
+    written = render_all(make_case(system({"a": ["g"]}), claims[:1], [kept]), tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in written}
+    assert "node-b.html" not in {path.name for path in written}
+
+
+def test_node_names_of_any_kind_have_a_page_each() -> None:
+    names = ["a", "a/b", "a b", "système", "../a", SYSTEM_LEVEL, "contracts", "-"]
+    pages = [wording.page_of(name) for name in names]
+    assert len(set(pages)) == len(names)
+    assert all(re.fullmatch(r"[\w.-]+\.html", page, re.ASCII) for page in pages)

@@ -16,8 +16,8 @@ from avow.base.files import sha256
 from avow.pipeline import report_check as check
 from avow.report import source
 from avow.report.markdown import render_markdown
-from avow.report.page import render_page
 from report.hostile import hostile_case
+from report.pages import all_claims, claim_pages
 from report.test_page import Page
 
 PATH = "contracts/rover/system.rcl"
@@ -59,18 +59,18 @@ def test_comments_and_keywords_have_colours() -> None:
 
 
 def test_a_guarantee_shows_beside_its_line_and_links_both_ways() -> None:
-    text = render_page(with_text("// a\nguarantee g(TRUE)\n"))
+    text = all_claims(with_text("// a\nguarantee g(TRUE)\n"))
     line = re.search(r'<div id="s1-2">(.*?)</div>', text)
     assert line
-    assert 'href="#rover/n/guarantee/g"' in line[1]
+    assert 'href="node-n.html#rover/n/guarantee/g"' in line[1]
     assert "missing" in line[1]
-    assert f'<a href="#s1-2">{PATH}:2</a>' in text
+    assert f'<a href="contracts.html#s1-2">{PATH}:2</a>' in text
 
 
 def test_a_place_beyond_the_text_or_in_another_file_is_no_link() -> None:
-    assert f"{PATH}:2 " in re.sub("<[^>]*>", " ", render_page(with_text("one line")))
-    assert "#s1-2" not in render_page(with_text("one line"))
-    assert "#s1-" not in render_page(with_text("a\nb\nc", "contracts/other/system.rcl")).replace('id="s1-', "")
+    assert f"{PATH}:2 " in re.sub("<[^>]*>", " ", all_claims(with_text("one line")))
+    assert "#s1-2" not in all_claims(with_text("one line"))
+    assert "#s1-" not in all_claims(with_text("a\nb\nc", "contracts/other/system.rcl")).replace('id="s1-', "")
 
 
 def test_what_cannot_be_seen_is_told() -> None:
@@ -81,7 +81,7 @@ def test_what_cannot_be_seen_is_told() -> None:
 
 
 def test_hostile_comments_stay_text_on_the_page() -> None:
-    page = Page(render_page(hostile_case()))
+    page = Page(claim_pages(hostile_case())["contracts.html"])
     assert page.faults == []
     assert page.tags.count("script") == 1
     assert "b" not in {tag for tag, name, _ in page.attributes if name == "onerror"}

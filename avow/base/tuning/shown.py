@@ -79,7 +79,7 @@ OBLIGATIONS_IN_FULL = 1500
 page over ten thousand is still a page that opens."""
 
 GUARANTEE_ROWS = 600
-"""So many guarantees have a row of their own in the summary; beyond that a node has one."""
+"""So many guarantees have a row of their own in the summary; beyond that each node's line counts them."""
 
 FINDING_CHARACTERS = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""

@@ -25,8 +25,9 @@
   };
   // The filter.
   const form = document.getElementById("filter");
-  const rows = all("#list > .ob");
-  const texts = rows.map((row) => row.firstElementChild.textContent.toLowerCase());
+  const rows = all("#list .ob");
+  const groups = all("#list > details:not(.ob)");
+  const texts = rows.map((row) => row.textContent.toLowerCase());
   const shown = document.getElementById("shown");
   const sieve = () => {
     const wanted = {};
@@ -40,6 +41,10 @@
       row.classList.toggle("off", !on);
       if (on) n += 1;
     });
+    groups.forEach((group) => {
+      group.classList.toggle("off", !group.querySelector(".ob:not(.off)"));
+      group.open = n < rows.length;
+    });
     shown.textContent = (n === rows.length ? "all " : n + " of ") + rows.length;
   };
   if (form) {
@@ -49,7 +54,7 @@
     form.addEventListener("submit", (event) => event.preventDefault());
     const unfold = document.getElementById("unfold");
     unfold.addEventListener("click", () => {
-      const visible = rows.filter((row) => !row.classList.contains("off"));
+      const visible = groups.filter((group) => !group.classList.contains("off"));
       const open = !visible.every((row) => row.open);
       visible.forEach((row) => { row.open = open; });
       unfold.textContent = open ? "fold all" : "unfold all";
