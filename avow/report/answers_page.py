@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
@@ -185,6 +186,7 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
         .render(
             rows=[(case, case.history.points) for case in ranked],
             earlier=earlier,
+            titles=Counter(case.title for case in cases),
             line=line,
             tone=tone,
             style=Markup(asset("answers.css")),

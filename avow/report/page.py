@@ -19,7 +19,6 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from avow.assurance.answers import MEANINGS, Tone
-from avow.assurance.argument import Arguments, Element
 from avow.assurance.model import Case, ObligationView, OpenItem
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import techniques
@@ -31,7 +30,6 @@ from avow.base.notes import cache_folder, sealed, unsealed
 from avow.base.plain import count
 from avow.base.tuning.bounds import SUPPORT_STEPS
 from avow.base.tuning.shown import (
-    ARGUMENT_ELEMENTS,
     FINDING_CHARACTERS,
     GUARANTEE_ROWS,
     OBLIGATIONS_IN_FULL,
@@ -171,7 +169,6 @@ def render_details(case: Case) -> Iterator[tuple[str, str]]:
         "full": _in_full([view for views in by_node.values() for view in views]),
         "places": source.places(case),
         "remarked": _by_item([item for item in case.open_items if item.kind == REMARK]),
-        "outline_of": _outlines(case),
     }
     for (title, name), views in zip_longest(pages, by_node.values()):
         kind = {"system.html": "system", "contracts.html": "contracts"}.get(name, "node")
@@ -366,17 +363,6 @@ def _cell(view: ObligationView, method: str) -> Status | None:
     if not mine and method not in dict(view.planned):
         return None
     return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
-
-
-def _outlines(case: Case) -> dict[str, list[tuple[int, Element]]]:
-    """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
-    arguments, room = Arguments(case), ARGUMENT_ELEMENTS
-    found: dict[str, list[tuple[int, Element]]] = {}
-    for r in case.requirements:
-        if room > 0:
-            found[r.id] = arguments.rows(r.id, room)
-            room -= len(found[r.id])
-    return found
 
 
 def svg_image(text: str) -> str:

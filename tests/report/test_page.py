@@ -14,7 +14,6 @@ from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, obligation, rover_case, system
 from helpers import some
 
-from avow.assurance.argument import Arguments
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.verdict import Verdict
@@ -198,18 +197,6 @@ def test_boxes_do_not_overlap_and_texts_fit() -> None:
             for a, b, c, d, _ in boxes[at + 1 : at + 40]:
                 apart = box[0] + box[2] <= int(a) or int(a) + int(c) <= box[0]
                 assert apart or box[1] + box[3] <= int(b) or int(b) + int(d) <= box[1]
-
-
-def test_the_argument_shows_what_nothing_supports_and_what_is_assumed() -> None:
-    case = rover_case()
-    told = [row for r in case.requirements for row in Arguments(case).rows(r.id, 1000)]
-    by_title = {element.title: element for _, element in told}
-    assert Arguments(case).claim("rover/localisation/guarantee/one_position").below == ()
-    assert by_title["REQ3"].status is Status.CHECKED
-    assert {e.kind for _, e in told} == {"goal", "strategy", "solution", "context", "assumption", "justification"}
-    rows = Arguments(case).rows("REQ3", 1000)
-    assert sum(element.title == "agent.exit_on_danger" for _, element in rows) == 1
-    assert Arguments(case).rows("REQ3", 3) == rows[:3]
 
 
 def test_a_goal_says_how_its_claim_stands_all_things_considered() -> None:

@@ -12,6 +12,7 @@ from avow.report.answers_page import render_argument
 from avow.report.page import render_page
 from report.chromium import frames_of, measure
 from report.driven import Driven, driven
+from report.pages import claim_pages
 
 pytestmark = pytest.mark.needs_chromium
 
@@ -70,10 +71,13 @@ def test_folds_open_and_close_by_keyboard(name: str, key: str, reader: tuple[Dri
 
 
 @pytest.mark.nightly
-def test_nothing_is_clipped_in_the_page_of_all_claims(tmp_path: Path) -> None:
-    page = render_page(rover_case())
-    fault = page.replace("</style>", ".tree{position:relative;left:-60px}</style>")
-    measured = measure(frames_of(page) | {"fault": (fault, 420)}, tmp_path)
+def test_nothing_is_clipped_in_the_pages_of_all_claims(tmp_path: Path) -> None:
+    made = claim_pages(rover_case())
+    frames = {
+        f"{at}{width}": frame for at, text in enumerate(made.values()) for width, frame in frames_of(text).items()
+    }
+    fault = made["node-agent.html"].replace("</style>", ".ob{position:relative;left:-60px}</style>")
+    measured = measure(frames | {"fault": (fault, 420)}, tmp_path)
     assert measured.pop("fault")["open"]
     for width, said in measured.items():
         assert said["closed"] == [], width

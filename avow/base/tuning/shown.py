@@ -84,9 +84,6 @@ GUARANTEE_ROWS = 600
 FINDING_CHARACTERS = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""
 
-ARGUMENT_ELEMENTS = 2500
-"""So many elements of the argument are listed on one page; all are in gsn.yaml."""
-
 PDF_OBLIGATIONS = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 

@@ -74,7 +74,7 @@
   let folded = [];
   const good = ["proved", "checked", "tested", "monitored", "reviewed", "justified", "argued"];
   addEventListener("beforeprint", () => {
-    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !d.querySelector(".tree") && !("screen" in d.dataset) && !("advice" in d.dataset)
+    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !("screen" in d.dataset) && !("advice" in d.dataset)
       && !(d.classList.contains("ob") && d.dataset.kind !== "guarantee" && good.includes(d.dataset.status)));
     if (folded.length < 3000) folded.forEach((d) => { d.open = true; });
   });
