@@ -16,14 +16,13 @@ from avow.base.graphs import components, cycles_in
 from avow.base.records import dataclass
 from avow.base.tuning.bounds import NODE_ANSWERS
 from avow.base.tuning.effort import SEARCH_STEPS
+from avow.calculus.cut_off import another_first, first_cut
 from avow.calculus.narrowing import Holds, Narrowing, Undecided, Unknown, Values, decided, forcings
 from avow.calculus.node_outputs import (
     Answerer,
     Doubts,
     Stuck,
-    another_first,
     by_variable,
-    first_cut,
     is_restricted,
     judge,
     possible,

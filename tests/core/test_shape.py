@@ -42,7 +42,7 @@ KEPT = "what was computed of the same arguments: faster, and never another answe
 PATCHED = "another's module, in the process of a subject or for the time of a search"
 ELSEWHERE = {
     "avow/assurance/policy._data": ONCE,
-    "avow/assurance/standards._data": ONCE,
+    "avow/assurance/standards.standards": ONCE,
     "avow/backend_kit/protocol._required": KEPT,
     "avow/backend_kit/registry.every_code": ONCE,
     "avow/backend_kit/registry.installed": ONCE,
@@ -56,6 +56,7 @@ ELSEWHERE = {
     "avow/language/load._lately": KEPT,
     "avow/language/load._under": KEPT,
     "avow/report/page.environment": ONCE,
+    "avow/report/qualification.data": ONCE,
     "avow/solving/limits._spent": PROCESS,
     "avow/solving/z3_module.z3": ONCE,
     "avow/solving/z3_sorts._kept": "a Z3 context for questions of evaluation, each of which has one answer",

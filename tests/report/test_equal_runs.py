@@ -20,7 +20,7 @@ from avow.evidence.ledger import Ledger
 from avow.report import formats
 
 _OWN = re.compile(
-    r"\d{8}T\d{6}\.\d+-\d+|\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.+Z]*|\b[0-9a-f]{8,64}\b|\b(?:[Rr]ecord|no\.|#)\s*\d+"
+    r"\d{8}T\d{6}\.\d+-\d+|\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.+Z]*|\b_?[0-9a-f]{8,64}\b|\b(?:[Rr]ecord|no\.|#)\s*\d+"
     r'|[\d.]+ s\b|"(?:number|n|seconds)": [\d.]+'
 )
 
