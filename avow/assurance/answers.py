@@ -275,6 +275,8 @@ class ChangeLine:
     words: str
     before: str = ""
     after: str = ""
+    edits: tuple[str, ...] = field(default=(), metadata=LATER)
+    """Of a requirement: what changed beneath it."""
 
     @property
     def worse(self) -> bool:

@@ -31,7 +31,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         until=until,
         content="",
         verdict=case.answers.verdict,
-        requirements=tuple((r.id, _meaning(r), r.level.value, r.formal) for r in case.requirements),
+        requirements=tuple((r.id, r.meaning, r.level.value, r.formal) for r in case.requirements),
         guarantees=tuple(map(_guarantee, case.guarantees)),
         assumptions=tuple((s.key, s.words, s.until) for s in case.assumptions),
         deficits=tuple((w.key, w.count) for w in case.deficits if w.key not in _PASSING),
@@ -68,7 +68,9 @@ def changes(
     now = {item[0]: item for item in map(_guarantee, guarantees)}
     then = {item[0]: item for item in old.guarantees}
     titles = {view.id: view.obligation.claim for view in guarantees}
-    shown = [*_requirements(old, requirements), *_guarantees(then, now, titles)]
+    below = list(_guarantees(then, now, titles))
+    under = {r.id: [_edit(entry) for entry in below if entry.subject in r.closure] for r in requirements}
+    shown = [replace(e, edits=tuple(under.get(e.subject, ()))) for e in _requirements(old, requirements)] + below
     lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
     entries = [*shown, *_assumptions(old, assumptions), *_deficits(old, deficits)]
     if lost:  # what less is claimed also supposes less, and has less to be weakened: that is no gain
@@ -80,8 +82,8 @@ def changes(
     return Changes(by, tuple(sorted(entries, key=lambda entry: KINDS.index(entry.kind))), again)
 
 
-def _meaning(view: RequirementView) -> str:
-    return sha256("\n".join((view.text, view.formula, view.temporal, *view.supported_by)))
+def _edit(entry: ChangeLine) -> str:
+    return f"{entry.words}: was {entry.before}, is {entry.after}" if entry.kind == "meaning" else entry.words
 
 
 def _guarantee(view: ObligationView) -> tuple[str, str, str, str, str]:
@@ -107,7 +109,7 @@ def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Ite
             yield ChangeLine(kind, r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
         elif _RANK[r.level] > _RANK[was]:
             yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.level}", was.value, r.level.value)
-        if meaning != _meaning(r):
+        if meaning != r.meaning:
             yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formal)
     for name in then:
         if name not in {r.id for r in requirements}:

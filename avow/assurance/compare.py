@@ -1,19 +1,24 @@
-"""What changed between two cases: claims, their meaning, statuses, gates, requirements; and why, from the evidence."""
+"""What changed between two cases: requirements with the edits behind each, claims, gates; why, from the evidence."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
 from typing import assert_never
 
-from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
-from avow.assurance.naming import requirement_claim, short
+from avow.assurance.answers import Baseline, Level
+from avow.assurance.model import Case, Currency, EvidenceView, ObligationView
+from avow.assurance.naming import short
+from avow.base.diagnostics import Span
 from avow.base.plain import listed
+from avow.base.tuning.shown import EDIT_CHARACTERS
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, roll_up
+from avow.system.statements import GENERAL
 
-ORDER = ("gate", "worse", "removed", "assumption", "meaning", "added", "better", "rerun")
+ORDER = ("requirement", "gate", "worse", "removed", "assumption", "meaning", "added", "better", "rerun")
 """Kinds of changes, what a reader must know first."""
 
 
@@ -37,11 +42,24 @@ class Told:
     below: tuple[str, ...] = ()
     """Claims that it rests on and that fail."""
     formula: str = ""
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Required:
+    """A requirement: how far it is shown, and every claim under it."""
+
+    words: str
+    level: Level
+    meaning: str
+    formal: str
+    closure: tuple[str, ...] = ()
+    span: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """What can be compared: claim → (digest of its meaning, status). Gates where there are any."""
+    """What can be compared: claim → (digest of its meaning, status). Requirements and gates where there are any."""
 
     name: str
     claims: Mapping[str, tuple[str, Status]]
@@ -51,6 +69,11 @@ class Snapshot:
     """Gate → why it fails or passes."""
     assumptions: Mapping[str, str] | None = None
     """Key → words; None where nothing is known of them (a bare ledger)."""
+    requirements: Mapping[str, Required] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """Contracts and plan: path → text."""
+    signed: bool = False
+    """Whether it is what a signature covers: of the claims only guarantees, and no answer of a method."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +95,8 @@ class Change:
         """Whether less is shown than before, or more supposed."""
         if self.kind == "gate":
             return self.after == "fails"
+        if self.kind == "requirement":
+            return bool(self.before) and _RANK.get(self.after, len(_RANK)) > _RANK.get(self.before, 0)
         if self.kind == "meaning":
             return {self.before, self.after} <= set(Status) and Status(self.after).rank < Status(self.before).rank
         return self.kind in ("worse", "removed", "assumption")
@@ -79,6 +104,9 @@ class Change:
     @property
     def text(self) -> str:
         match self.kind:
+            case "requirement":
+                moved = f"{self.before or 'new'} → {self.after or 'not claimed any more'}"
+                return f"{self.subject}: {f'still {self.after}' if self.before == self.after else moved}"
             case "added":
                 return f"new: {self.subject} ({self.after})"
             case "removed":
@@ -91,33 +119,41 @@ class Change:
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
                 return f"re-run: {self.subject} (still {self.after})"
-            case _:  # worse, better, gate: all are told the same way
+            case _:  # worse and better are told the same way
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
 
+_OF_RUN = ("integrity", "derivations", "proved", "certified")
+"""Gates that ask what a run found out: a case that is concluded without one has no answer."""
+_RANK: Mapping[str, int] = {level: at for at, level in enumerate(Level)}
+
+
 def of_case(case: Case) -> Snapshot:
-    claims = {v.id: (v.obligation.digest, v.standing) for v in case.obligations if not v.advice}
-    claims |= {requirement_claim(r.id): (r.text + r.formula + r.temporal, _standing(r)) for r in case.requirements}
-    told = {
-        v.id: Told(v.obligation.claim, _answers(v), v.below, v.obligation.formula)
-        for v in case.obligations
-        if not v.advice
-    }
-    told |= {requirement_claim(r.id): Told(r.words, {}, r.below or r.failing, r.formal) for r in case.requirements}
+    views = [v for v in case.obligations if not v.advice]
     return Snapshot(
         case.system,
-        claims,
-        {g.title: g.passed for g in case.gates},
-        told,
+        {v.id: (v.obligation.digest, v.standing) for v in views},
+        {g.title: g.passed for g in case.gates if case.audited or g.id not in _OF_RUN},
+        {v.id: Told(v.obligation.claim, _answers(v), v.below, v.obligation.formula, v.obligation.span) for v in views},
         {g.title: g.reason for g in case.gates},
         {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.assumptions if not s.general},
+        {r.id: Required(r.words, r.level, r.meaning, r.formal, r.closure, r.span) for r in case.requirements},
+        {source.path: source.text for source in case.sources},
     )
 
 
-def _standing(requirement: RequirementView) -> Status:
-    """A requirement whose own evidence is good is open all the same where what it rests on fails or has expired."""
-    fallen = not requirement.level.holds and requirement.status.supports
-    return Status.UNSUPPORTED if fallen else requirement.status
+def of_signature(name: str, signed: Baseline) -> Snapshot:
+    """What a signature covers."""
+    return Snapshot(
+        name,
+        {claim: (digest, Status(status)) for claim, digest, status, _, _ in signed.guarantees},
+        {},
+        {claim: Told(formula=formula) for claim, _, _, formula, _ in signed.guarantees},
+        {},
+        {key: words for key, words, _ in signed.assumptions if key not in GENERAL},
+        {name: Required(name, Level(level), meaning, formal) for name, meaning, level, formal in signed.requirements},
+        signed=True,
+    )
 
 
 def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
@@ -146,6 +182,9 @@ def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
 
 def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
     """Every difference: what got worse first."""
+    if old.signed:
+        kept = {name: replace(told, answers={}) for name, told in new.told.items() if "/guarantee/" in name}
+        new = replace(new, claims={name: new.claims[name] for name in kept}, told=kept)
     changes: list[Change] = []
     for name in dict.fromkeys((*old.claims, *new.claims)):
         before, after = old.told.get(name, Told()), new.told.get(name, Told())
@@ -163,6 +202,7 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
                 changes.append(Change("better" if is_.rank > was.rank else "worse", name, was, is_, title, why))
             elif any(_asked_again(before, after)):
                 changes.append(Change("rerun", name, was, is_, title, why))
+    changes += list(_requirements(old, new, changes))
     lost = any(change.kind in ("worse", "removed") for change in changes)  # what less is shown also supposes less
     changes += (c for c in _assumptions(old, new) if not lost or c.kind != "better")
     word = {True: "passes", False: "fails"}
@@ -171,6 +211,56 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
             reason = (new.reasons[gate],) if new.reasons.get(gate) else ()
             changes.append(Change("gate", gate, word[old.gates[gate]], word[passed], "", reason))
     return tuple(sorted(changes, key=lambda change: ORDER.index(change.kind)))
+
+
+def _requirements(old: Snapshot, new: Snapshot, changes: Sequence[Change]) -> Iterator[Change]:
+    """Each requirement that changed, or under which a claim changed: was, is, and the edits that may be why."""
+    edits = list(_edits(old, new))
+    for name in dict.fromkeys((*old.requirements, *new.requirements)):
+        was, now = old.requirements.get(name), new.requirements.get(name)
+        reached = {claim for one in (was, now) if one is not None for claim in one.closure}
+        moved = [c for c in changes if c.subject in reached and c.kind != "rerun"]
+        moved = [c for c in moved if c.kind != "meaning" or c.is_worse or "/guarantee/" in c.subject]
+        if not moved and was and now and (was.level, was.meaning) == (now.level, now.meaning):
+            continue
+        why = ["its sentence, formula or support is another"] if was and now and was.meaning != now.meaning else []
+        why += [text for owners, text in edits if not owners or owners & {*reached, name}]
+        why += [f"{short(change.subject)}: {_move(change)}" for change in moved]
+        before, after = was.level if was else "", now.level if now else ""
+        formal = was.formal if was else "", now.formal if now else ""
+        words = (now or was or Required(name, Level.NOT_SHOWN, "", "")).words
+        yield Change("requirement", name, before, after, words, tuple(why), *formal)
+
+
+def _move(change: Change) -> str:
+    if change.old_formula != change.new_formula:
+        return f"was {change.old_formula}, is {change.new_formula}"
+    cause = f" ({change.why[0]})" if change.why else ""
+    return f"{change.before or 'new'} → {change.after or 'gone'}{cause}"
+
+
+def _edits(old: Snapshot, new: Snapshot) -> Iterator[tuple[set[str], str]]:
+    """Edits of contract and plan: the claims and requirements in whose text each lies (none: others may use it), and
+    where it is, what was there, and what is."""
+    spans = [(name, told.span) for name, told in new.told.items() if "/guarantee/" in name]
+    spans += [(name, required.span) for name, required in new.requirements.items()]
+    for path, text in new.sources.items():
+        was, now = old.sources.get(path, "").splitlines(), text.splitlines()
+        if not old.sources or was == now:
+            continue
+        for kind, a, b, start, end in SequenceMatcher(None, was, now).get_opcodes():
+            if kind != "equal":
+                owners = {
+                    name
+                    for name, s in spans
+                    if s and s.file == path and s.line <= max(end, start + 1) and start < s.end_line
+                }
+                yield owners, f"{path}:{start + 1}: {_lines(was[a:b])} → {_lines(now[start:end])}"
+
+
+def _lines(lines: Sequence[str]) -> str:
+    text = " ".join(line.strip() for line in lines)
+    return (text if len(text) <= EDIT_CHARACTERS else f"{text[: EDIT_CHARACTERS - 1]}…") or "(nothing)"
 
 
 def _assumptions(old: Snapshot, new: Snapshot) -> Iterator[Change]:

@@ -23,6 +23,7 @@ from avow.assurance.rates import RateView
 from avow.assurance.standards import StandardView
 from avow.base import codec
 from avow.base.diagnostics import Span
+from avow.base.files import sha256
 from avow.base.records import dataclass
 from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Verdict
@@ -262,6 +263,11 @@ class RequirementView:
     def formal(self) -> str:
         """Its formula or temporal property; empty where it is prose."""
         return self.formula or self.temporal
+
+    @property
+    def meaning(self) -> str:
+        """A digest of what it says, and of what a person says that it rests on."""
+        return sha256("\n".join((self.text, self.formula, self.temporal, *self.supported_by)))
 
     @property
     def stands(self) -> str:

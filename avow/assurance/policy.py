@@ -19,13 +19,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from decimal import Decimal
 from functools import cache
-from importlib import resources
 from typing import Any
-
-import yaml
 
 from avow.base import codec
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.packaged import packaged
 from avow.base.records import dataclass
 from avow.base.suggestions import suggest
 from avow.base.verdict import Isolation, Link, Object, unsaid
@@ -326,15 +324,9 @@ def _unknown(
     ]
 
 
-def packaged(name: str) -> Any:
-    """The data of a YAML file in this package."""
-    text = resources.files("avow.assurance").joinpath(name).read_text(encoding="utf-8")
-    return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-
-
 @cache
 def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
-    data = packaged("profiles.yaml")
+    data = packaged("avow.assurance", "profiles.yaml")
     faults: list[Diagnostic] = []
     policies = {}
     for name, raw in data["profiles"].items():

@@ -55,17 +55,18 @@ def sign_case(
 def newest_signed(signed: Path, system: str) -> tuple[Baseline | None, tuple[str, ...]]:
     """The newest signature of a system's case that verifies, and why newer ones do not. Raises Rejected for a key in
     ``signed/keys`` that cannot be read."""
-    trusted = sorted((signed / KEYS).glob("*.pub"))
     refused: list[str] = []
     for path in sorted((signed / system).glob("*.json"), key=_number, reverse=True):
-        found = _read(path, system, trusted)
+        found = read_signed(path)
         if isinstance(found, Baseline):
             return found, tuple(refused)
         refused.append(f"{path.name}: {found}")
     return None, tuple(refused)
 
 
-def _read(path: Path, system: str, trusted: list[Path]) -> Baseline | str:
+def read_signed(path: Path) -> Baseline | str:
+    """A signature in ``signed/<system>/``, or why it does not count. Raises Rejected as `newest_signed` does."""
+    system, trusted = path.parent.name, sorted((path.parent.parent / KEYS).glob("*.pub"))
     try:
         opened = unseal(read_regular(path).decode("utf-8"), trusted)
     except (OSError, ValueError) as error:

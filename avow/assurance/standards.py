@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from avow.assurance.policy import packaged
+from avow.base.packaged import packaged
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Object
@@ -252,19 +252,10 @@ def _named(what: str, names: Sequence[str]) -> str:
 @cache
 def standards() -> Mapping[str, tuple[str, tuple[Objective, ...]]]:
     """Name of a standard → its title and its objectives."""
-    return {
-        name: (
-            raw["title"],
-            tuple(
-                Objective(
-                    o["id"],
-                    o["text"],
-                    tuple(map(Query, o.get("serves", ()))),
-                    tuple(o.get("levels", ())),
-                    o.get("remark", ""),
-                )
-                for o in raw["objectives"]
-            ),
-        )
-        for name, raw in packaged("standards.yaml").items()
-    }
+
+    def objective(raw: Mapping[str, Any]) -> Objective:
+        lists = {"serves": tuple(map(Query, raw.get("serves", ()))), "levels": tuple(raw.get("levels", ()))}
+        return Objective(**{"remark": "", **raw, **lists})
+
+    data = packaged("avow.assurance", "standards.yaml")
+    return {name: (raw["title"], tuple(map(objective, raw["objectives"]))) for name, raw in data.items()}

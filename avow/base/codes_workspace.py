@@ -213,8 +213,8 @@ WORKSPACE_CODES = register(
     declare(
         "DIFF001",
         "nothing to compare",
-        "The argument is no report, ledger or git revision.",
-        "Give a `report.json`, a ledger, or a commit.",
+        "The argument is no report, folder of reports, ledger, signature, workspace or git revision.",
+        "Give a `report.json`, a ledger, `signed`, the folder of another workspace, or a commit.",
     ),
     declare(
         "DIFF002",

@@ -12,13 +12,14 @@ import click
 from avow import __version__
 from avow.assurance.case import conclude
 from avow.assurance.codec import read_case
-from avow.assurance.compare import Change, Snapshot, compare, of_case, of_ledger
+from avow.assurance.compare import Change, Snapshot, compare, of_case, of_ledger, of_signature
 from avow.assurance.facts import facts_of_system
 from avow.assurance.model import RunInfo
+from avow.assurance.signed import KEYS, newest_signed, read_signed
 from avow.base import git
 from avow.base.codec import document, to_json
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.files import write_out
+from avow.base.files import read_regular, write_out
 from avow.base.plain import count
 from avow.base.tuning.shown import DIFF_REASONS
 from avow.base.workspace import Workspace, workspace
@@ -40,11 +41,11 @@ from avow.pipeline.workload import survey
     help="Exit code 1 where less is shown or more assumed than before, or never.",
 )
 def command(old: str, new: str | None, as_json: bool, page: Path | None, fail_on: str) -> int:
-    """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was re-run.
+    """What changed from OLD to NEW: each requirement (was, is, which edit), then claims, gates and what was re-run.
 
-    Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
-    contracts and plans of that revision are held against today's ledger. NEW is the workspace as it is, if left out.
-    Exit code 1 where something got worse.
+    Each is a report (its folder or report.json), a folder of reports, a ledger (.jsonl), a signature (signed/, a folder
+    or file in it), another workspace, or a git revision of this one: then the contracts and plans of that revision are
+    held against today's ledger. NEW is the workspace as it is, if left out. Exit code 1 where something got worse.
     """
     changes = [(system, change) for system, before, after in _pair(old, new) for change in compare(before, after)]
     if page is not None:
@@ -103,17 +104,38 @@ def _pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]
 def _snapshots(name: str | None) -> dict[str, Snapshot]:
     """System → its snapshot, from a report, a ledger, a revision, or (None) the workspace as it is. Raises Rejected."""
     path = Path(name) if name is not None else None
+    if path is not None and path.exists() and (found := _of_signatures(path)):
+        return found
     if path is not None and path.suffix == ".jsonl" and path.is_file():
         return {path.stem: of_ledger(path.stem, _records(path))}
     if path is not None and (path.is_file() or (path / "report.json").is_file()):
         case = read_case(path)
         return {case.system: of_case(case)}
+    if path is not None and (reports := sorted(path.glob("*/report.json"))):
+        return {case.system: of_case(case) for case in map(read_case, reports)}
+    if path is not None and (path / "contracts").is_dir():
+        return _of_contracts(Workspace(path), Workspace(path))
     place = workspace()
     if name is None:
         return _of_contracts(place, place)
     with tempfile.TemporaryDirectory() as folder:
         _checkout(place, name, Path(folder))
         return _of_contracts(Workspace(Path(folder)), place)
+
+
+def _of_signatures(path: Path) -> dict[str, Snapshot]:
+    """Of ``signed/``, or a system's folder in it, the newest signatures that count; or of a file there. Raises
+    Rejected."""
+    path = path.resolve()
+    if path.is_file() and path.parent.parent.name == "signed":
+        read = {path.parent.name: read_signed(path)}
+    else:
+        inside = path.parent.name == "signed"
+        folders = [path] if inside else sorted(path.glob("*/")) if path.name == "signed" else []
+        read = {f.name: newest_signed(f.parent, f.name)[0] or "no signature counts" for f in folders if f.name != KEYS}
+    if faults := [f"{path}: {name}: {why}" for name, why in read.items() if isinstance(why, str)]:
+        raise Rejected(*(Diagnostic("DIFF001", fault) for fault in faults))
+    return {name: of_signature(name, found) for name, found in read.items() if not isinstance(found, str)}
 
 
 def _records(path: Path) -> tuple[Entry, ...]:
@@ -127,7 +149,7 @@ def _checkout(place: Workspace, revision: str, folder: Path) -> None:
     try:
         git.write_files(place.root, revision, place.contracts.name, folder)
     except (git.GitFailed, OSError) as error:
-        message = f"'{revision}' is no report, ledger or revision here: {error}"
+        message = f"'{revision}' is no report, ledger, signature, workspace or revision here: {error}"
         raise Rejected(Diagnostic("DIFF001", message)) from None
 
 
@@ -138,7 +160,8 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]
         if isinstance(surveyed, Rejected):
             found[folder.name] = Snapshot(folder.name, {}, {})
             continue
-        system = surveyed.system
+        system, plan = surveyed.system, surveyed.system.plan
+        files = (*plan.contract_files, plan.path, *plan.included)
         case = conclude(
             facts_of_system(
                 system,
@@ -147,6 +170,7 @@ def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]
                 keys=surveyed.keys,
                 today=date.today(),
                 run=RunInfo("diff", "", 0.0, __version__),
+                sources={contracts.relative(path): read_regular(path).decode("utf-8", "replace") for path in files},
             )
         )
         found[system.name] = of_case(case)

@@ -13,6 +13,7 @@ from avow.evidence.status import Status
 from avow.report.page import asset, environment
 
 _KINDS = {
+    "requirement": ("Requirements: what each was, what it is, and which edit", "requirements changed", ""),
     "gate": ("Gates of the policy", "of the gates changed", ""),
     "worse": ("Lost: claims that stand worse", "worse", "bad"),
     "removed": ("Gone: claims that are not made any more", "gone", "open"),
@@ -22,7 +23,7 @@ _KINDS = {
     "better": ("Gained: claims that stand better", "better", "good"),
     "rerun": ("Re-run, with the same verdict", "re-run", "plain"),
 }
-"""Of each kind its heading, the word after its number, and its colour (a gate's is that of what it says now)."""
+"""Of each kind its heading, the word after its number, and its colour (empty: by what it says now)."""
 
 
 def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]]) -> str:
@@ -64,6 +65,5 @@ def _line(counts: Counter[str], lost: int) -> str:
 
 
 def _tone(kind: str, changes: Sequence[tuple[str, Change]]) -> str:
-    if kind != "gate":
-        return _KINDS[kind][2]
-    return "bad" if any(c.kind == "gate" and c.after == "fails" for _, c in changes) else "good"
+    worse = any(c.is_worse for _, c in changes if c.kind == kind)
+    return _KINDS[kind][2] or ("bad" if worse else "good")

@@ -6,21 +6,21 @@ The data beside this module (`qualification.yaml`) are kept by hand; everything 
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
-from importlib import resources
-from typing import Any
 
-import yaml
 from markupsafe import Markup
 
 from avow.assurance.certification import ProofGrade
 from avow.assurance.gap import independent, reviewers
 from avow.assurance.model import Case, ObligationView
+from avow.base.packaged import packaged
 from avow.base.persons import one_person
 from avow.base.records import dataclass
 from avow.base.verdict import Link
 from avow.evidence.status import weigh
 from avow.report.page import asset, environment
+
+DATA = "qualification.yaml"
+"""What is kept by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +37,6 @@ class Independence:
     """What was examined."""
     persons: tuple[str, ...]
     """Reviewers; two names of one person are one."""
-
-
-@cache
-def data() -> dict[str, Any]:
-    """What is kept by hand."""
-    text = resources.files("avow.report").joinpath("qualification.yaml").read_text(encoding="utf-8")
-    found: dict[str, Any] = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # a file of ours
-    return found
 
 
 def independence(view: ObligationView) -> Independence:
@@ -70,7 +62,7 @@ def render_qualification(case: Case) -> str:
         .get_template("qualification.html.j2")
         .render(
             case=case,
-            data=data(),
+            data=packaged("avow.report", DATA),
             used=[m for m in case.methods if m.name in backends],
             backends=backends,
             grades=[(grade, grades[grade]) for grade in ProofGrade],

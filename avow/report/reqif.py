@@ -20,7 +20,7 @@ from avow.report.wording import clean
 TEXT = "ReqIF.Text"
 KINDS: Mapping[str, tuple[str, ...]] = {
     "Hazard": (TEXT, "Status", "Severity", "Exposure", "Source", "Remark"),
-    "Requirement": (TEXT, "Status", "Formula", "Source", "Remark"),
+    "Requirement": (TEXT, "Status", "Failure rate", "Formula", "Source", "Remark"),
     "Derived property": ("Status", "Remark"),
     "Claim": (TEXT, "Status", "Formula", "Remark"),
     "Evidence": (TEXT, "Verdict", "Method", "Link", "Tool", "Tool output", "SHA-256", "Re-run"),
@@ -41,7 +41,14 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
         levels = {"Severity": own.severity, "Exposure": own.exposure, "Source": own.source}
         objects["Hazard", own.id] = {TEXT: own.text, "Status": status, **levels}
     for r in case.requirements:
-        objects["Requirement", r.id] = {TEXT: r.words, "Status": r.level, "Formula": r.formal, "Source": r.source}
+        rate = {"Failure rate": r.rate.brief} if r.rate and r.level.holds else {}
+        objects["Requirement", r.id] = {
+            TEXT: r.words,
+            "Status": r.level,
+            "Formula": r.formal,
+            "Source": r.source,
+            **rate,
+        }
     for row in rows:
         requirement, claim, evidence = ("Requirement", row.requirement), ("Claim", row.obligation), row.evidence
         path = (claim, ("Derived property", row.derivation), requirement, ("Hazard", row.hazards))

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import inside, read_regular
+from avow.base.packaged import packaged
 from avow.base.plain import bare
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
@@ -37,6 +35,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "mitigated_by": ("mitigated_by", "mitigated by", "mitigations", "constraints", "safety constraints"),
 }
 """Field of a hazard → the headings that it may have in a CSV file, in any case."""
+_SCHEMA = "avow.system", "hazards.schema.json"
 _LISTS = ("causes", "consequences", "mitigated_by")
 
 
@@ -78,7 +77,7 @@ def read_hazards(
 
 def _document(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
     root, faults = read_yaml(data, file)
-    faults += violations(root.located(), _schema(), "the hazards")
+    faults += violations(root.located(), packaged(*_SCHEMA), "the hazards")
     if faults:
         return (), faults
     found = []
@@ -117,7 +116,7 @@ def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic
             values |= {field: values[field].lower()} if field in values else {}
         name = values.pop("id", "")
         entry = {name: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}}
-        wrong = violations(Located(entry, span), _schema(), "the table")
+        wrong = violations(Located(entry, span), packaged(*_SCHEMA), "the table")
         faults += wrong
         if not wrong:
             found.append(_hazard(name, values, span))
@@ -129,13 +128,6 @@ def _hazard(name: str, values: Mapping[str, Any], span: Span) -> Hazard:
         key: " ".join(value.split()) if isinstance(value, str) else value for key, value in values.items()
     }
     return Hazard(name, span=span, **words)
-
-
-@cache
-def _schema() -> dict[str, Any]:
-    text = resources.files("avow.system").joinpath("hazards.schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text)
-    return schema
 
 
 def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnostic]:

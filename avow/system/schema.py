@@ -7,10 +7,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from importlib import resources
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.packaged import packaged
 from avow.base.remembered import Shelf
 from avow.base.suggestions import suggest
 from avow.base.tools import package_version
@@ -19,11 +19,9 @@ from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
 
 
-@cache
 def plan_schema() -> dict[str, Any]:
     """The published schema of plan.yaml."""
-    text = resources.files("avow.system").joinpath("plan.schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text)
+    schema: dict[str, Any] = packaged("avow.system", "plan.schema.json")
     return schema
 
 

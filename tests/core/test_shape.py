@@ -56,13 +56,10 @@ ELSEWHERE = {
     "avow/language/load._lately": KEPT,
     "avow/language/load._under": KEPT,
     "avow/report/page.environment": ONCE,
-    "avow/report/qualification.data": ONCE,
     "avow/solving/limits._spent": PROCESS,
     "avow/solving/z3_module.z3": ONCE,
     "avow/solving/z3_sorts._kept": "a Z3 context for questions of evaluation, each of which has one answer",
     "avow/solving/z3_sorts._session": "the Z3 context of a node's questions, for the time of its claims",
-    "avow/system/hazards._schema": ONCE,
-    "avow/system/schema.plan_schema": ONCE,
     "avow/system/schema._validator": ONCE,
 }
 """What outlives a call in the other rooms, and why it may."""

@@ -88,7 +88,8 @@ INSTEAD = {
     ),
     "avow explain HASH": """kept=$(tail -1 artifacts/ledger/thermostat.jsonl | grep -o '"hash":"[0-9a-f]*')"""
     " && avow explain ${kept#*:?}",
-    "avow diff OLD NEW --html FILE": "avow diff reports/thermostat reports/thermostat --html changes.html",
+    "avow diff v1.2": "avow diff reports/thermostat",
+    "avow diff signed --html FILE": f"{SIGNED} && avow diff signed --html changes.html",
     "avow diff OLD [NEW]": "avow diff reports/thermostat reports/thermostat",
     "avow monitor SYSTEM - --node agent": "avow monitor thermostat - --node thermostat <contracts/thermostat/traces/*",
     "avow refines A B [--node n] [--rename new=old]": "avow refines thermostat thermostat"

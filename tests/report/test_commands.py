@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import subprocess
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from avow.base.verdict import Verdict
 from avow.cli.audit import command as audit
 from avow.cli.diff import command as diff
 from avow.cli.explain import command as explain
+from avow.cli.init import command as init
 from avow.cli.report import command as report
 from avow.evidence.ledger import Ledger
 from avow.report import render_all
@@ -133,6 +135,7 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
     subject, obligations, records, keys, extras = rover_parts()
     better = [r for r in records if r.verdict is not Verdict.REFUTED]
     render_all(case(subject, obligations, better, keys=keys, **extras), root / "new")
+    assert run(diff, "reports", "reports/rover") == (0, "nothing changed\n")
     text = run(diff, "reports/rover", "new")[1]
     assert "better: rover/radiationSensor/guarantee/medium: refuted → tested" in text
     other = root / "other.jsonl"
@@ -155,6 +158,27 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
         run(diff, "no-such-revision", "reports/rover")
     with pytest.raises(Rejected):
         run(diff, "--", "--output=x", "reports/rover")
+
+
+def test_diff_takes_revisions_and_workspaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The requirement that an edit of the contract concerns is told with the edit, whatever is held against it."""
+    assert run(init, str(tmp_path / "w"))[0] == 0
+    monkeypatch.chdir(tmp_path / "w")
+    person = ("-c", "user.name=n", "-c", "user.email=e")
+    for words in (("init", "-q"), ("add", "-A"), (*person, "commit", "-qm", "first"), ("tag", "v1.2")):
+        subprocess.run(["git", *words], check=True)
+    shutil.copytree(tmp_path / "w", tmp_path / "copy")
+    path = Path("contracts/thermostat/system.rcl")
+    text = path.read_text()
+    assert run(diff, "v1.2") == run(diff, "../copy") == (0, "nothing changed\n")
+    path.write_text(text.replace("High = 24", "High = 25"))
+    line = 1 + text[: text.index("High = 24")].count("\n")
+    for old in ("v1.2", "../copy"):
+        lines = run(diff, old)[1].splitlines()
+        at = lines.index("  REQ2: still not shown")
+        assert lines[at + 1].startswith(f"      {path}:{line}: High = 24;"), lines
+        assert "High = 25;" in lines[at + 1]
+        assert not [line for line in lines if line.startswith("  REQ1")]
 
 
 def test_comparison_tells_new_gone_and_changed_claims() -> None:

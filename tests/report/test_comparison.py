@@ -18,12 +18,14 @@ from click.testing import CliRunner
 from avow.assurance.compare import ORDER, Change, Snapshot, compare, of_case
 from avow.assurance.model import Case
 from avow.assurance.naming import short
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Rejected, Span
+from avow.base.files import sha256
 from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
 from avow.evidence.record import Evidence
 from avow.report import render_all
 from avow.report.comparison import render_comparison
+from avow.system.plan import Requirement
 from report.hostile import NAME, hostile_case
 from report.test_page import Page
 
@@ -122,6 +124,70 @@ def test_comparing_is_fair_both_ways() -> None:
         assert kinds == {c.subject: c.kind for c in back if c.subject in claims}
         assert compare(old, old) == ()
         assert [ORDER.index(c.kind) for c in there] == sorted(ORDER.index(c.kind) for c in there)
+
+
+LINES = ["const LOW = 18;", "node n {", "guarantee g ( x > 1 )", "guarantee h ( x > LOW )", "}"]
+FILE = "contracts/rover/system.rcl"
+
+
+def required(lines: list[str], *, moved: str = "", verdict: Verdict = Verdict.PROVED) -> Snapshot:
+    """Two guarantees, each under a requirement of its own; `moved` means something else."""
+    claims = [replace(guarantee("n", name), span=Span(FILE, line, 1, line, 20)) for name, line in (("g", 3), ("h", 4))]
+    claims = [replace(claim, digest=sha256(moved + claim.id)) if claim.name in moved else claim for claim in claims]
+    asked = [Requirement(name, f"It is {name}.", None, None, (f"n.{name.lower()}",)) for name in ("G", "H")]
+    records = [evidence(claim, verdict if claim.name == "h" else Verdict.PROVED) for claim in claims]
+    subject = system({"n": ["g", "h"]}, requirements=asked)
+    return of_case(case(subject, claims, records, sources={FILE: "\n".join(lines)}))
+
+
+def edited(at: int, text: str) -> list[str]:
+    return [text if n == at else line for n, line in enumerate(LINES, 1)]
+
+
+@pytest.mark.parametrize(
+    ("after", "told"),
+    [
+        (required(LINES), {}),
+        (required(edited(4, "guarantee h ( x > LOW ) // why")), {}),  # it changes no meaning
+        (required(edited(4, "guarantee h ( x >= LOW )"), moved="h"), {"H": 4}),
+        (required(edited(1, "const LOW = 19;"), moved="h"), {"H": 1}),
+        (required(edited(1, "const LOW = 19;"), moved="gh"), {"G": 1, "H": 1}),
+        (required(["// a rover", *LINES], verdict=Verdict.REFUTED), {"H": 1}),
+        (required(LINES[:3] + LINES[4:], moved="h"), {"H": 4}),
+    ],
+)
+def test_a_requirement_names_the_edits_that_concern_it(after: Snapshot, told: dict[str, int]) -> None:
+    found = {c.subject: c for c in compare(required(LINES), after) if c.kind == "requirement"}
+    assert set(found) == set(told)
+    for name, line in told.items():
+        lines = [why for why in found[name].why if why.startswith(FILE)]
+        assert [why.split(":")[1] for why in lines] == [str(line)]
+        assert any(f"n.{name.lower()}" in why for why in found[name].why)
+
+
+def test_requirements_that_came_and_went_and_how_each_stands() -> None:
+    before, after = required(LINES), required(LINES, verdict=Verdict.REFUTED)
+    (worse,) = [c for c in compare(before, after) if c.kind == "requirement"]
+    assert (worse.text, worse.is_worse) == ("H: argued → not shown", True)
+    (better,) = [c for c in compare(after, before) if c.kind == "requirement"]
+    assert (better.text, better.is_worse) == ("H: not shown → argued", False)
+    fewer = replace(before, requirements={"G": before.requirements["G"]})
+    (gone,) = compare(before, fewer)
+    assert (gone.text, gone.is_worse) == ("H: argued → not claimed any more", True)
+    (new,) = compare(fewer, before)
+    assert (new.text, new.is_worse) == ("H: new → argued", False)
+    said = replace(before.requirements["G"], meaning="0", words="It is quick.")
+    (other,) = compare(before, replace(before, requirements={**before.requirements, "G": said}))
+    assert (other.text, other.why) == ("G: still argued", ("its sentence, formula or support is another",))
+
+
+def test_a_gate_that_needs_a_run_is_not_compared_with_a_conclusion_without_one() -> None:
+    whole = case(rover_parts()[0], [TARGET], [], discrepancies=())
+    bare = replace(whole, audited=False)
+    assert "integrity" in {g.id for g in whole.gates}
+    titles = {g.title for g in whole.gates if g.id in ("integrity", "derivations")}
+    assert titles <= set(of_case(whole).gates)
+    assert not titles & set(of_case(bare).gates)
 
 
 def pages() -> list[str]:

@@ -12,21 +12,23 @@ from conformance import test_shipped_backends
 from hypothesis_backend.faults import FAULTS
 from hypothesis_backend.test_faults import UNSEEN
 
+from avow.base.packaged import packaged
 from avow.base.verdict import Link, Object, Verdict
 from avow.conformance.suite import Conformance
 from avow.evidence.record import Evidence
-from avow.report.qualification import data, independence, render_qualification
+from avow.report.qualification import DATA, independence, render_qualification
 
+KEPT = packaged("avow.report", DATA)
 ROOT = Path(__file__).parents[2]
 
 
 def test_each_test_that_it_names_is_there() -> None:
-    named = [test for item in (*data()["functions"], *data()["mended"]) for test in item["tests"]]
+    named = [test for item in (*KEPT["functions"], *KEPT["mended"]) for test in item["tests"]]
     for test in named:
         path, _, function = test.partition("::")
         assert (ROOT / path).exists(), test
         assert not function or re.search(rf"^def {function}\(", (ROOT / path).read_text("utf-8"), re.M), test
-    ids = [item["id"] for item in (*data()["functions"], *data()["problems"])]
+    ids = [item["id"] for item in (*KEPT["functions"], *KEPT["problems"])]
     assert len(set(ids)) == len(ids)
 
 
@@ -37,8 +39,8 @@ def test_the_figures_of_seeded_faults_are_those_of_the_tests() -> None:
         if suite.__module__.endswith("test_shipped_backends"):
             verdicts = [verdict for seeded in suite.seeded for verdict in seeded.verdicts.values()]
             found[suite.backend.name] = [len(verdicts), sum(not verdict.supports for verdict in verdicts)]
-    assert data()["seeded"] == found
-    (said,) = [item["text"] for item in data()["problems"] if item["of"] == ["hypothesis"]]
+    assert KEPT["seeded"] == found
+    (said,) = [item["text"] for item in KEPT["problems"] if item["of"] == ["hypothesis"]]
     kinds, chance = len(FAULTS), len(UNSEEN)
     assert f"of {kinds} kinds of seeded faults, {kinds - chance} are found in each run, and {chance} only by" in said
 

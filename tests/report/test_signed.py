@@ -15,11 +15,13 @@ from click.testing import CliRunner
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
 from avow.assurance.signed import newest_signed, sign_case
+from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
 from avow.evidence.envelope import seal, unseal
 from avow.evidence.signing import new_key_pair
 from avow.report import render_all
+from avow.report.answers_page import render_answers
 from avow.system.plan import Requirement
 
 G = guarantee("n", "g", "n does g", "x > 1")
@@ -51,6 +53,11 @@ def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
     worse = made(Verdict.REFUTED, found)
     assert worse.changes.entries[0].kind == "open"
     assert worse.answers.changed[0][0] == "✘"
+    other = replace(G, formula="x > 2", digest="e" * 64)
+    moved = case(SUBJECT, [other], [evidence(other, Verdict.REFUTED)], baseline=found)
+    (line,) = [entry for entry in moved.changes.entries if entry.subject == "R" and entry.kind == "open"]
+    assert line.edits[0] == "“n does g” means something else: was x > 1, is x > 2"
+    assert "was x &gt; 1, is x &gt; 2" in render_answers(moved)
 
 
 def test_the_newest_that_verifies_counts(tmp_path: Path) -> None:
@@ -130,8 +137,38 @@ def test_diff_fails_on_what_is_worse_and_shows_both_formulas(tmp_path: Path) -> 
     code, text = run(good, bad)
     assert code == 1
     lines = text.splitlines()
-    assert lines[1].startswith(("  gate", "  worse")), text
+    assert lines[1] == "  R: argued → not shown"
+    assert next(line for line in lines[2:] if line[2] != " ").startswith(("  gate", "  worse")), text
     assert run(bad, good)[0] == 0
     code, text = run(good, moved)
     assert code == 0
     assert "      was: x > 1\n      now: x > 2" in text
+
+
+def test_diff_against_a_signature_compares_what_was_signed(tmp_path: Path) -> None:
+    path = signed(tmp_path)
+    other = replace(G, formula="x > 2", digest="e" * 64)
+    moved = case(SUBJECT, [other, guarantee("n", "h")], [evidence(other)])
+    for name, found in (("same", made()), ("bad", made(Verdict.REFUTED)), ("moved", moved)):
+        render_all(found, tmp_path / "reports" / name)
+
+    def run(*arguments: object) -> tuple[int, list[str]]:
+        done = CliRunner().invoke(diff, [str(a) for a in arguments], standalone_mode=False)
+        assert done.exception is None, done.exception
+        return int(done.return_value), done.output.splitlines()
+
+    reports = tmp_path / "reports"
+    for given in (path, path.parent, path.parent.parent):
+        assert run(given, reports / "same") == (0, ["nothing changed"])
+        code, lines = run(given, reports / "bad")
+        assert (code, lines[1]) == (1, "  R: argued → not shown")
+        code, lines = run(given, reports / "moved")
+        assert lines[2] == "      rover/n.g: was x > 1, is x > 2" or lines[2].endswith("n.g: was x > 1, is x > 2"), (
+            lines
+        )
+        assert not [line for line in lines if "rerun" in line or "answers now" in line]
+        assert [line for line in lines if line.startswith("  new: rover/n/guarantee/h")]
+    path.write_text("{}")
+    done = CliRunner().invoke(diff, [str(path), str(reports / "same")], standalone_mode=False)
+    assert isinstance(done.exception, Rejected)
+    assert done.exception.diagnostics[0].code == "DIFF001"

@@ -128,3 +128,6 @@ TIMELINE_PORTS = 12
 
 TIMELINES = 4
 """Timelines of one guarantee in its evidence, those with a finding first."""
+
+EDIT_CHARACTERS = 160
+"""Of an edited part of a contract or plan, before and after: some two lines of either."""
