@@ -300,6 +300,8 @@ class TrustLine:
     what: str
     which: str
     mitigation: str
+    partly: bool = field(default=False, metadata=LATER)
+    """Whether that was not done, or not for all of it."""
 
 
 @dataclass(frozen=True, slots=True)

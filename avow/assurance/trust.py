@@ -16,29 +16,25 @@ def trust_lines(
     wanted = certifiable(proofs)
     certified = [p for p in wanted if p.grade in (ProofGrade.CERTIFIED_1, ProofGrade.CERTIFIED_2)]
     twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
-    lines = [
-        TrustLine(
-            "Avow's front end",
-            "parser, type checker and translators",
-            "tested against an evaluator that shares no code with them; a translator is not proved",
-        )
-    ]
+    tested = "tested against an evaluator that shares no code with them; a translator is not proved"
+    lines = [TrustLine("Avow's front end", "parser, type checker and translators", tested)]
     if wanted and kernel.run == run:
         lines.append(
             TrustLine(
                 "the kernel",
                 "it re-establishes each proof of the composition",
                 f"{len(certified)} of {count(len(wanted), 'proof')} re-established in this run",
+                len(certified) < len(wanted),
             )
         )
     elif wanted:
-        lines.append(TrustLine("the calculus", count(len(wanted), "proof"), "the kernel did not run: nothing was done"))
+        done = "the kernel did not run: nothing was done"
+        lines.append(TrustLine("the calculus", count(len(wanted), "proof"), done, True))
     if kernel.solvers:
         names = " and ".join(f"{name} {version}" for name, version in sorted(kernel.solvers.items()))
-        second = (
-            f"{twice} of {len(certified)} answered by two solvers" if len(kernel.solvers) > 1 else "no second solver"
-        )
-        lines.append(TrustLine("solvers", names, second))
+        several = f"{twice} of {len(certified)} answered by two solvers"
+        second = several if len(kernel.solvers) > 1 else "no second solver"
+        lines.append(TrustLine("solvers", names, second, twice < len(certified) or not twice))
     tools: dict[str, int] = {}
     for proof in proofs:
         for tool in proof.tools:
@@ -50,7 +46,6 @@ def trust_lines(
         )
     bare = [a for a in assumptions if not a.owned]
     if bare:
-        lines.append(
-            TrustLine("assumptions without an owner", listed([a.number for a in bare], 6), "nobody keeps them true")
-        )
+        numbers = listed([a.number for a in bare], 6)
+        lines.append(TrustLine("assumptions without an owner", numbers, "nobody keeps them true", True))
     return tuple(lines)

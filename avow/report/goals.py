@@ -15,12 +15,14 @@ from avow.assurance.certification import ProofGrade
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.assurance.modules import RequirementModule, node_modules, requirement_modules
 from avow.assurance.naming import derivation_claim, is_foundation
+from avow.assurance.relied import upper_bound
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Link, Object
 from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.status import Status, weigh
 from avow.report import wording
+from avow.report.qualification import independence
 
 
 class Sort(StrEnum):
@@ -103,6 +105,8 @@ class _Argument:
         self.requirement_modules = requirement_modules(case)
         self.views = {view.id: view for view in case.obligations}
         self.grades = {proof.obligation: proof.grade for proof in case.proofs}
+        programs = [view for view in case.obligations if view.obligation.kind is Kind.PROGRAM]
+        self.links = [view for view in programs if view.obligation.name == ProgramClaim.LINKED]
         self.top = self.new(Sort.GOAL)
         self.requirements = {r.id: self.new(Sort.GOAL) for r in case.requirements}
         self.nodes = {node.name: self.new(Sort.GOAL) for node in case.nodes}
@@ -226,13 +230,7 @@ class _Argument:
         of_models = {v.obligation.node for v in self.case.guarantees if any(r.of is Object.MODEL for r in v.records)}
         if not of_models:
             return None
-        linked = [
-            v
-            for v in self.case.obligations
-            if v.obligation.kind is Kind.PROGRAM
-            and v.obligation.name == ProgramClaim.LINKED
-            and v.obligation.node in of_models
-        ]
+        linked = [v for v in self.links if v.obligation.node in of_models]
         goals, solutions = self.claims(linked)
         shown = {v.obligation.node for v in linked if v.standing.supports}
         text = "Each model that was verified behaves as the program that runs"
@@ -251,7 +249,13 @@ class _Argument:
     def tools(self) -> Module:
         """Whether the tools answer rightly: what was done about each part that has to be trusted."""
         solutions = [
-            Element(self.new(Sort.SOLUTION), Sort.SOLUTION, f"{line.what} ({line.which}): {line.mitigation}")
+            Element(
+                self.new(Sort.SOLUTION),
+                Sort.SOLUTION,
+                f"{line.what} ({line.which}): {line.mitigation}",
+                believed="it belongs to what has to be trusted",
+                defeaters=(Defeater(f"wrong: {line.what}", "" if line.partly else line.mitigation),),
+            )
             for line in self.case.answers.trusted
         ]
         text = "The tools and the trusted base answer rightly"
@@ -352,26 +356,36 @@ class _Argument:
     def defeaters(self, view: ObligationView, item: EvidenceView) -> Iterator[Defeater]:
         record = item.entry.evidence
         status, promised = weigh(record).status, view.obligation.kind is Kind.GUARANTEE
-        mechanical = record.link is not Link.GUIDED
-        seeded = "the backend's conformance tests catch seeded faults" if mechanical else ""
-        yield Defeater("the translation or the reading of the tool's answer is wrong", seeded)
+        if record.link is not Link.GUIDED:
+            seeded = "the backend's conformance tests catch seeded faults"
+            yield Defeater("the translation or the reading of the tool's answer is wrong", seeded)
+        if status is Status.REVIEWED:
+            several = len(independence(view).persons) > 1
+            yield Defeater("the reviewer overlooked a fault", "several persons reviewed it" if several else "")
+        if status is Status.JUSTIFIED:
+            yield Defeater("the reason that a person gives does not hold", "")
+        if status is Status.CHECKED:
+            yield Defeater("what the finite scenario leaves out breaks the claim", "")
+        if record.of is Object.RECORDING:
+            yield Defeater("the recording does not show the programs of today", "")
         if promised:
-            yield Defeater("the method would accept a wrong node as well", wording.mutation(record))
+            score, told = record.details.get("mutation"), wording.mutation(record)
+            whole = isinstance(score, Mapping) and score.get("killed") == score.get("mutants")
+            seen = f" ({told})" if told and not whole else ""
+            yield Defeater(f"the method would accept a wrong node as well{seen}", told if whole else "")
         if promised and status in (Status.PROVED, Status.CHECKED) and record.of is Object.MODEL:
             yield Defeater("the model differs from the program that runs", self.linked(view.obligation.node))
         if status in (Status.TESTED, Status.MONITORED):
-            bound = wording.bound_text(record.bound)
-            yield Defeater("a case that was not tried fails", f"bounded: {bound}" if bound else "")
+            known = upper_bound(record) is not None
+            yield Defeater("a case that was not tried fails", wording.bound_text(record.bound) if known else "")
         if status is Status.PROVED:
             twice = self.grades.get(view.id) is ProofGrade.CERTIFIED_2
-            yield Defeater("the solver is wrong", "two solvers answered each question" if twice else "")
+            other = "a method with another tool supports the claim" if independence(view).tools > 1 else ""
+            yield Defeater("the solver is wrong", "two solvers answered each question" if twice else other)
 
     def linked(self, node: str) -> str:
-        for view in self.case.obligations:
-            o = view.obligation
-            if o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED and o.node == node and view.standing.supports:
-                return f"the program agrees with it: {view.standing}"
-        return ""
+        agreed = (v for v in self.links if v.obligation.node == node and v.standing.supports)
+        return next((f"the program agrees with it: {view.standing}" for view in agreed), "")
 
 
 def by_name(modules: Iterable[Module]) -> Mapping[str, Element]:

@@ -7,15 +7,21 @@ must agree with the one here.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from assurance.sample import case as make_case
+from assurance.sample import evidence, guarantee, node_plan, system
 from assurance.test_case import rover_case
 
 from avow.assurance.model import Case
+from avow.base.verdict import Object, Verdict
+from avow.evidence.record import Evidence
 from avow.report.goals import Sort, argument
 from avow.report.sacm import SACM, XMI, render_sacm
+from avow.system.plan import EnvironmentInput, Requirement
 from report.hostile import hostile_case
 
 Feature = tuple[str, int, bool, bool]
@@ -148,6 +154,48 @@ def test_every_element_of_the_argument_is_there_and_claim_points_have_defeaters(
     assert all(element.defeaters for element in believed)
     counters = [element for element in root.iter() if element.get("isCounter") == "true"]
     assert len(counters) >= sum(len(element.defeaters) for element in believed)
+
+
+@pytest.mark.parametrize("made", CASES.values(), ids=CASES)
+def test_each_solution_has_a_claim_point_and_a_defeater(made: type[Case]) -> None:
+    solutions = [e for module in argument(made()) for e in module.elements if e.sort is Sort.SOLUTION]
+    assert solutions
+    assert [e.text for e in solutions if not (e.believed and e.defeaters)] == []
+
+
+G = guarantee("n", "g")
+PROOF, TEST = evidence(G), evidence(G, Verdict.TESTED, "hypothesis", bound={"cases": 9})
+READ = evidence(G, Verdict.REVIEWED, "review", details={"reviewers": ["A. Person"]})
+TWO = evidence(G, Verdict.REVIEWED, "review", details={"reviewers": ["A. Person", "B. Other"]})
+
+
+@pytest.mark.parametrize(
+    ("records", "words", "answered"),
+    [
+        ([PROOF], "the solver is wrong", False),
+        ([PROOF, TEST], "the solver is wrong", True),
+        ([PROOF], "the method would accept a wrong node as well", False),
+        ([replace(PROOF, details={"mutation": {"killed": 2, "mutants": 2}})], "would accept a wrong node", True),
+        ([replace(PROOF, details={"mutation": {"killed": 1, "mutants": 2}})], "1 of 2 mutants killed", False),
+        ([PROOF], "the translation or the reading", True),
+        ([TEST], "a case that was not tried fails", False),
+        ([replace(TEST, bound={"failures at most": 0.1})], "a case that was not tried fails", True),
+        ([READ], "the reviewer overlooked a fault", False),
+        ([TWO], "the reviewer overlooked a fault", True),
+        ([evidence(G, Verdict.CHECKED, "ajpf")], "what the finite scenario leaves out", False),
+        ([evidence(G, Verdict.MONITORED, "rosmonitoring", of=Object.RECORDING)], "does not show the programs", False),
+        ([PROOF], "wrong: assumptions without an owner", False),
+    ],
+)
+def test_a_defeater_is_answered_only_by_what_was_done(records: list[Evidence], words: str, answered: bool) -> None:
+    asked = Requirement("R", "It is safe.", None, None, ("n.g",))
+    environment = [EnvironmentInput("n.x", "in.x > 0", "so")]
+    plans = [node_plan("n", "high", "hoare", "hypothesis", "review", "ajpf", "rosmonitoring")]
+    subject = system({"n": ["g"]}, plans=plans, requirements=[asked], environment=environment)
+    found = make_case(subject, [G], records)
+    doubts = [d for module in argument(found) for e in module.elements for d in e.defeaters if words in d.text]
+    assert doubts, [d.text for module in argument(found) for e in module.elements for d in e.defeaters]
+    assert {bool(d.answer) for d in doubts} == {answered}
 
 
 @pytest.mark.parametrize(
