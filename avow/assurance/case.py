@@ -144,7 +144,7 @@ def conclude(facts: Facts) -> Case:
     fresh, freshness = _fresh(facts, views)
     proofs = proof_views(views, facts.kernel, facts.run.id)
     grade, reason = _grade(facts, proofs)
-    hazards = hazard_views(facts.hazards, requirements, by_id, relied, closure, supposed, titles, said.judge)
+    hazards = hazard_views(facts.hazards, requirements, by_id, relied, closure, supposed, facts.nodes, said.judge)
     found = gates(facts, views, requirements, derived, hazards, findings, proofs, relied, fresh)
     standard = None
     if facts.policy.standard:

@@ -34,8 +34,9 @@ from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause
+from avow.system.graph import dataflow
 from avow.system.names import ports_named
-from avow.system.plan import Finding, Hazard, Plan, Requirement, Statement, System
+from avow.system.plan import Endpoint, Finding, Hazard, Plan, Requirement, Statement, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +109,7 @@ def facts_of_system(
             tuple((clause.name, _say(clause)) for clause in node.assumptions),
             plan.node(node.name).title or words_of(node.name),
             discharging.get(node.name, ()),
+            tuple((port.name, _feeds(system, node.name, port.name)) for port in node.inputs),
         )
         for node in system.contract.nodes
         if not node.relay
@@ -155,6 +157,11 @@ def facts_of_system(
         history=told,
         hazards=tuple(replace(h, span=_relative(h.span, plan)) for h in plan.hazards),
     )
+
+
+def _feeds(system: System, node: str, port: str) -> str:
+    edge = dataflow(system).by_target.get(Endpoint(node, port))
+    return edge.source.node if edge else ""
 
 
 def _maps(plan: Plan) -> tuple[MapView, ...]:

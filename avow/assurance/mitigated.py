@@ -9,7 +9,7 @@ from avow.assurance.answers import Assumption, Level, Tone
 from avow.assurance.closure import Closure
 from avow.assurance.first_screen import tone_of
 from avow.assurance.hazards import WORST_FIRST, HazardView, Mitigation
-from avow.assurance.model import ObligationView, RequirementView
+from avow.assurance.model import NodeView, ObligationView, RequirementView
 from avow.assurance.relied import Opinion, Relied, relied_upon
 from avow.assurance.requirement_views import is_bounded, level_of
 from avow.evidence.obligation import Kind
@@ -24,17 +24,25 @@ def hazard_views(
     relied: Mapping[str, Relied],
     closure: Closure,
     supposed: Sequence[Assumption],
-    titles: Mapping[str, str],
+    nodes: Sequence[NodeView],
     opinion: Opinion,
 ) -> tuple[HazardView, ...]:
     """The hazards in their order. Guarantees as mitigations are judged as a requirement that rests on them, with all
-    that they rest on and assume; `relied`: claim → the record that it relies on; `titles`: the nodes'."""
+    that they rest on and assume; `relied`: claim → the record that it relies on."""
     known = {r.id: r for r in requirements}
+    titles = {node.name: node.title for node in nodes}
+    clauses = {f"{node.name}.{clause}" for node in nodes for clause, _ in node.guarantees}
+    fed = {f"{node.name}.{port}": source for node in nodes for port, source in node.inputs}
 
     def mitigation(name: str) -> tuple[Mitigation, Tone]:
         if name in known:
             r = known[name]
             return Mitigation(name, r.words, r.level, r.obligations), r.tone
+        if name in fed and name not in clauses:
+            source = fed[name]
+            who = f"only {titles.get(source, source)}" if source else "the environment"
+            level, tone = (Level.ARGUED, Tone.AMBER) if source else (Level.NOT_SHOWN, Tone.RED)
+            return Mitigation(name, f"in the graph {who} reaches {name}", level, ()), tone
         node, slash, method = name.partition("/")
         owner, _, clause = (node if slash else name).partition(".")
         own = [

@@ -88,12 +88,8 @@ class SideCondition:
 
 @dataclass(frozen=True, slots=True)
 class Derivation:
-    """One derivation of the calculus, or one instance of a rule within it.
-
-    `text` is the derivation in the paper's notation, as lines of plain Unicode text (shown in a fixed-width font);
-    `premises` are the names of nodes (their guarantees are what it rests on) or of other derivations; `conclusion` one
-    line; `conditional` what the conclusion depends on without its being shown.
-    """
+    """One derivation of the calculus, or one instance of a rule. `text` has it in the paper's notation, in lines;
+    `premises` are nodes, whose guarantees it rests on, or derivations; `conditional` is what nothing shows."""
 
     name: str
     rule: str
@@ -313,6 +309,8 @@ class NodeView:
     """What people call it."""
     discharged_by: tuple[str, ...] = ()
     """The obligations (without the system) that settle its assumptions: its guarantees count only with these."""
+    inputs: tuple[tuple[str, str], ...] = field(default=(), metadata=codec.LATER)
+    """(input, the node that feeds it; empty: the environment does)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import derivation_claim, requirement_claim, rerun, short
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
-from avow.evidence.status import weigh
+from avow.evidence.status import Status, weigh
 
 COLUMNS = (
     "source",
@@ -72,6 +72,7 @@ def trace(case: Case) -> tuple[Row, ...]:
     for hazard in case.hazards:
         for name in (name for m in hazard.mitigations for name in (m.name, *m.claims)):
             mitigating.setdefault(name, {})[hazard.hazard.id] = None
+    named = {requirement.id for requirement in case.requirements}
     for requirement in case.requirements:
         before = len(rows)
         seen: set[str] = set()
@@ -97,8 +98,8 @@ def trace(case: Case) -> tuple[Row, ...]:
         if len(rows) == before:
             rows.append(Row(remark="orphan: nothing supports this requirement"))
         rows += [Row(remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names]
-        named = {"source": requirement.source, "level": requirement.level, "requirement": requirement.id}
-        rows[before:] = [replace(row, **named) for row in rows[before:]]
+        known = {"source": requirement.source, "level": requirement.level, "requirement": requirement.id}
+        rows[before:] = [replace(row, **known) for row in rows[before:]]
     for view in case.guarantees:
         if view.id not in reached:
             rows += _rows(view, "", "orphan: serves no requirement")
@@ -117,12 +118,17 @@ def trace(case: Case) -> tuple[Row, ...]:
         )
         for entry in case.orphans
     ]
-    rows = [
-        replace(row, hazards=", ".join(mitigating.get(row.requirement, {}) | mitigating.get(row.obligation, {})))
-        for row in rows
-    ]
-    bare = [view.hazard.id for view in case.hazards if not view.mitigations]
-    return (*rows, *(Row(hazards=name, remark="orphan: nothing mitigates this hazard") for name in bare))
+    for at, row in enumerate(rows):
+        found = mitigating.get(row.requirement, {}) | mitigating.get(row.obligation, {})
+        rows[at] = replace(row, hazards=", ".join(v.hazard.id for v in case.hazards if v.hazard.id in found))
+    for hazard in case.hazards:
+        for m in hazard.mitigations:
+            if not m.claims and m.name not in named:  # what the graph keeps away
+                status = Status.ARGUED if m.level.holds else Status.MISSING
+                rows.append(Row(hazards=hazard.hazard.id, obligation=m.name, status=status))
+        if not hazard.mitigations:
+            rows.append(Row(hazards=hazard.hazard.id, remark="orphan: nothing mitigates this hazard"))
+    return tuple(rows)
 
 
 def _rows(view: ObligationView, derivation: str, remark: str = "") -> Iterable[Row]:

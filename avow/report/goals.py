@@ -254,7 +254,7 @@ class _Argument:
                 Sort.SOLUTION,
                 f"{line.what} ({line.which}): {line.mitigation}",
                 believed="it belongs to what has to be trusted",
-                defeaters=(Defeater(f"wrong: {line.what}", "" if line.partly else line.mitigation),),
+                defeaters=(Defeater(f"an error in {line.what} goes unseen", "" if line.partly else line.mitigation),),
             )
             for line in self.case.answers.trusted
         ]
@@ -264,9 +264,14 @@ class _Argument:
     def hazards(self) -> Module | None:
         if not self.case.hazards:
             return None
-        goals = []
+        goals, others = [], list[Element]()
         for view in self.case.hazards:
-            below = [goal for m in view.mitigations if (goal := self.mitigation(m.name, m.claims)) is not None]
+            below = []
+            for m in view.mitigations:
+                below.append(self.mitigation(m.name, m.claims) or self.new(Sort.GOAL))
+                if not self.mitigation(m.name, m.claims):  # what the graph keeps away
+                    label = f"{m.name} [{m.level}]"
+                    others.append(Element(below[-1], Sort.GOAL, m.words, undeveloped=True, label=label))
             hazard = view.hazard
             goals.append(
                 Element(
@@ -280,7 +285,7 @@ class _Argument:
                 )
             )
         good = all(view.level.holds for view in self.case.hazards)
-        return self.general("hazards", "Each hazard that was identified is mitigated", goals, good, goals)
+        return self.general("hazards", "Each hazard that was identified is mitigated", [*goals, *others], good, goals)
 
     def mitigation(self, name: str, claims: Sequence[str]) -> str | None:
         if name in self.requirements:

@@ -55,7 +55,7 @@ def independence(view: ObligationView) -> Independence:
 
 def render_qualification(case: Case) -> str:
     """The page. Deterministic: same case, same bytes."""
-    backends = {r.backend for view in case.obligations for r in view.records}
+    backends = {backend for node in case.nodes for _, backend in node.methods}
     grades = Counter(proof.grade for proof in case.proofs)
     return (
         environment()

@@ -37,6 +37,7 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
     links: dict[tuple[str, _Name, _Name], str] = {}
     views = {view.id: view for view in case.obligations}
     summaries = {item.entry.hash[:12]: item.entry.evidence.summary for view in views.values() for item in view.evidence}
+    graph = {m.name: m.words for view in case.hazards for m in view.mitigations}
     for own, status in ((view.hazard, view.level) for view in case.hazards):
         levels = {"Severity": own.severity, "Exposure": own.exposure, "Source": own.source}
         objects["Hazard", own.id] = {TEXT: own.text, "Status": status, **levels}
@@ -55,8 +56,8 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
         about = next(name for name in path if name[1])
         if about == claim and claim not in objects:
             view = views.get(row.obligation)
-            known = {TEXT: view.obligation.claim, "Formula": view.obligation.formula} if view else {}
-            objects[claim] = {**known, "Status": row.status}
+            text, formula = (view.obligation.claim, view.obligation.formula) if view else (graph.get(claim[1], ""), "")
+            objects[claim] = {TEXT: text, "Formula": formula, "Status": row.status}
         objects.setdefault(about, {"Status": row.status})
         if about == claim and row.requirement:
             links["rests on", requirement, claim] = row.derivation
@@ -70,7 +71,7 @@ def render_reqif(case: Case, rows: Sequence[Row]) -> str:
             objects[about]["Remark"] = f"{said}; {row.remark}" if said else row.remark
     for hazard in case.hazards:
         for m in hazard.mitigations:
-            named = [("Requirement", m.name), *(("Claim", name) for name in m.claims)]
+            named = [("Requirement", m.name), *(("Claim", name) for name in (m.name, *m.claims))]
             source = "Hazard", hazard.hazard.id
             links |= {("is mitigated by", source, name): m.name for name in named if name in objects}
     below: dict[_Name, list[_Name]] = {}

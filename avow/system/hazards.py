@@ -1,8 +1,9 @@
 """Hazards of a system and what mitigates each: a YAML file of one entry per hazard, or a table of an STPA in CSV.
 
 Severity and exposure have the levels of MIL-STD-882E, tables I and II. A mitigation is a requirement (``REQ1``), a node
-(``agent``: all of its guarantees), a guarantee (``agent.stop``), or a method of a node (``agent/monitor``), such as a
-monitor that runs on the robot. A security goal is a hazard with ``kind: security``.
+(``agent``: all of its guarantees), a guarantee (``agent.stop``), an input (``agent.command``: no message from outside
+the graph reaches it), or a method of a node (``agent/monitor``), such as a monitor that runs on the robot. A security
+goal is a hazard with ``kind: security``.
 """
 
 from __future__ import annotations
@@ -134,11 +135,11 @@ def check_mitigations(plan: Plan, nodes: Mapping[str, Node]) -> Iterator[Diagnos
     """A diagnostic for each mitigation that names no requirement, node, guarantee or method of the system."""
     known = [r.id for r in plan.requirements] + list(nodes)
     known += [f"{node.name}.{clause.name}" for node in nodes.values() for clause in node.guarantees]
+    known += [f"{node.name}.{port.name}" for node in nodes.values() for port in node.inputs]
     known += [f"{entry.node}/{method.id}" for entry in plan.nodes for method in entry.methods]
     for hazard in plan.hazards:
         for name in hazard.mitigated_by:
             if name not in known:
-                message = (
-                    f"hazard {hazard.id}: mitigated by {name!r}, which is no requirement, node, guarantee or method"
-                )
+                kinds = "requirement, node, guarantee, input or method"
+                message = f"hazard {hazard.id}: mitigated by {name!r}, which is no {kinds}"
                 yield Diagnostic("PLAN106", message, hazard.span, hint=suggest(name, known))

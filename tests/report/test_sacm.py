@@ -184,7 +184,7 @@ TWO = evidence(G, Verdict.REVIEWED, "review", details={"reviewers": ["A. Person"
         ([TWO], "the reviewer overlooked a fault", True),
         ([evidence(G, Verdict.CHECKED, "ajpf")], "what the finite scenario leaves out", False),
         ([evidence(G, Verdict.MONITORED, "rosmonitoring", of=Object.RECORDING)], "does not show the programs", False),
-        ([PROOF], "wrong: assumptions without an owner", False),
+        ([PROOF], "an error in assumptions without an owner", False),
     ],
 )
 def test_a_defeater_is_answered_only_by_what_was_done(records: list[Evidence], words: str, answered: bool) -> None:

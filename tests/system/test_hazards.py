@@ -9,11 +9,13 @@ import pytest
 from assurance.sample import case, evidence, guarantee, node_plan, system
 
 from avow.assurance.answers import Level
+from avow.assurance.case import conclude_again
 from avow.assurance.model import Case
 from avow.assurance.traceability import trace
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.evidence.record import Evidence
+from avow.report import formats
 from avow.report.bowtie import bowtie
 from avow.system.load import load_system
 from avow.system.plan import Hazard, Requirement, System
@@ -143,3 +145,44 @@ def test_the_trace_leads_from_source_and_hazard_to_the_command_that_asks_again()
     assert (row.source, row.hazards, row.requirement) == ("SRS 4.2", "H1", "R")
     assert (row.output, row.digest) == ("artifacts/rover/n/hoare/n.smt2", "ab" * 32)
     assert row.rerun == "AVOW_FRESH=1 doit discharge:rover:n:hoare"
+
+
+SECURE = """node remote { inputs() outputs( order : REAL ) topics( std_msgs/Float64 order )
+  guarantee small ( out.order < 9 ) }
+node n { inputs( order : REAL, r : REAL ) outputs( v : REAL )
+  topics( std_msgs/Float64 order, std_msgs/Float64 r, std_msgs/Float64 v ) guarantee r ( out.v <= in.order ) }
+"""
+
+
+def secured(folder: Path, contract: str, hazards: str) -> System:
+    (folder / "contracts/s").mkdir(parents=True)
+    (folder / "contracts/s/s.rcl").write_text(contract)
+    (folder / "contracts/s/plan.yaml").write_text("system: s\nhazards: h.yaml\n")
+    (folder / "contracts/s/h.yaml").write_text(hazards)
+    return load_system(folder / "contracts/s")
+
+
+def test_a_security_goal_rests_on_who_feeds_an_input(tmp_path: Path) -> None:
+    goals = (
+        "S1: {text: A stranger gives orders, severity: critical, kind: security, mitigated_by: [n.order]}\n"
+        "S2: {text: A stranger sends readings, severity: critical, kind: security, mitigated_by: [n.r]}\n"
+    )
+    found = case(secured(tmp_path, SECURE.replace("guarantee r (", "guarantee low ("), goals), [], [])
+    ordered, read = found.hazards
+    assert (ordered.level, read.level) == (Level.ARGUED, Level.NOT_SHOWN)
+    assert ordered.mitigations[0].words == "in the graph only remote reaches n.order"
+    (gate,) = [gate for gate in found.gates if gate.id == "hazards"]
+    assert (gate.passed, "S2: not shown" in gate.reason, "S1" in gate.reason) == (False, True, False)
+    rows = {row.hazards: (row.obligation, row.status) for row in trace(found) if row.hazards}
+    assert rows == {"S1": ("n.order", "argued"), "S2": ("n.r", "missing")}
+    made = dict(formats(found))
+    for name in ("gsn.yaml", "sacm.xml", "traceability.reqif"):
+        assert "in the graph only remote reaches n.order" in str(made[name]), name
+    assert conclude_again(found) == found
+
+
+def test_a_guarantee_comes_before_an_input_of_its_name(tmp_path: Path) -> None:
+    r = guarantee("n", "r", of="s")
+    subject = secured(tmp_path, SECURE, "H1: {text: It burns, severity: critical, mitigated_by: [n.r]}\n")
+    (view,) = case(subject, [r], [evidence(r)]).hazards
+    assert view.mitigations[0].claims == (r.id,)
