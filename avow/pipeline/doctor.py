@@ -2,28 +2,46 @@
 
 from __future__ import annotations
 
-import importlib
 import shutil
 import sys
 from dataclasses import replace
+from functools import partial
 from importlib import metadata
 
 from avow.backend_kit.registry import backend, names
 from avow.base.records import dataclass
-from avow.base.tools import Tool, find_tool, z3_tool
+from avow.base.tools import Tool, find_tool, works, z3_tool
 from avow.isolation.level import seals
 from avow.isolation.tracing import INSTALL, remedy, traces
 
 _PACKAGES = (
-    ("second opinion", "cvc5", "cvc5", "pip install 'avow[cvc5]'"),
-    ("PDF report", "typst", "typst", "pip install typst"),
-    ("live monitoring", "websockets", "websockets", "pip install 'avow[monitor]'"),
-    ("ROS 2 over DDS", "cyclonedds", "cyclonedds", "pip install 'avow[dds]'"),
-    ("verdicts as MCAP", "mcap", "mcap", "pip install 'avow[monitor]'"),
-    ("language server", "pygls", "pygls", "pip install 'avow[lsp]'"),
-    ("signatures", "cryptography", "cryptography", "pip install 'avow[signing]'"),
+    (
+        *("second opinion", "cvc5", "pip install 'avow[cvc5]'"),
+        "import cvc5; s = cvc5.Solver(); s.assertFormula(s.mkFalse()); assert s.checkSat().isUnsat()",
+    ),
+    ("PDF report", "typst", "pip install typst", "import typst; assert typst.compile(b'x')[:4] == b'%PDF'"),
+    (
+        *("live monitoring", "websockets", "pip install 'avow[monitor]'"),
+        "from websockets.sync import client, server; server.serve(print, '127.0.0.1', 0).socket.close()",
+    ),
+    (
+        *("ROS 2 over DDS", "cyclonedds", "pip install 'avow[dds]'"),
+        "from cyclonedds.domain import DomainParticipant; DomainParticipant(0)",
+    ),
+    (
+        *("verdicts as MCAP", "mcap", "pip install 'avow[monitor]'"),
+        "import io, mcap.writer; w = mcap.writer.Writer(io.BytesIO()); w.start(); w.finish()",
+    ),
+    (
+        *("language server", "pygls", "pip install 'avow[lsp]'"),
+        "from pygls.lsp.server import LanguageServer; LanguageServer('trial', '1')",
+    ),
+    (
+        *("signatures", "cryptography", "pip install 'avow[signing]'"),
+        "from cryptography.fernet import Fernet; f = Fernet(Fernet.generate_key()); f.decrypt(f.encrypt(b'x'))",
+    ),
 )
-"""What each is for, the distribution, its module, and the command that installs it."""
+"""What each is for, the distribution, the command that installs it, and a line that uses it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +62,7 @@ def findings(*, tried: bool = False) -> tuple[Finding, ...]:
     found = [
         ("everything", Tool("python", sys.version.split()[0], sys.executable, "", optional=False)),
         ("logic", z3_tool()),
-        *((use, _package(name, module, install)) for use, name, module, install in _PACKAGES),
+        *((use, _package(*of)) for use, *of in _PACKAGES),
         ("what tools read", _strace()),
         ("sandbox", replace(find_tool("bwrap", install="sudo apt install bubblewrap"), trial=_try_bubblewrap)),
         *((name, tool) for name in names() for tool in backend(name).tools()),
@@ -67,17 +85,9 @@ def _try_bubblewrap() -> str:
     return "" if seals() else "it cannot seal a program here: a container may forbid namespaces"
 
 
-def _package(name: str, module: str, install: str) -> Tool:
+def _package(name: str, install: str, line: str) -> Tool:
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Tool(name, None, None, install)
-    return Tool(name, version, shutil.which(name), install, trial=lambda: _imported(module))
-
-
-def _imported(module: str) -> str:
-    try:
-        importlib.import_module(module)
-    except Exception as error:  # a broken package raises anything
-        return f"it cannot be imported: {error}"[:200]
-    return ""
+    return Tool(name, version, shutil.which(name), install, trial=partial(works, line))

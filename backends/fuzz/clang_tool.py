@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from avow.base.tools import Tool, find_tool, package_version, tried
@@ -31,7 +32,11 @@ def zig() -> Tool | None:
     if spec is None or not spec.submodule_search_locations:
         return None
     path = Path(spec.submodule_search_locations[0], "zig")
-    return Tool("zig", package_version("ziglang"), str(path), "pip install 'avow[cpp]'", optional=False)
+    compiled = partial(
+        tried, [(str(path), "c++", "-c", "target.cpp")], "target.cpp", _TARGET, ""
+    )  # linking takes minutes
+    install = "pip install 'avow[cpp]'"
+    return Tool("zig", package_version("ziglang"), str(path), install, optional=False, trial=compiled)
 
 
 def clang() -> Tool:

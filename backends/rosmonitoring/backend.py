@@ -13,7 +13,7 @@ from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCh
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.files import inside, read_text
-from avow.base.tools import Tool
+from avow.base.tools import Tool, works
 from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
 
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from avow.formulas.values import Value
     from avow.language.contract import Node
     from avow.system.plan import System
+
+
+_TRIAL = """from rosbags.typesys import Stores, get_typestore
+get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(b"\\0\\1\\0\\0\\2\\0\\0\\0x\\0", "std_msgs/msg/String")"""
 
 
 class RosMonitoringBackend(Backend):
@@ -49,7 +53,8 @@ class RosMonitoringBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("rosbags", metadata.version("rosbags"), None, "pip install rosbags", package="rosbags"),)
+        version, install = metadata.version("rosbags"), "pip install rosbags"
+        return (Tool("rosbags", version, None, install, package="rosbags", trial=partial(works, _TRIAL)),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from avow.formulas.formula import free_variables

@@ -12,6 +12,10 @@ from pathlib import Path
 import pytest
 from helpers import edit
 
+from avow.backend_kit.registry import backend, names
+from avow.base.tools import works
+from avow.pipeline import doctor
+
 METHODS = "      - hoare: {program: models/thermostat.imp}\n"
 ACCEPTS = "policy: {profile: default, programs: [proved, checked, tested, not-run]}\n"
 
@@ -88,3 +92,19 @@ def test_doctor_names_what_is_missing(path: Path, tmp_path: Path) -> None:
     assert tools["dafny", "dafny"]["install"] == "sudo apt install dafny"
     assert tools["logic", "z3"]["version"]
     assert not tools["logic", "z3"]["fault"]
+
+
+def test_every_tool_has_a_job_that_tries_it() -> None:
+    tools = [tool for name in names() for tool in backend(name).tools() if tool.present]
+    assert [tool.name for tool in tools if tool.trial is None] == []
+    assert "No module named 'no_such_module'" in works("import no_such_module")
+    assert works("print('an error is mentioned')") == ""
+
+
+@pytest.mark.slow
+def test_the_job_of_a_package_fails_with_a_package_that_does_nothing(path: Path) -> None:
+    for _, name, _, line in doctor._PACKAGES:
+        (path / f"{name}.py").touch()
+        environment = {**os.environ, "PYTHONPATH": str(path)}
+        done = subprocess.run([sys.executable, "-c", line], env=environment, capture_output=True, check=False)
+        assert done.returncode == 1, name
