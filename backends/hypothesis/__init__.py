@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from avow.backend_kit.given import READING, file, schema, whole_number
 from avow.backend_kit.one_step import unsaid
 from avow.backend_kit.protocol import Backend, Job, Limits, OutsideCheck, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tools import works
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Clause, Node
 
@@ -29,7 +31,7 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, or of the node's own class, generated from the contract"
-    version = "11"
+    version = "12"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False
@@ -46,7 +48,12 @@ class HypothesisBackend(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         version = metadata.version("hypothesis")
-        return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False, package="hypothesis"),)
+        install, line = (
+            "pip install hypothesis",
+            "from hypothesis import find, strategies as st; find(st.integers(), bool)",
+        )
+        trial = partial(works, line)
+        return (Tool("hypothesis", version, None, install, optional=False, package="hypothesis", trial=trial),)
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause)

@@ -183,7 +183,7 @@ def _outcome(obligation: Obligation, answer: Answer, seed: int, wanted: int, ref
         return replace(outcome, verdict=Verdict.REFUTED, summary=apart[0].text(), counterexample=apart[0])
     if answer.unsteady is not None:
         case = ", ".join(f"{name} = {value}" for name, value in answer.unsteady)
-        why = f"undeclared input: asked the same again from its start, another process answers otherwise ({case})"
+        why = f"undeclared input: another process, asked the same again or often, answers otherwise ({case})"
         return replace(outcome, summary=why)
     why = _doubt(answer, own, wanted)
     if why:

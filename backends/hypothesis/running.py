@@ -16,7 +16,7 @@ import os
 import pickle
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -304,6 +304,7 @@ class Bench:
         try:
             self._replay_kept()
             stopped = self._sweep()
+            self._hold()
             for name in list(self.traces):
                 self._simplify(name)
             if self.crash and not self.unit.process.silent and not self.unit.process.fault:
@@ -354,9 +355,9 @@ class Bench:
             return
         for trace in (self.traces[name], first):
             with self._twin():
-                again = self._replayed([inputs for inputs, _ in trace], name)
-            if again is not None:
-                self.traces[name] = again
+                again = self._replayed((inputs for inputs, _ in trace), name)
+            if again:
+                self.traces |= again
                 return
         self.unsteady = self.traces.pop(name)[-1][0]
 
@@ -372,25 +373,28 @@ class Bench:
             first.process.fault = first.process.fault or twin.fault
             self.silent = self.silent or twin.silent
 
-    def _replayed(self, steps: Sequence[Inputs], name: str) -> Trace | None:
-        """The run of these steps up to one that breaks the guarantee, if one does and all before it are allowed."""
+    def _replayed(self, steps: Iterable[Inputs], *names: str) -> dict[str, Trace]:
+        """Of those guarantees that the run of these steps breaks, the run up to there, as far as it is allowed."""
         trace: Trace = []
+        broken: dict[str, Trace] = {}
         self.keeper.restart()
-        try:
+        with contextlib.suppress(SubjectFailed):
             memory = self.unit.begin()
             for step in steps:
                 inputs = {**step, **memory}
                 if inputs.keys() != self.inputs.keys() or not self._assumed(inputs):
-                    return None
+                    break
                 found = self.unit.advance(inputs)
                 trace.append((inputs, found))
-                if self.guarantees[name].judged.holds(self.keeper.at(valuation(inputs, found))) is False:
-                    return trace
+                values = self.keeper.at(valuation(inputs, found))
+                for name in names:
+                    if name not in broken and self.guarantees[name].judged.holds(values) is False:
+                        broken[name] = list(trace)
+                if len(broken) == len(names):
+                    break
                 self.keeper.advance(valuation(inputs, found))
                 memory = self.unit.memory(found)
-        except SubjectFailed:
-            return None
-        return None
+        return broken
 
     def _replay_kept(self) -> None:
         """First of all, whatever the seed, what refuted a guarantee before; as far as it is still a case."""
@@ -402,25 +406,43 @@ class Bench:
                     steps.append({n: received(v, self.inputs[n], n) for n, v in plain.items()})
             if len(steps) == len(run):
                 self.replayed += 1
-                for name in self.guarantees:
-                    trace = self._replayed(steps, name) if name not in self.traces else None
-                    if trace is not None:
-                        self.traces[name] = trace
+                self.traces = {**self._replayed(steps, *self.guarantees), **self.traces}
+
+    def _hold(self) -> None:
+        """The first inputs of a few runs, held: what counts, or waits, comes to its end."""
+        for inputs in self._starts if self._runs and not self.crash else ():
+            left = [name for name in self.guarantees if name not in self.traces]
+            if left and time.monotonic() < self.end:
+                self.traces |= self._replayed(itertools.repeat(inputs, tuning.LONGEST_RUN), *left)
 
     def _asked_again(self) -> Inputs | None:
-        """Inputs to which another process, asked the same from its start, gives another answer: what comes of clock,
-        chance or place in memory is no function of what was recorded."""
+        """Inputs to which another process, asked the same from its start, gives another answer, or, asked often, one
+        that breaks a guarantee: what comes of clock, chance, place in memory or the number of calls is no function of
+        what was recorded."""
         requests = self.unit.requests
+        short = [] if self.asked.driven else sorted(requests, key=lambda request: len(str(request)))[: BATCH // 2]
+        twice = [request for request in short for _ in range(2)]
         with self._twin() as twin:
-            for at in range(0, len(requests), BATCH):
+            for before in _batches(requests):
                 if time.monotonic() > self.end:
                     raise _Stop("again")
-                before = requests[at : at + BATCH]
-                again = twin.process.ask_all([request for request, _ in before])
-                for (request, reply), other in itertools.zip_longest(before, again):
-                    if twin.differ(reply, str(other) if isinstance(other, SubjectFailed) else other):
-                        return twin.inputs_of(request)
+                for inputs, _ in twin.differing(before):
+                    return inputs
+            end = min(self.end, time.monotonic() + tuning.SECONDS_OFTEN)
+            for before in itertools.islice(itertools.cycle(_batches(twice)), tuning.ASKED_OFTEN // BATCH):
+                for inputs, reply in twin.differing(before) if time.monotonic() < end else ():
+                    if self._breaks(inputs, reply):
+                        return inputs
         return None
+
+    def _breaks(self, inputs: Inputs, reply: Any) -> bool:
+        """Whether a function's reply to these inputs breaks a guarantee, or is none."""
+        try:
+            found = self.unit.read(reply)
+        except SubjectFailed:
+            return True
+        self.keeper.restart()
+        return any(g.judged.holds(self.keeper.at(valuation(inputs, found))) is False for g in self.guarantees.values())
 
     def _asked_apart(self) -> list[tuple[Pairs, str]]:
         """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
@@ -463,6 +485,10 @@ class Bench:
             case = steps if self.runs_counted else steps[0]
         shown = tuple(pairs(*step) for step in trace)
         return replace(found, failure=shown[-1], trace=shown if len(shown) > 1 else (), case=case)
+
+
+def _batches(requests: Sequence[tuple[Any, Any]]) -> list[Sequence[tuple[Any, Any]]]:
+    return [requests[at : at + BATCH] for at in range(0, len(requests), BATCH)]
 
 
 def _stand_in(bench: Bench) -> type:

@@ -89,9 +89,11 @@ class Strategies:
             case sorts.RealSort() | sorts.IntegerSort() | sorts.NaturalSort():
                 return self._few(sort) if few else self._number(sort, (None, None))
             case sorts.StringSort():
-                texts = pprint.pformat(list(self.thresholds.texts), width=110, compact=True)
-                self.definitions.setdefault("TEXTS", f"TEXTS = {texts}")
-                return "(st.sampled_from(TEXTS) | st.text(max_size=20))"
+                for name, texts in (("TEXTS", self.thresholds.texts), ("WORDS", self.thresholds.words)):
+                    shown = pprint.pformat(list(texts), width=110, compact=True)
+                    self.definitions.setdefault(name, f"{name} = {shown}")
+                self._list("LENGTHS", self.thresholds.lengths)
+                return "texts()"
             case sorts.EnumSort(members=members):
                 return f"st.sampled_from({list(members)!r})"
             case sorts.OpaqueSort(name=name):
@@ -118,6 +120,8 @@ class Strategies:
 
     def _few_or_known(self, sort: sorts.Sort) -> str:
         drawn = self._of(sort, few=True)
+        if isinstance(sort, sorts.RealSort | sorts.IntegerSort | sorts.NaturalSort):
+            drawn = f"either({drawn}, {self._of(sort, few=False)})"
         return f"({drawn} | st.sampled_from({self._column((sort,))}))" if (sort,) in self._known else drawn
 
     def _row(self, parameters: Column, constructor: str = "") -> str:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import ast
 import itertools
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.programs.samples import numbers_of, worked_out
+from avow.base.files import text_or_nothing
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.subterms import subterms
 from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
@@ -35,71 +39,80 @@ class Thresholds:
     """What lies around these, and what is calculated from them."""
     few: tuple[Fraction, ...]
     texts: tuple[str, ...]
+    """The texts of contract and program, and what a careless comparison takes for them."""
+    words: tuple[str, ...]
+    """What other texts are put together from."""
     lengths: tuple[int, ...]
 
 
-def thresholds(formulas: Iterable[Term], program: Iterable[str], parameters: Iterable[Fraction]) -> Thresholds:
-    """From the formulas, the texts of Python sources, and the numbers of a class's parameters."""
+def thresholds(formulas: Iterable[Term], program: Iterable[Path], parameters: Iterable[Fraction]) -> Thresholds:
+    """From the formulas, Python sources and the data files that these name, and a class's parameters."""
     stated = list(formulas)
     parts = [part for formula in stated for part in subterms(formula)]
     contract = {*numbers_of(stated), *(n for part in parts if isinstance(part, Compare) for n in _meeting(part))}
     said = {part.value for part in parts if isinstance(part, Literal) and isinstance(part.value, str)}
     of_program = [*itertools.islice(_constants(program), tuning.CONSTANTS_READ)]
-    texts = said | {text for text in of_program if isinstance(text, str)}
+    written = said | {text for text in of_program if isinstance(text, str)}
     own = {number for number in of_program if not isinstance(number, str)} | set(parameters)
+    own |= {Fraction(text) for text in written if text.isascii() and text.isdecimal()}
     few = _simple(own)[: tuning.CONSTANTS_COMBINED]
     calculated = {m for a in few for b in few for m in (a + b, a * b)}
+    calculated |= {Fraction(math.isqrt(n.numerator)) for n in own if n.denominator == 1 and n > 1}
     numbers = contract | own | {-number for number in own} | calculated
     small = sorted(contract)[: tuning.CONSTANTS_COMBINED]
     around = {n + d for n in numbers - calculated | {Fraction(0)} for d in (-1, -_STEP, 0, _STEP, 1)}
     between = {(a + b) / 2 for a, b in itertools.pairwise(sorted(numbers | {Fraction(0)}))}
     combined = {a + b for a in small for b in small} | {a - b for a in small for b in small}
     beside = {beside for n in numbers - calculated for beside in _neighbours(n)}
-    beside |= {n + d for n in calculated for d in (-1, 0, 1)}
     far = {2 * max(numbers, default=Fraction(0)) + 100, min(numbers, default=Fraction(0)) - 100}
-    whole = {int(n) for n in contract | own | calculated if n.denominator == 1 and 0 < n <= tuning.LONGEST_SEQUENCE}
-    lengths = {n + d for n in whole for d in (-1, 0, 1)} if len(whole) <= tuning.CONSTANTS_COMBINED else whole
+    whole, others = _lengths(contract | own), _lengths(calculated)
+    lengths = others | {n + d for n in whole for d in ((-1, 0, 1) if len(whole) <= tuning.LENGTHS_BESIDE else (0,))}
+    words = written | {str(n) for n in _simple(own) if n.denominator == 1}
     return Thresholds(
         _simple({Fraction(0), *contract, *own}),
-        _simple(around | between | combined | beside | far),
+        _simple(calculated | around | between | combined | beside | far),
         _simple({*map(Fraction, range(tuning.SMALL)), *contract}),
-        tuple(sorted({"", *(v for text in texts for v in _variants(text))}, key=lambda s: (len(s), s))),
+        _shortest({"", *words, *(v for text in written for v in _variants(text))}),
+        _shortest({"", *words}),
         tuple(sorted(n for n in lengths | {*tuning.LONG_SEQUENCES} if n > 0)),
     )
+
+
+def _lengths(numbers: Iterable[Fraction]) -> set[int]:
+    return {int(n) for n in numbers if n.denominator == 1 and 0 < n <= tuning.LONGEST_SEQUENCE}
 
 
 def _simple(numbers: Iterable[Fraction]) -> tuple[Fraction, ...]:
     return tuple(sorted(set(numbers), key=lambda n: (n.denominator, n < 0, abs(n))))
 
 
-def _variants(text: str) -> tuple[str, ...]:
-    """Texts that a careless comparison takes for this one."""
-    return (
-        text,
-        f" {text}",
-        f"{text} ",
-        text.upper(),
-        text.capitalize(),
-        f"{text}x",
-        f"x{text}",
-        text[:-1],
-        text[::-1],
-    )
+def _shortest(texts: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(texts, key=lambda text: (len(text), text)))
 
 
-def _constants(program: Iterable[str]) -> Iterator[Fraction | str]:
-    """The numbers and short texts that Python sources write down, calculated numbers (``2**31 - 1``) among them."""
-    for text in program:
+def _variants(text: str) -> Iterator[str]:
+    """Texts that a careless comparison takes for this one; the last two look alike."""
+    yield from (f" {text}", f"{text} ", text.upper(), text.capitalize(), f"{text}x", f"x{text}", text[:-1], text[::-1])
+    yield f"{text[:1]}\u200b{text[1:]}"
+    yield "".join(chr(ord(letter) + 0xFEE0) if "!" <= letter <= "~" else letter for letter in text)
+
+
+def _constants(program: Iterable[Path]) -> Iterator[Fraction | str]:
+    """The numbers and short texts that Python sources write down: calculated ones (``2 * LIMIT + 1``) among them, and
+    those of the data files that they name."""
+    for path in program:
         try:
-            tree = ast.parse(text)
-            calculated = [*worked_out(compile(tree, "", "exec", dont_inherit=True))]
+            tree = ast.parse(text_or_nothing(path))
+            alone = [part.value for part in ast.walk(tree) if isinstance(part, ast.Expr)]
+            documentation = {part.value for part in alone if isinstance(part, ast.Constant)}
+            written = [part.value for part in ast.walk(tree) if isinstance(part, ast.Constant)]
+            named = _Named(tree).visit(tree)
+            calculated = [*worked_out(compile(named, "", "exec", dont_inherit=True))]
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             continue
-        documentation = {id(part.value) for part in ast.walk(tree) if isinstance(part, ast.Expr)}
-        written = (part for part in ast.walk(tree) if isinstance(part, ast.Constant) and id(part) not in documentation)
-        for value in (*(part.value for part in written), *calculated):
+        for value in (*written, *calculated, *_beside(path, written)):
             match value:
-                case bool():
+                case _ if isinstance(value, bool) or value in documentation:
                     pass
                 case int() if abs(value) <= tuning.LARGEST_CONSTANT:
                     yield Fraction(value)
@@ -108,6 +121,43 @@ def _constants(program: Iterable[str]) -> Iterator[Fraction | str]:
                     yield Fraction(value)  # as the machine has it
                 case str() if len(value) <= tuning.LONGEST_TEXT:
                     yield value
+
+
+class _Named(ast.NodeTransformer):
+    """Puts their values in the place of a module's named constants and of `math.pi`, so that Python calculates."""
+
+    def __init__(self, tree: ast.Module) -> None:
+        self.known: dict[str, Any] = {}
+        for part in tree.body:
+            if isinstance(part, ast.Assign):
+                values = part.value.elts if isinstance(part.value, ast.Tuple) else [part.value]
+                for target in part.targets:
+                    names = target.elts if isinstance(target, ast.Tuple) else [target]
+                    for name, value in zip(names, values, strict=False):
+                        if isinstance(name, ast.Name) and isinstance(value, ast.Constant):
+                            self.known[name.id] = value.value
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        known = isinstance(node.ctx, ast.Load) and node.id in self.known
+        return ast.copy_location(ast.Constant(self.known[node.id]), node) if known else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        of_math = isinstance(node.value, ast.Name) and node.value.id == "math"
+        value = getattr(math, node.attr, None) if of_math else None
+        return ast.copy_location(ast.Constant(value), node) if isinstance(value, float) else node
+
+
+def _beside(source: Path, texts: Iterable[object]) -> Iterator[float | str]:
+    """The first numbers and words of the data files beside a source that it names."""
+    for name in texts:
+        if isinstance(name, str) and re.fullmatch(r"[\w-]+\.(json|ya?ml|txt|csv|ini|toml)", name):
+            path = source.with_name(name)
+            text = text_or_nothing(path)[: tuning.DATA_READ] if path.is_file() else ""
+            for word in re.findall(r"[-+]?[\w.]+", text):
+                try:
+                    yield float(word)
+                except ValueError:
+                    yield word
 
 
 def _neighbours(number: Fraction) -> Iterator[Fraction]:

@@ -15,6 +15,12 @@ BATCH = 50
 ASKED_AGAIN = 200
 """The first questions, which are put to a second process too: most thresholds, at a fraction of the time."""
 
+ASKED_OFTEN = 10_000
+"""Calls by which the shortest of these are asked again in turn, each twice: a quarter of an hour at ten hertz."""
+
+SECONDS_OFTEN = 3.0
+"""Seconds for these: a slow function is called less often."""
+
 APART = 4
 """Cases in which NaN, the infinities and the negative zero are tried: a fault there rarely depends on other inputs."""
 
@@ -30,8 +36,14 @@ LONG_SEQUENCES = (50, 300, 1100)
 LONGEST_SEQUENCE = 4096
 """Numbers up to which they are taken for lengths: a laser's scan has a thousand and more."""
 
+LENGTHS_BESIDE = 20
+"""So many lengths are tried one shorter and one longer, too."""
+
 CONSTANTS_READ = 300
 """So many constants of a program are looked at."""
+
+DATA_READ = 1000
+"""So many letters of a data file that a program names are looked at: its first rows, as each number is a threshold."""
 
 LARGEST_CONSTANT = 2**64
 """Larger constants are no thresholds of a robot: no machine word holds them."""

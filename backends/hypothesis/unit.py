@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from avow.formulas.values import Value
@@ -90,6 +91,13 @@ class Unit:
             except (Malformed, ValueError):
                 continue
         return found
+
+    def differing(self, before: Sequence[tuple[Any, Any]]) -> Iterator[tuple[Inputs, Any]]:
+        """The inputs of requests that have another reply now, and that reply."""
+        again = self.process.ask_all([request for request, _ in before])
+        for (request, reply), other in itertools.zip_longest(before, again):
+            if other != reply and self.differ(reply, str(other) if isinstance(other, SubjectFailed) else other):
+                yield self.inputs_of(request), other
 
     def differ(self, one: Any, other: Any) -> bool:
         """Whether two replies mean different outputs."""

@@ -51,7 +51,7 @@ def value(rng: random.Random, variable: Variable) -> Value:
 
 
 SCOPE: dict[str, Any] = {"Fraction": Fraction}
-for text in _helpers()[:4]:
+for text in [*_helpers().values()][:4]:
     exec(text, SCOPE)
 
 

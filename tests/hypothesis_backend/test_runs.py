@@ -173,6 +173,16 @@ def test_a_class_may_inherit_its_step(tmp_path: Path) -> None:
     assert found.verdict is Verdict.TESTED, found.summary
 
 
+@pytest.mark.parametrize("steps", [50, 399])
+def test_a_fault_that_comes_late_is_found(tmp_path: Path, steps: int) -> None:
+    """Runs are of twenty steps; then the first inputs of some are held."""
+    text = f"class C:\n    n = 0\n    def step(self, a):\n        self.n += 1\n        return self.n < {steps}\n"
+    rcl = "node n { inputs( a : BOOL ) outputs( o : BOOL ) topics() guarantee g ( o or not a ) guarantee h ( o or a ) }"
+    found = run(job(tmp_path, text, rcl, "s.py:C", cases=40)).outcomes
+    assert Verdict.REFUTED in {outcome.verdict for outcome in found}, found
+    assert all(len(o.counterexample.trace) >= steps for o in found if o.counterexample is not None)
+
+
 # -- generated contracts against every run ---------------------------------------------------------------------------
 
 

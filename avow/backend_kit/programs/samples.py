@@ -64,12 +64,12 @@ def written(text: str) -> list[Fraction]:
     return [Fraction(n) for n in numbers if isinstance(n, int) or math.isfinite(n)]
 
 
-def worked_out(code: CodeType) -> Iterator[int | float]:
-    """The numbers in a program as it is compiled: ``2**31 - 1`` is a threshold as much as 2 is."""
+def worked_out(code: CodeType) -> Iterator[int | float | str]:
+    """The numbers and texts in a program as it is compiled: ``2**31 - 1`` is a threshold as much as 2 is."""
     for held in code.co_consts:
         if isinstance(held, CodeType):
             yield from worked_out(held)
-        elif isinstance(held, int | float):
+        elif isinstance(held, int | float | str):
             yield held
 
 
