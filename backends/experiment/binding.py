@@ -67,19 +67,23 @@ def bound(name: str, sort: s.Sort, entry: Any) -> Binding:
 
 
 def _check_words(sort: s.Sort, words: Mapping[str, str]) -> None:
-    """Raises Unfit where a word stands for no name of the type, or is itself a name of it and stands for another."""
+    """Raises Unfit where a word stands for no value of the type, or is itself a value of it and stands for another. Any
+    text is a value of STRING."""
+    for word, name in words.items() if sort != s.STRING else ():
+        if (meant := _valued(name, sort)) is None:
+            names = ", ".join(_names(sort))
+            raise Unfit(f"'{name}' is {f'none of {names}' if names else 'no value of this type'}")
+        if (own := _valued(word, sort)) is not None and own != meant:
+            raise Unfit(f"'{word}' is itself a value of this type, and cannot stand for '{name}'")
+
+
+def _names(sort: s.Sort) -> tuple[str, ...]:
     match sort:
         case s.EnumSort(members=names):
-            pass
+            return names
         case s.DataSort(constructors=constructors):
-            names = tuple(each.name for each in constructors)
-        case _:  # of the other types any text may be a value
-            return
-    for word, name in words.items():
-        if name not in names:
-            raise Unfit(f"'{name}' is none of {', '.join(names)}")
-        if word in names and word != name:
-            raise Unfit(f"'{word}' is itself a value of this type, and cannot stand for '{name}'")
+            return tuple(each.name for each in constructors)
+    return ()
 
 
 def _items(sort: s.Sort, count: int) -> Sequence[s.Sort]:
@@ -114,14 +118,22 @@ def _constructed(name: str, sort: s.DataSort, entry: Mapping[str, Any]) -> Bindi
 
 def _cell(cells: Cells, column: str, sort: s.Sort, words: Mapping[str, str]) -> Value:
     text = words.get(cells[column], cells[column])
+    if (value := _valued(text, sort)) is not None:
+        return value
+    kind = {s.BOOL: "neither true nor false", s.REAL: "not a number"}.get(sort, "no value of its port's type")
+    raise Unfit(f"column '{column}': {repr(cells[column]) if text else 'an empty cell'} is {kind}")
+
+
+def _valued(text: str, sort: s.Sort) -> Value | None:
+    """The value that a word is; None where it is none of its type."""
     match sort:
-        case s.BoolSort() if text.casefold() in WORDS:
-            return WORDS[text.casefold()]
+        case s.BoolSort():
+            return WORDS.get(text.casefold())
         case s.RealSort() | s.IntegerSort() | s.NaturalSort():
             number = _number(text)
-            if isinstance(sort, s.RealSort) and number is not None:
+            if isinstance(sort, s.RealSort) or number is None:
                 return number
-            if number is not None and number.denominator == 1 and (isinstance(sort, s.IntegerSort) or number >= 0):
+            if number.denominator == 1 and (isinstance(sort, s.IntegerSort) or number >= 0):
                 return int(number)
         case s.EnumSort(members=members) if text in members:
             return Element(text)
@@ -129,8 +141,7 @@ def _cell(cells: Cells, column: str, sort: s.Sort, words: Mapping[str, str]) -> 
             return Data(text)
         case s.StringSort():
             return text
-    kind = {s.BOOL: "neither true nor false", s.REAL: "not a number"}.get(sort, "no value of its port's type")
-    raise Unfit(f"column '{column}': {repr(cells[column]) if text else 'an empty cell'} is {kind}")
+    return None
 
 
 def _number(text: str) -> Fraction | None:

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from avow.backend_kit.programs.judging import Formula
 from avow.base.records import dataclass
+from avow.base.tuning.effort import JUDGE_EFFORT
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.running import Keeper
-from avow.formulas.conditions import conditions
-from avow.formulas.formula import conjunction, negation, substitute
+from avow.formulas.conditions import Condition, conditions
+from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.temporal.cell import Cell
 from avow.formulas.temporal.cells import Records
 from avow.formulas.temporal.responses import due
+from avow.formulas.traversal import transform
 from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.printer import show_term
-from avow.language.sorts import FunctionSort
-from avow.language.subterms import histories, ports_of
-from avow.language.terms import TRUE, Quantified, Quantifier, Role, Term, Variable
+from avow.language.sorts import BOOL, FunctionSort
+from avow.language.subterms import histories, ports_of, subterms
+from avow.language.terms import TRUE, And, Conditional, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.solving.questions import solve
 
 from .binding import Interpretation, interpreted
+from .tuning import CASES
 
 Step = Mapping[str, Value]
 
@@ -75,7 +80,7 @@ def claim(clause: Clause, assumptions: Iterable[Clause], meanings: Iterable[Inte
     judged_terms = (formula, *(term for name, term in assumed.items() if name not in unseen))
     return Claim(
         ready(clause.name, formula),
-        tuple(ready(_text(condition), condition) for condition in _conditions(formula)),
+        tuple(ready(_text(condition), condition) for condition in _conditions(formula, assumed)),
         _demands(formula),
         tuple(ready(name, term) for name, term in assumed.items() if name not in unseen),
         tuple(unseen),
@@ -115,9 +120,20 @@ def _demands(formula: Term) -> Evaluator | None:
     others = {port: Variable(Role.BOUND, f"other {port.name}", port.sort) for port in outputs}
     broken = negation(substitute(formula, dict(others)))
     try:
-        return compile_term(Quantified(Quantifier.EXISTS, tuple(others.values()), broken) if others else broken)
+        asked = compile_term(Quantified(Quantifier.EXISTS, tuple(others.values()), broken) if others else broken)
     except NotEvaluable:
         return None
+    given = [port.qualified for port in ports_of(formula) if port.role is not Role.OUTPUT]
+    known: dict[tuple[Value, ...], Value] = {}
+
+    def demands(values: Mapping[str, Value]) -> Value:
+        """As `asked`, once of equal inputs."""
+        key = tuple(values[name] for name in given)
+        if key not in known:
+            known[key] = asked(values)
+        return known[key]
+
+    return demands
 
 
 def _demanded(claim: Claim, values: Step) -> bool:
@@ -127,15 +143,57 @@ def _demanded(claim: Claim, values: Step) -> bool:
         return True
 
 
-def _conditions(formula: Term) -> tuple[Term, ...]:
-    """Of a response, that all of what it demands has come due."""
+def _conditions(formula: Term, assumed: Mapping[str, Term]) -> tuple[Term, ...]:
+    """Of a response, that all of what it demands has come due; else those that can come about under the assumptions."""
     response = due(formula)
     if response is None:
-        return tuple(condition.formula for condition in conditions(formula))
+        apart = conditions(conjunction(_by_cases(formula, iter(range(CASES)))))
+        found = dict.fromkeys(way for condition in apart for way in _ways(condition))
+        return tuple(way for way in found if not _dead(way, assumed))
     if response.full == TRUE:
         return ()
     outer, full = response.outer, conjunction((response.full,))
     return (Quantified(Quantifier.EXISTS, outer, full) if outer else full,)
+
+
+def _by_cases(formula: Term, left: Iterator[int], when: tuple[Term, ...] = ()) -> Iterator[Term]:
+    """``y == (if b then s else t)`` says one thing under b and another under ``not b``, where inputs tell which."""
+    choices = (part for part in subterms(formula) if isinstance(part, Conditional) and part.sort != BOOL)
+    choice = next((c for c in choices if all(v.role is Role.INPUT for v in free_variables(c.condition))), None)
+    if choice is None or next(left, None) is None:
+        yield Implies(conjunction(when), formula) if when else formula
+        return
+    for test, chosen in ((choice.condition, choice.then), (negation(choice.condition), choice.otherwise)):
+        body = transform(formula, lambda part, chosen=chosen: chosen if part == choice else part)  # type: ignore[misc]
+        yield from _by_cases(body, left, (*when, test))
+
+
+def _ways(condition: Condition) -> Iterator[Term]:
+    """``a or b -> c`` demands c under a, and under b: who tried a has not tried b."""
+    choices = [(part, items) for part in condition.parts if (items := _choices(part))]
+    if not choices or sum(len(items) for _, items in choices) > CASES:
+        yield condition.formula
+        return
+    for choice, items in choices:
+        for item in items:
+            yield replace(condition, parts=tuple(item if part is choice else part for part in condition.parts)).formula
+
+
+def _choices(condition: Term) -> tuple[Term, ...]:
+    match condition:
+        case Or(items=items):
+            return items
+        case Not(body=And(items=items)):
+            return tuple(map(negation, items))
+        case Implies(left=left, right=right):
+            return negation(left), right
+    return ()
+
+
+def _dead(condition: Term, assumed: Mapping[str, Term]) -> bool:
+    said = {**assumed, "": condition}
+    plain = not any(histories(term) for term in said.values())
+    return plain and solve(said, effort=JUDGE_EFFORT, values="unused").status == "unsat"
 
 
 def _ports(formula: Term) -> set[str]:

@@ -17,3 +17,7 @@ GRID = 100_000
 
 RUNS_NEEDED = 1_000_000
 """Up to so many runs it is told how many would be enough."""
+
+CASES = 16
+"""Choices of a guarantee, and ways to meet one condition, that are told apart. Each is a stratum, which takes its share
+of the confidence."""

@@ -249,7 +249,8 @@ def _decimal(value: Fraction) -> str:
 
 
 def _percent(value: Fraction) -> str:
-    return f"{float(value * 100):.6g} %"
+    """Four decimals, never rounded up."""
+    return f"{decimal(Fraction(value * 10**6 // 1, 10**4))} %"
 
 
 def _percent_up(value: Fraction) -> str:

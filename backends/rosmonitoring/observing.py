@@ -149,11 +149,16 @@ def _check_words(
 ) -> None:
     if wire.name not in INTEGERS:
         return
-    for number in names:
+    own = words(sort, wire, holder, {})
+    for number, element in names.items():
         if not number.removeprefix("-").isdigit():
             constants = [name for name, kind, _ in holder.constants if kind == wire.name]
             hint = suggest(number, constants)
             raise Wrong(f"{number!r} is neither a number nor a constant of {holder.name}", "values", number, hint=hint)
+        if own.get(number, element) != element:
+            hint = f"leave {number} out of `values`, or give the elements other names"
+            meant = f"by its name in {holder.name} it means {own[number]}"
+            raise Wrong(f"{number} is to mean {element}, and {meant}", "values", number, hint=hint)
     left = [member for member in sort.members if member not in names.values()]
     if left and not said:
         raise Wrong(

@@ -101,6 +101,73 @@ def test_each_direction_of_an_equivalence_has_its_own_bound(tmp_path: Path) -> N
     assert never.vacuous
 
 
+CASES = {
+    "(in.speed > 10 or in.person) -> out.detected": ["in.speed > 10", "in.person"],
+    "not in.person and in.speed <= 10 or out.detected": ["in.speed > 10", "in.person"],
+    "in.person and (in.speed > 10 or in.kind == dog) -> out.detected": ["in.speed > 10", "in.kind == dog"],
+    "out.distance == (if in.person then 1 else 2)": ["in.person", "not in.person"],
+    "out.distance <= 1 + (if in.person then 1 else if in.speed > 10 then 2 else 3)": [
+        "in.person",
+        "not in.person and in.speed > 10",
+        "not in.person and in.speed <= 10",
+    ],
+    "out.seen == (if in.person then human else in.kind)": ["in.person", "not in.person"],
+    "in.speed > 10 -> out.distance <= (if in.person then 1 else 2)": [
+        "in.speed > 10 and in.person",
+        "in.speed > 10 and not in.person",
+    ],
+}
+
+
+@pytest.mark.parametrize("guarantee", CASES)
+def test_each_case_and_each_way_to_meet_a_condition_has_its_own_bound(tmp_path: Path, guarantee: str) -> None:
+    """Data that leave one of them out show nothing; all of them together are counted one by one."""
+    mapping = {"in.speed": "v", "in.person": "p", "in.kind": "k", "out.distance": "d", "out.detected": "f"}
+    mapping |= {"out.seen": "s"}
+
+    def cell(speed: int, person: bool, kind: str) -> str:
+        distance = "1" if person else "2" if speed > 10 or "1 else 2" in guarantee else "3"
+        return f"{speed},{person},{kind},{distance},true,{'human' if person else kind}".lower()
+
+    every = [(v, p, k) for v in (1, 20) for p in (False, True) for k in ("human", "dog")]
+    asked = [part.replace("in.kind == dog", "k == 'dog'") for part in CASES[guarantee]]
+    asked = [part.replace("in.speed", "v").replace("in.person", "p") for part in asked]
+    met = [{one for one in every if eval(part, {}, dict(zip("vpk", one, strict=True)))} for part in asked]
+    base = {"guarantee": guarantee, "mapping": mapping}
+    for at, part in enumerate(met):
+        without = rows("v,p,k,d,f,s", *(cell(*one) for one in every if one not in part for _ in range(30)))
+        assert settle(job(tmp_path / str(at), table=without, **base)).vacuous
+    whole = rows("v,p,k,d,f,s", *(cell(*one) for one in every for _ in range(30)))
+    outcome = settle(job(tmp_path / "all", table=whole, **base))
+    assert (outcome.verdict, outcome.vacuous) == (Verdict.TESTED, False), outcome.summary
+    trials = [s.trials for s in sample_of(outcome)]
+    wide = "in.person and (" in guarantee  # a part of the condition that is no choice holds in each way
+    assert sorted(trials) == sorted(30 * len({o for o in part if o[1] or not wide}) for part in met)
+
+
+@pytest.mark.parametrize("guarantee", ["out.distance == (if in.person then 1 else 2)", DETECTS])
+def test_a_case_that_the_assumptions_exclude_is_not_asked_for(tmp_path: Path, guarantee: str) -> None:
+    table = rows("p,d,f", *["yes,1,yes"] * 47)
+    mapping = {"in.person": "p", "out.distance": "d", "out.detected": "f"}
+    asked = {"guarantee": guarantee, "table": table, "mapping": mapping}
+    assert settle(job(tmp_path / "a", **asked)).vacuous
+    outcome = settle(job(tmp_path / "b", assume="assume someone ( in.person )", **asked))
+    assert [s.trials for s in sample_of(outcome)] == [47]
+
+
+def test_a_confidence_is_never_said_to_be_more_than_it_is(tmp_path: Path) -> None:
+    for confidence in ("0.95", "0.9999999", "0.99999999999", "19/20"):
+        asked = job(
+            tmp_path / confidence.replace("/", "-"),
+            "out.detected",
+            rows("f", *["yes"] * 300),
+            mapping={"out.detected": "f"},
+            confidence=confidence,
+        )
+        said = settle(asked).summary.partition(" fail at ")[2].partition(" % ")[0]
+        assert Fraction(said) / 100 <= Fraction(confidence)
+
+
 def test_yes_and_no_trials_count_each(tmp_path: Path) -> None:
     outcome = settle(job(tmp_path, "out.detected", rows("found", *["yes"] * 47), mapping={"out.detected": "found"}))
     assert outcome.summary == "47 runs, 0 failed: at most 6.2 % fail at 95 % confidence"
@@ -464,6 +531,26 @@ AT = "in.person -> out.at(1, 2)"
             {"mapping": {"in.kind": {"field": "v", "values": {"5": "cat"}}, "out.seen": "d"}},
             "EXP103",
             "'cat' is none of human, dog",
+        ),
+        *(
+            (
+                guarantee,
+                {"mapping": {port: {"field": "v", "values": values}, other: "d"}},
+                "EXP103",
+                f"'{word}' is itself a value",
+            )
+            for guarantee, port, other, values, word in (
+                (DETECTS, "out.detected", "in.person", {"no": "yes", "yes": "no"}, "no"),
+                (DETECTS, "in.person", "out.detected", {"0": "true"}, "0"),
+                (BRAKES, "out.distance", "in.speed", {"9": "1"}, "9"),
+                (BRAKES, "in.speed", "out.distance", {"5.0": "5.1"}, "5.0"),
+            )
+        ),
+        (
+            BRAKES,
+            {"mapping": {"in.speed": {"field": "v", "values": {"fast": "quick"}}, "out.distance": "d"}},
+            "EXP103",
+            "'quick' is no value",
         ),
         (AT, {"interpret": {"out.at(x, y)": "v =="}}, "RCL", ""),
         (AT, {"interpret": {"out.at(x, y)": "speeds == x"}}, "RCL", "speeds"),

@@ -305,6 +305,30 @@ def test_a_word_that_is_an_elements_name_means_that_element(
     assert all(repr(word) in fault.message and fault.span is not None for fault in told)
 
 
+@pytest.mark.parametrize(
+    ("values", "number"),
+    [
+        ({"0": "red", "1": "green"}, "0"),
+        ({"1": "green"}, "1"),
+        ({"0": "green", "7": "red"}, ""),
+        ({"7": "red", "8": "green"}, ""),
+        ({"OTHER": "red"}, ""),
+    ],
+)
+def test_a_number_whose_constant_has_an_elements_name_means_that_element(
+    values: dict[str, str], number: str, make_system: Callable[..., System]
+) -> None:
+    rcl = """context { L : {green, red}; } node n { inputs( c : L ) outputs( o : BOOL )
+      topics( a/S c matches(in.c), bool o matches(out.o) ) guarantee g ( out.o <=> in.c == red ) }"""
+    definition = "uint8 GREEN=0\nuint8 RED=1\nuint8 OTHER=7\nuint8 level"
+    system = make_system(rcl, {"in.c": {"field": "level", "values": values}}, messages={"a/S": definition})
+    _, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    told = [fault for fault in faults if "by its name in a/S it means" in fault.message]
+    assert [fault.message.startswith(f"mapping.in.c.values.{number}: {number} is to mean") for fault in told] == (
+        [True] if number else []
+    )
+
+
 BOTH = """node n { inputs( r : REAL, q : REAL ) outputs( v : REAL, at : REAL x REAL --> BOOL )
   topics( a/R r matches(in.r), a/R q matches(in.q), a/V v matches(out.v), a/R at matches(out.at) )
   guarantee g ( out.v == in.r ) guarantee h ( out.at(in.r, in.q) ) }"""
