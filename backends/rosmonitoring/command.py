@@ -272,7 +272,7 @@ def _anything_judged(running: Session) -> bool:
 def _print_summary(running: Session) -> None:
     for monitor, name, kind, tally in running.clauses():
         words = [coverage(tally) if tally.published else f"judged {tally.judged} times"]
-        if tally.judged and not tally.triggered:
+        if tally.judged and not tally.triggered and not tally.broken:
             words.append("its antecedent was never met")
         if tally.reason:
             words.append(tally.reason)

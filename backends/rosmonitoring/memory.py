@@ -25,6 +25,7 @@ from avow.formulas.temporal.clock import Timed, is_arrival, longest_limit
 from avow.formulas.temporal.responses import due, fulfilled, in_the_past, pending, responding
 from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Clause, ClauseKind
+from avow.language.printer import show_term
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import histories, subterms, timed
 from avow.language.terms import Apply, History, Implies, Literal, Past, Quantified, Role, Term, Variable
@@ -352,7 +353,8 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         steps.alone = bool(arrivals) and names == set(map(_port_of, arrivals))
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
-        clause = replace(clause, formula=formula)
+        said = clause.text or show_term(clause.formula, "unicode")
+        clause = replace(clause, formula=formula, text=said)
     return Watched(
         clause,
         tuple(sorted(names if steps is not None else free_names(formula))),

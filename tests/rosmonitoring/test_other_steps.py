@@ -305,3 +305,34 @@ def test_a_missed_deadline_is_one_breach_however_long_it_is_still_missed(limit: 
     assert [v.fault for v in told] == [Fault.GUARANTEE]
     assert (tally.broken, tally.overdue > 0) == (1, True)
     assert tally.asked == tally.decided
+
+
+SAID = [
+    "rose(in.a) -> within[1 steps](out.b)",
+    "in.a -> for[2 steps](out.b)",
+    "in.a -> next(out.b)",
+    "in.a -> out.b until in.n > 100",
+    "historically(in.a) -> out.b",
+    "held[1 steps](in.a) -> out.b",
+    "rose(in.a) -> within[1 s](out.b)",
+    "once[2 s](in.a) -> out.b",
+]
+
+
+@pytest.mark.parametrize("text", SAID)
+def test_a_breach_is_told_in_the_words_of_the_contract(make_system: Make, tmp_path: Path, text: str) -> None:
+    """Also in evidence, where the clause comes without its text; and it is not said that its condition never came."""
+    system = made(make_system, f"guarantee g ( {text} )")
+    run: list[Step] = [{"in.a": k > 0, "in.n": 0, "out.b": False} for k in range(6)]
+    run[0] = {"in.a": "historically" in text, "in.n": 0, "out.b": False}
+    known = found(system)
+    (clause,) = known.node.guarantees
+    monitor = Monitor(replace(known, node=replace(known.node, guarantees=(replace(clause, text="", sentence=None),))))
+    told = [violation for event in events_of(run) for violation in monitor.step(event)]
+    assert told
+    assert all("#" not in violation.explanation and "out.b" in violation.explanation for violation in told)
+    trace = tmp_path / "t.jsonl"
+    trace.write_text("".join(json.dumps(event) + "\n" for event in events_of(run)))
+    done = CliRunner().invoke(command, [str(system.plan.root), str(trace)])
+    assert "broken" in done.output
+    assert "antecedent was never met" not in done.output
