@@ -233,8 +233,7 @@ class Composition:
         """The assumptions of nodes that speak of environment inputs alone and stay assumed, with these inputs."""
         flat = self.frame
         for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in self.whole.root.assumed):
-            formula = flat.node(name.node).clause(name.clause).formula
-            ports = tuple(v.name for v, _ in flat.behind(name.node, formula))
+            ports = tuple(v.name for v in ports_of(flat.system.contract.node(name.node).clause(name.clause).formula))
             if ports and not any(Endpoint(name.node, port) in flat.graph.by_target for port in ports):
                 yield name, ports
 
@@ -261,7 +260,8 @@ class Composition:
                 clauses |= {c.name: c.formula for c in self._unchanging({v.name: v for v in ports})}
             inputs = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in ports)
             assumed = (Clause(ClauseKind.ASSUMPTION, label, 0, f) for label, f in clauses.items())
-            self._surroundings = Node("environment", inputs, (), (), tuple(assumed), ())
+            paces = {digest(g.formula): g for node in contract.nodes for g in node.guarantees if g.pace is not None}
+            self._surroundings = Node("environment", inputs, (), (), tuple(assumed), tuple(paces.values()))
         return self._surroundings
 
     def _unchanging(self, entries: Mapping[str, Variable]) -> Iterator[Clause]:
@@ -303,9 +303,9 @@ class Composition:
         over_runs = [clause.name for clause in (*assumed, *node.guarantees) if histories(clause.formula)]
         if not assumed or not over_runs:
             return ()
-        asked = results.Bounds(min(bounds.effort, DEFEAT_EFFORT), bounds.seed)
-        within = OverRuns(replace(node, assumptions=(*node.assumptions, *assumed)), asked)
-        alone = OverRuns(node, asked)
+        asked = results.Patience(min(bounds.effort, DEFEAT_EFFORT)), bounds.seed
+        within = OverRuns(replace(node, assumptions=(*node.assumptions, *assumed)), *asked)
+        alone = OverRuns(node, *asked)
         names = (clause.name for clause in node.guarantees)
         return tuple(name for name in names if within.never_met(name) and not alone.never_met(name))
 

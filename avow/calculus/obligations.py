@@ -387,8 +387,7 @@ class _Resting:
             yield from (h for clause in node.guarantees for h in self.guarantee(node.name, clause.name))
             yield from (self.discharging(node.name, clause.name) for clause in node.assumptions)
         yield from (self.composed(f"environment.{assumed.port}") for assumed in frame.assumed)
-        constants = (entry for entry in frame.system.plan.environment if entry.constant)
-        yield from (self.composed(f"environment.{entry.constancy}") for entry in constants)
+        yield from (self.composed(f"environment.{e.constancy}") for e in frame.system.plan.environment if e.constant)
         yield from self.together(frame.graph.nodes, None, optional=True)
 
     def needed(self, need: Needed, goal: str | None) -> Iterable[Hypothesis]:

@@ -57,7 +57,9 @@ def analyse(
     """
     bounds = bounds or Bounds()
     analysis = (
-        OverRuns(node, bounds) if remembers(node) else _Analysis(node, scenario or {}, ranges or Ranges(), bounds)
+        OverRuns(node, Patience(bounds.effort), bounds.seed)
+        if remembers(node)
+        else _Analysis(node, scenario or {}, ranges or Ranges(), bounds)
     )
     results = []
     asked = claims(node)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import assert_never
 
+from avow.base.diagnostics import Severity
 from avow.base.tuning.bounds import RUN_TO_AN_EXAMPLE, VIABILITY_ROUNDS
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
@@ -19,8 +20,9 @@ from avow.language.contract import ClauseKind, Node
 from avow.language.subterms import histories
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, triggers
-from avow.sanity.results import Bounds, Finding, listing, never_demanded
+from avow.sanity.results import Finding, Patience, listing, never_demanded
 from avow.sanity.viability import Viability, lasting, steps_of, told_apart, viable
+from avow.solving.limits import spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted, doubted
 
@@ -36,13 +38,21 @@ class OverRuns:
     """One node; its claims share what was found of its memory."""
 
     node: Node
-    bounds: Bounds
+    patience: Patience
+    seed: int = 0
+    serious: bool = True
+    """Whether the claim that is being settled is one of severity error."""
     remembering: Remembering = field(init=False)
     _viable: Viability | None = None
     _empty: bool | None = None
     _ends: dict[int, bool] = field(default_factory=dict)
     _written: list[Mapping[str, Term]] = field(default_factory=list)
     """What holds before the first step of a run, then what each step adds: the contract is kept, memories move on."""
+
+    @property
+    def limit(self) -> int:
+        """Effort for a question of this claim: less, the more went into claims that stayed open."""
+        return self.patience.effort(self.serious)
 
     def __post_init__(self) -> None:
         asked = tuple(
@@ -61,7 +71,10 @@ class OverRuns:
         return {c.name: c.formula for c in self.remembering.node.guarantees if not c.name.endswith(_TRIGGER)}
 
     def settle(self, claim: Claim) -> Finding:
+        self.serious, start, lost = claim.severity is Severity.ERROR, spent(), self.patience.lost
         found = self._settled(claim)
+        if found.verdict is Verdict.UNKNOWN:
+            self.patience.lost = max(self.patience.lost, lost + spent() - start)
         if claim.about is Property.ASSUMPTIONS_SATISFIABLE:
             return found
         return replace(found, because="assumptions-satisfiable") if self._impossible(found) else found
@@ -110,14 +123,14 @@ class OverRuns:
     @property
     def viability(self) -> Viability:
         if self._viable is None:
-            self._viable = viable(one_step(self.node), effort=2 * self.bounds.effort, seed=self.bounds.seed)
+            self._viable = viable(one_step(self.node), effort=2 * self.patience.effort(serious=True), seed=self.seed)
         return self._viable
 
     def _satisfiable(self) -> Finding:
         found = self._possible(self.assumptions, "no input meets {} at any step of a run")
         if found.verdict is not Verdict.PROVED or not any(histories(c.formula) for c in self.node.assumptions):
             return found
-        for_ever = lasting(self.node, effort=2 * self.bounds.effort, seed=self.bounds.seed)
+        for_ever = lasting(self.node, effort=2 * self.patience.effort(serious=True), seed=self.seed)
         match for_ever.verdict:
             case Verdict.PROVED:
                 return found
@@ -129,11 +142,7 @@ class OverRuns:
     def _realizable(self) -> Finding:
         found = self.viability
         if found.verdict is Verdict.REFUTED:
-            steps = (
-                f" in {len(found.run.trace)} step{'s' if len(found.run.trace) > 1 else ''}"
-                if found.run is not None and found.run.trace
-                else ""
-            )
+            steps = f" in {steps_of(len(found.run.trace))}" if found.run is not None and found.run.trace else ""
             text = found.reason or f"the environment can bring it{steps} to where no output meets the guarantees"
             return Finding(found.verdict, text, found.clauses or tuple(self.guarantees), found.run)
         if found.verdict is Verdict.UNKNOWN and not self.node.inputs and not self.node.assumptions:
@@ -150,9 +159,9 @@ class OverRuns:
         clause = self.node.clause(claim.subject or "")
         if clause.kind is ClauseKind.GUARANTEE:
             whole = claim.about is Property.NOT_REDUNDANT
-            return self if whole else OverRuns(replace(self.node, guarantees=(clause,)), self.bounds)
+            return self if whole else OverRuns(replace(self.node, guarantees=(clause,)), self.patience, self.seed)
         these = self.node.assumptions if claim.about is Property.NOT_REDUNDANT else (clause,)
-        return OverRuns(replace(self.node, assumptions=these, guarantees=()), self.bounds)
+        return OverRuns(replace(self.node, assumptions=these, guarantees=()), self.patience, self.seed)
 
     def _said_already(self, claim: Claim) -> Finding:
         name = claim.subject or ""
@@ -198,11 +207,9 @@ class OverRuns:
         if found.verdict is not Verdict.REFUTED:
             return found
         remembered = any(output in free_variables(cell.now) for cell in self.remembering.cells)
-        return (
-            Finding(Verdict.UNKNOWN, "it is remembered, and may matter later")
-            if remembered
-            else Finding(found.verdict, text)
-        )
+        if remembered:
+            return Finding(Verdict.UNKNOWN, "it is remembered, and may matter later")
+        return Finding(found.verdict, text)
 
     def _determined(self, name: str) -> Finding:
         """Two answers at one step of a run. Where an output is remembered, one of them may be no answer in the end."""
@@ -221,28 +228,31 @@ class OverRuns:
             return Finding(Verdict.PROVED)
         if found.verdict is not Verdict.PROVED:
             return found
-        if any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now)):
+        remembered = any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now))
+        lost = remembered and self.viability.verdict is Verdict.REFUTED  # then nobody can go on for ever after either
+        if remembered and not lost:
             lasting = self.viability.lasting
             if lasting is not None:  # of both values it is known whether the node can go on after them
                 after = substitute(lasting, {cell.before: cell.now for cell in self.remembering.cells})
                 stays = {"memory": lasting, "goes on": after, "goes on again": substitute(after, again)}
                 both = together | stays
-                answer = solve(both, effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
+                answer = solve(both, effort=self.limit, seed=self.seed, values="unused")
                 if answer.status == "unsat":
                     return Finding(*((Verdict.ERROR, CONTRADICTED) if doubted(answer, both) else (Verdict.PROVED,)))
                 if answer.status == "sat":
                     return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name} for ever")
-            return Finding(
-                Verdict.UNKNOWN, f"two values of out.{name} are possible at a step, and one may matter later"
-            )
-        return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name} at a step of a run")
+            return Finding(Verdict.UNKNOWN, f"two values of out.{name} are possible at a step; one may matter later")
+        text = f"the guarantees allow two values of out.{name} at a step of a run"
+        return Finding(Verdict.REFUTED, text, because="realizable" if lost else None)
 
     def _needed(self, name: str) -> Finding:
         """Whether the node could keep its guarantees for ever without the assumption."""
+        if self.viability.verdict is Verdict.REFUTED:
+            return Finding(Verdict.PROVED, "the guarantees cannot be kept with it either", because="realizable")
         if self.viability.verdict is not Verdict.PROVED:
             return Finding(Verdict.UNKNOWN, "whether the guarantees can be kept with it is not shown")
         others = tuple(clause for clause in self.node.assumptions if clause.name != name)
-        match OverRuns(replace(self.node, assumptions=others), self.bounds).viability.verdict:
+        match OverRuns(replace(self.node, assumptions=others), self.patience, self.seed).viability.verdict:
             case Verdict.REFUTED:
                 return Finding(Verdict.PROVED)
             case Verdict.PROVED:
@@ -252,8 +262,7 @@ class OverRuns:
 
     def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
         """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""
-        limit, seed = self.bounds.effort, self.bounds.seed
-        anywhere = solve(formulas, effort=limit, seed=seed, values="unused")
+        anywhere = solve(formulas, effort=self.limit, seed=self.seed, values="unused")
         if anywhere.status == "unsat":
             if doubted(anywhere, formulas):
                 return Finding(Verdict.ERROR, CONTRADICTED)
@@ -263,7 +272,7 @@ class OverRuns:
         for length in range(RUN_TO_AN_EXAMPLE):
             here = {label: self._at(f, length) for label, f in formulas.items()}
             together = {**self._run(length), **here}
-            answer = solve(together, effort=limit, seed=seed, values="unused")
+            answer = solve(together, effort=self.limit, seed=self.seed, values="unused")
             if answer.status == "sat":
                 return Finding(Verdict.PROVED)
             if answer.status != "unsat":
@@ -280,7 +289,7 @@ class OverRuns:
         if self.viability.reachable is None:
             return Finding(Verdict.UNKNOWN, open_still)
         within = {**formulas, "memory": self.viability.reachable}
-        ever = solve(within, effort=limit, seed=seed, values="unused")
+        ever = solve(within, effort=self.limit, seed=self.seed, values="unused")
         if ever.status == "unsat":
             if doubted(ever, within):
                 return Finding(Verdict.ERROR, CONTRADICTED)
@@ -306,7 +315,7 @@ class OverRuns:
         return self._excluded({**going, "here": self._at(whole, length)})
 
     def _excluded(self, facts: Mapping[str, Term]) -> bool:
-        answer = solve(facts, effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
+        answer = solve(facts, effort=self.limit, seed=self.seed, values="unused")
         return answer.status == "unsat" and not doubted(answer, facts)
 
     def _run(self, length: int) -> Mapping[str, Term]:
@@ -327,7 +336,7 @@ class OverRuns:
     def _over(self, length: int) -> bool:
         """Whether no run of so many steps keeps the contract."""
         if length not in self._ends:
-            answer = solve(self._run(length), effort=self.bounds.effort, seed=self.bounds.seed, values="unused")
+            answer = solve(self._run(length), effort=self.limit, seed=self.seed, values="unused")
             self._ends[length] = answer.status == "unsat"
         return self._ends[length]
 

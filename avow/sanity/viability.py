@@ -35,7 +35,7 @@ from avow.formulas.values import Value, show
 from avow.formulas.written import value_term
 from avow.language.contract import ClauseKind, Node, Port
 from avow.language.sorts import Sort, TupleSort
-from avow.language.subterms import subterms
+from avow.language.subterms import subterms, timed
 from avow.language.terms import FALSE, TRUE, Apply, Conditional, Implies, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
@@ -219,8 +219,9 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
 
 def lasting(node: Node, *, effort: int = 10_000, seed: int = 0) -> Viability:
     """Whether there are inputs, step by step for ever, that meet a node's assumptions: as if they were the outputs of a
-    node that promises what is assumed."""
-    made = one_step(replace(node, guarantees=()))
+    node that promises what is assumed, at the pace of its steps where what is assumed depends on time."""
+    in_time = any(timed(c.formula) for c in node.assumptions)
+    made = one_step(replace(node, guarantees=tuple(c for c in node.guarantees if in_time and c.pace is not None)))
     ports = (*made.node.inputs, *made.node.outputs)
     given = {p.variable: Variable(Role.OUTPUT, p.variable.qualified, p.sort) for p in ports}
     promised = tuple(

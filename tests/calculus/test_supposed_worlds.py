@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.base.verdict import Outcome, Verdict
 from avow.language.load import check_text
@@ -146,3 +147,35 @@ def test_what_is_proved_from_an_input_that_is_constant_rests_on_that(name: str, 
     found = outcomes(make(tmp_path, text, plan))["R"]
     assert found.verdict is Verdict.PROVED
     assert any(h.name.endswith("environment.in.k") for h in found.rests_on) is rests
+
+
+PACED = {
+    "slower than messages are assumed to come": ("once[1 s](arrived(in.x))", "every 2 s", True),
+    "slow enough to miss one": ("once[1 s](arrived(in.x))", "every 1001 ms", True),
+    "just as fast": ("once[1 s](arrived(in.x))", "every 1 s", False),
+    "perhaps slower": ("once[1 s](arrived(in.x))", "at most 2 s", False),
+    "too slow to end in time": ("in.x -> within[300 ms](not in.x)", "every 400 ms", False),
+    "of what must end and must not": ("(in.x or once(in.x)) and not held[1 s](in.x)", "every 2 s", True),
+}
+OWNERS = ("a node", "another node")
+
+
+@pytest.mark.parametrize("of", ["the plan", *(pytest.param(of, marks=pytest.mark.slow) for of in OWNERS)])
+@pytest.mark.parametrize("name", some(PACED, 2, slow=4))
+def test_a_world_that_no_steps_of_the_declared_pace_can_meet_supports_nothing(
+    name: str, of: str, tmp_path: Path
+) -> None:
+    assumed, pace, ends = PACED[name]
+    paced = node("n", "x : BOOL", "y : BOOL", *([f"A: {assumed}"] if of == "a node" else []), "G: out.y or not out.y")
+    text = paced.replace("topics()", f"topics()\n  steps( {pace} )")
+    if of == "another node":
+        text += node("m", "x : BOOL", "z : BOOL", f"A: {assumed}", "G: out.z")
+    said = f"assume: '{assumed}', " if of == "the plan" else ""
+    answers = outcomes(make(tmp_path, text, f"environment: {{in.x: {{{said}because: one wire}}}}\n"))
+    (found,) = (outcome for key, outcome in answers.items() if key.startswith("environment."))
+    assert found.vacuous is ends, found.summary
+    if of == "a node":
+        contract, _ = check_text(text, "n.rcl")
+        assert contract is not None
+        (result,) = analyse(contract.nodes[0], wanted={"assumptions-satisfiable"})
+        assert result.verdict is (Verdict.REFUTED if ends else Verdict.PROVED)

@@ -91,7 +91,7 @@ def one_step(node: Node) -> Remembering:
     made = compile_timed(replace(node, assumptions=(*node.assumptions, *paced), guarantees=others))
     read = events(made)
     ports = tuple(Port(t.Role.INPUT, v.name, v.sort, str(v.sort)) for v in read)
-    goes_on = Clause(ClauseKind.ASSUMPTION, CLOCK.name, 0, GOES_ON)
+    goes_on = Clause(ClauseKind.ASSUMPTION, "time goes on", 0, GOES_ON)
     assumed = (*made.node.assumptions, *((goes_on,) if CLOCK in read else ()))
     return replace(made, node=replace(made.node, inputs=(*node.inputs, *ports), assumptions=assumed))
 
