@@ -235,6 +235,18 @@ def test_adding_a_belief_posts_an_event_only_if_it_is_new():
     assert sum(b.startswith("m(") for b in said[-1][0]) == 1
 
 
+@pytest.mark.parametrize(
+    ("added", "seen"), [("v(1)", True), ("v(f(1))", True), ("v(X)", False), ("v(f(X))", False), ("v(_)", False)]
+)
+def test_adding_a_belief_with_a_free_variable_wakes_no_plan(added: str, seen: bool):
+    """As in AIL; it holds for every value all the same."""
+    plans = f"+p : {{ True }} <- +{added}, after; +v(Y) : {{ True }} <- other; +q : {{ B v(Z) }} <- believed;"
+    done = actions(run(plans, ["p"], ["q"], semantics=Semantics.EDGE))
+    assert "after" in done
+    assert "believed" in done
+    assert ("other" in done) is seen
+
+
 def test_dropping_a_belief_drops_all_that_unify():
     said = run("+p : { True } <- -n(X, 1);", ["p"], beliefs="n(1, 1) n(2, 1) n(3, 2)")
     assert said[-1][0] == ["n(3, 2)", "p"]
