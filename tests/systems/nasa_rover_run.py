@@ -52,7 +52,7 @@ def published(planC: Any, lengthC: int, planD: Any, lengthD: int, battery: Fract
 def run(mission: Sequence[int], interface: Interface, length: int) -> list[dict[str, dict[str, Any]]]:
     """Each step's inputs and outputs, by node; up to a step after which the battery is empty."""
     models = rover()
-    free, step = _callable(FREE_TABLE), _callable(STEP_TABLE)
+    free, step = function(FREE_TABLE), function(STEP_TABLE)
     points = _function(dict(enumerate(mission)), CHARGER)
     position, charge, recharge, at_goal, last, visited = CHARGER, Fraction(1), False, False, CHARGER, 0
     found: list[dict[str, dict[str, Any]]] = []
@@ -63,7 +63,7 @@ def run(mission: Sequence[int], interface: Interface, length: int) -> list[dict[
         charging = models.plan_to_charging(gra["start"], CHARGER, free, step)
         destination = models.plan_to_destination(gra["start"], gra["goal"], free, step)
         battery = models.battery_monitor(charge)
-        plan_c, plan_d = _plan(charging["planC"]), _plan(destination["planD"])
+        plan_c, plan_d = planned(charging["planC"]), planned(destination["planD"])
         told = interface(plan_c, charging["lengthC"], plan_d, destination["lengthD"], battery)
         hardware_in = {"movement": told["movement"], "place": position, "energy": charge, "charger": CHARGER}
         moved = models.hardware(**hardware_in)
@@ -97,7 +97,7 @@ class _Function:
         return list(self.value.table)
 
 
-def _callable(value: FunctionValue) -> _Function:
+def function(value: FunctionValue) -> _Function:
     return _Function(value.table, value.default)
 
 
@@ -105,7 +105,7 @@ def _function(table: Mapping[int, Any], default: Any) -> _Function:
     return _Function({(k,): v for k, v in table.items()}, default)
 
 
-def _plan(answer: Mapping[Any, Any]) -> _Function:
+def planned(answer: Mapping[Any, Any]) -> _Function:
     return _function({k: v for k, v in answer.items() if k is not ...}, answer[...])
 
 

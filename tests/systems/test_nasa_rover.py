@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import itertools
-from collections import deque
+import random
+from collections import Counter, deque
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -38,6 +39,8 @@ from .nasa_rover_run import (
     USE,
     WAYS,
     as_value,
+    function,
+    planned,
     published,
     rover,
     run,
@@ -344,7 +347,41 @@ def test_the_environment_assumptions_hold_of_the_grid() -> None:
             assert way[-1] == g
             assert all(pair in STEPS for pair in itertools.pairwise(way))
             assert [AWAY[cell, g] for cell in way] == list(range(AWAY[a, g], -1, -1))
-    assert all(AWAY[b, g] <= AWAY[a, g] + 1 for a, b in STEPS for g in FREE)
+    assert all(AWAY[b, g] <= AWAY[a, g] + 1 and AWAY[a, g] <= AWAY[b, g] + 1 for a, b in STEPS for g in FREE)
+
+
+PLANNERS = {
+    "ComputePlan2Charging": ("charger", "planC", "lengthC", "plan_to_charging"),
+    "ComputePlan2Destination": ("goal", "planD", "lengthD", "plan_to_destination"),
+}
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_on_every_map_that_meets_the_assumptions_breadth_first_search_meets_the_guarantees(planner: str) -> None:
+    """Also where the map's table of distances is made up: a walk of so many moves is its way."""
+    to, plan, length, name = PLANNERS[planner]
+    node, chance, count = system().contract.node(planner), random.Random(0), Counter[bool]()
+    for _ in range(600):
+        cells = range(chance.randrange(2, 5))
+        steps = [(a, b) for a in cells for b in cells if chance.random() < 0.6]
+        walk = [chance.choice(cells)]
+        for _ in range(chance.randrange(4)):
+            walk.append(chance.choice([b for a, b in steps if a == walk[-1]] or walk[-1:]))
+        away = {(cell, walk[-1]): len(walk) - 1 - k for k, cell in enumerate(walk)}
+        away = {(cell, walk[-1]): away.get((cell, walk[-1]), chance.randrange(4)) for cell in cells}
+        maps = {"free": FREE_TABLE, "step": FunctionValue(dict.fromkeys(steps, True), False)}
+        maps["free"] = FunctionValue(dict.fromkeys(((cell,) for cell in cells), True), False)
+        maps["away"] = FunctionValue(away, 9)
+        maps["way"] = FunctionValue({(walk[0], walk[-1], k): cell for k, cell in enumerate(walk)}, walk[-1])
+        step = {f"in.{port}": value for port, value in {"start": walk[0], to: walk[-1], **maps}.items()}
+        found = getattr(rover(), name)(walk[0], walk[-1], function(maps["free"]), function(maps["step"]))
+        step |= {f"out.{length}": found[length], f"out.{plan}": as_value(planned(found[plan]))}
+        allowed = all(compile_term(clause.formula)(step) for clause in node.assumptions)
+        count[allowed] += 1
+        if allowed:
+            assert all(compile_term(clause.formula)(step) for clause in node.guarantees), step
+    assert count[True] > 50
+    assert count[False] > 50
 
 
 @pytest.mark.slow
