@@ -22,6 +22,7 @@ from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.formulas.finite import interpretation
 from avow.formulas.formula import digest, sort_digest, substitute
+from avow.formulas.temporal.clock import one_pace
 from avow.kernel.solvers import Solvers
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.sorts import BOOL, FunctionSort
@@ -260,7 +261,8 @@ class Composition:
                 clauses |= {c.name: c.formula for c in self._unchanging({v.name: v for v in ports})}
             inputs = tuple(Port(Role.INPUT, v.name, v.sort, str(v.sort)) for v in ports)
             assumed = (Clause(ClauseKind.ASSUMPTION, label, 0, f) for label, f in clauses.items())
-            paces = {digest(g.formula): g for node in contract.nodes for g in node.guarantees if g.pace is not None}
+            paced = contract.nodes if one_pace(contract.nodes) else ()  # else their steps are not the same steps
+            paces = {digest(g.formula): g for node in paced for g in node.guarantees if g.pace is not None}
             self._surroundings = Node("environment", inputs, (), (), tuple(assumed), tuple(paces.values()))
         return self._surroundings
 

@@ -357,7 +357,7 @@ class EnvironmentQuestion:
 
     because: str
     label: str = ""
-    """Of what the plan assumes (`Frame.environment`); none where it is a node's own assumption."""
+    """Of what is assumed (`Composition.assumed`); none where it is that an input is constant."""
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         if not self.because:
@@ -369,24 +369,23 @@ class EnvironmentQuestion:
         if not found.verdict.supports:
             text = f"whether an environment can meet for ever all that is assumed of it is open: {found.explanation}"
             return Answer(found.verdict, text, link=Link.GUIDED)
-        excluded = next(self._excluded(composition.frame), None) if self.label else None
-        if excluded is None:
-            excluded = next(iter(composition.excluded_over_runs(bounds)), None)
+        excluded = next(self._excluded(composition), None) if self.label else None
+        excluded = excluded or next(iter(composition.excluded_over_runs(bounds)), None)
         if excluded is not None:
             text = f"vacuous: what {excluded} is about can never come about where this is so"
             return Answer(Verdict.JUSTIFIED, text, link=Link.GUIDED, vacuous=True)
         return Answer(Verdict.JUSTIFIED, self.because, link=Link.GUIDED)
 
-    def _excluded(self, frame: Frame) -> Iterator[str]:
+    def _excluded(self, composition: Composition) -> Iterator[str]:
         """The guarantees whose condition this keeps from coming about, which their nodes' contracts do not."""
-        environment = frame.environment()
+        frame, environment = composition.frame, composition.assumed()
         about = ports_of(environment[self.label])
-        for node in frame.graph.nodes:
+        for node in (name for name in frame.graph.nodes if not self.label.startswith(f"{name}.")):
             for guarantee in frame.node(node).guarantees:
                 for situation in triggers(frame.clause(node, guarantee.name)):
                     if not set(about) & set(ports_of(situation)):
                         continue
-                    known = frame.contracts((node,)) | environment | frame.memory()
+                    known = frame.contracts((node,)) | environment
                     answer = implied(known, negation(situation), effort=DEFEAT_EFFORT)
                     if answer.verdict is Verdict.PROVED and self.label in answer.needed:
                         yield f"{node}.{guarantee.name}"

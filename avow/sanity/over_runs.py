@@ -75,9 +75,8 @@ class OverRuns:
         found = self._settled(claim)
         if found.verdict is Verdict.UNKNOWN:
             self.patience.lost = max(self.patience.lost, lost + spent() - start)
-        if claim.about is Property.ASSUMPTIONS_SATISFIABLE:
-            return found
-        return replace(found, because="assumptions-satisfiable") if self._impossible(found) else found
+        failed = claim.about is not Property.ASSUMPTIONS_SATISFIABLE and self._impossible(found)
+        return replace(found, because="assumptions-satisfiable") if failed else found
 
     def _impossible(self, found: Finding) -> bool:
         """Whether a claim is only false because no run is allowed at all."""
@@ -231,8 +230,7 @@ class OverRuns:
         remembered = any(v.role is Role.OUTPUT for cell in self.remembering.cells for v in free_variables(cell.now))
         lost = remembered and self.viability.verdict is Verdict.REFUTED  # then nobody can go on for ever after either
         if remembered and not lost:
-            lasting = self.viability.lasting
-            if lasting is not None:  # of both values it is known whether the node can go on after them
+            if (lasting := self.viability.lasting) is not None:  # known after both values
                 after = substitute(lasting, {cell.before: cell.now for cell in self.remembering.cells})
                 stays = {"memory": lasting, "goes on": after, "goes on again": substitute(after, again)}
                 both = together | stays

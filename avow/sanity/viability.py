@@ -21,7 +21,7 @@ from avow.base.tuning.bounds import (
     INPUTS_AHEAD,
     VIABILITY_ROUNDS,
 )
-from avow.base.tuning.effort import DEFEAT_EFFORT
+from avow.base.tuning.effort import DEFEAT_EFFORT, REALIZABLE_SHARE
 from avow.base.verdict import Counterexample, Verdict
 from avow.evaluation.compiler import combinations
 from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
@@ -38,6 +38,7 @@ from avow.language.sorts import Sort, TupleSort
 from avow.language.subterms import subterms, timed
 from avow.language.terms import FALSE, TRUE, Apply, Conditional, Implies, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import realizable
+from avow.solving.limits import budget
 from avow.solving.quantifier_elimination import ELIMINABLE, eliminable, eliminated
 from avow.solving.questions import entails, solve
 from avow.solving.second import CONTRADICTED, contradicted
@@ -202,7 +203,8 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
         return Viability(Verdict.UNKNOWN, "an assumption speaks of an output at the same step")
     apart, about = contract.divided()
     try:
-        found = _decided(about)
+        with budget(effort * REALIZABLE_SHARE):
+            found = _decided(about)
         if found.verdict is Verdict.PROVED or not apart:
             return found
         match solve(apart, effort=effort, seed=seed, values="unused").status:

@@ -74,6 +74,21 @@ def test_an_environment_in_which_a_guarantee_is_about_nothing_supports_nothing(
     assert ("n.high" in outcome.summary) is excluded
 
 
+@pytest.mark.parametrize(
+    ("assumed", "excluded"),
+    [("in.r < 120", True), ("in.r < 130", False), ("in.r < in.s", False), ("in.r < in.s and in.s < 119", True)],
+)
+def test_what_another_node_assumes_of_the_same_input_is_asked_the_same(
+    assumed: str, excluded: bool, tmp_path: Path
+) -> None:
+    text = node("n", "r : REAL", "y : BOOL", "G high: in.r >= 120 -> out.y")
+    text += node("m", "r, s : REAL", "z : BOOL", f"A few: {assumed}", "G low: in.r >= 0 -> out.z")
+    plan = "environment: {in.r: {because: so}, in.s: {because: so}}\n"
+    outcome = outcomes(make(tmp_path, text, plan))["environment.m.few"]
+    assert outcome.vacuous is excluded
+    assert ("n.high" in outcome.summary) is excluded
+
+
 OVER_RUNS = {
     "a response": ("p : BOOL", "in.p -> next(out.y)", {"p": "not in.p"}),
     "a response until": ("p, q : BOOL", "in.p -> out.y until in.q", {"p": "not in.p"}),
@@ -179,3 +194,13 @@ def test_a_world_that_no_steps_of_the_declared_pace_can_meet_supports_nothing(
         assert contract is not None
         (result,) = analyse(contract.nodes[0], wanted={"assumptions-satisfiable"})
         assert result.verdict is (Verdict.REFUTED if ends else Verdict.PROVED)
+
+
+def test_nodes_with_steps_of_their_own_each_end_no_world(tmp_path: Path) -> None:
+    text = "".join(
+        node(n, "x : BOOL", f"{n}y : BOOL", "G: TRUE").replace("topics()", f"topics()\n  steps( every {pace} ms )")
+        for n, pace in (("n", 10), ("m", 20))
+    )
+    plan = "environment: {in.x: {assume: 'not held[1 s](in.x)', because: so}}\n"
+    outcome = outcomes(make(tmp_path, text, plan))["environment.in.x"]
+    assert (outcome.verdict, outcome.vacuous) == (Verdict.JUSTIFIED, False), outcome.summary
