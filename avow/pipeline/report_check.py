@@ -3,8 +3,8 @@
 It checks, each step on its own: every record that the report quotes is in the ledger, unchanged, and the ledger has no
 other record that counts, no other refutation and no newer one; every conclusion (status, gate, exit code) follows from
 those records; the kernel establishes its share from the certificates in the report; the contracts' texts have the
-digests that the report names; every other format equals, byte for byte, what the case renders to. Contract and plan are
-compared by digest if the files are here; changed files of the evidence are reported (`stale`) and are no difference
+digests that the report names; every other format equals, byte for byte, what the case renders to; `avow.recount`, which
+shares no code with the rest, recomputes each number of the first page. Contract and plan are compared by digest if the files are here; changed files of the evidence are reported (`stale`) and are no difference
 from the ledger. It cannot know whether the obligations are still those of today's contract: `avow verify` does.
 """
 
@@ -31,6 +31,7 @@ from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.kernel.certificate import Certificate
 from avow.pipeline.work import engine_works
+from avow.recount import recount
 from avow.report import ATTESTATION, PDF, formats, left_over
 from avow.report.pdf import render_pdf
 from avow.solving.apart import Both
@@ -47,7 +48,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     except (OSError, ValueError) as error:
         return (f"report.json cannot be read: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
-    found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]
+    found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys), *_recounted(folder)]
     found += [_NO_LEDGER] if ledger is None else _ledger(case, ledger, root)
     if root is not None:
         found += [*_sources(case, root), *_kernel(case, root)]
@@ -175,6 +176,14 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
                 yield f"{PDF} is not what the case in report.json renders to"
         except (OSError, Rejected) as error:
             yield f"{PDF} cannot be compared here: {error}"
+
+
+def _recounted(folder: Path) -> Iterable[str]:
+    """Numbers of the first page that its facts do not bear out, as a checker has it that shares no code with it."""
+    try:
+        return [f"index.html: {line}" for line in recount(folder)]
+    except (OSError, ValueError, LookupError) as error:
+        return [f"index.html cannot be recounted: {error}"]
 
 
 def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:

@@ -44,7 +44,7 @@ def large_case(nodes: int = 12, requirements: int = 30) -> Case:
                 bound={
                     "cases": 300,
                     "triggered": 12,
-                    "failure_probability_when_triggered_below": 0.22,
+                    "failure_probability_when_triggered_below": 0.221,
                     "confidence": 0.95,
                 }
                 if drawn

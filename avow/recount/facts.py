@@ -1,0 +1,281 @@
+"""What report.json says of obligations, records, requirements, assumptions and proofs, counted again."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+Json = dict[str, Any]
+HOLDS = ("shown", "shown of models", "shown by tests", "argued")
+_SUPPORTS = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
+"""Best first."""
+_STRICT = 1 - 1e-5
+"""Bounds in records are decimals of six digits: so far may one lie below what the sample gives."""
+_QUOTED: tuple[str, ...] = (
+    "assumptions",
+    "baseline",
+    "changes",
+    "digests",
+    "environment",
+    "hazards",
+    "ledger_head",
+    "nodes",
+    "policy",
+)
+_QUOTED += ("run", "standard", "statements", "system", "title", "today", "tools", "methods", "sources")
+
+
+class Facts:
+    """`quoted`: every text that the page may quote to the letter."""
+
+    def __init__(self, case: Json) -> None:
+        self.case = case
+        self.requirements: list[Json] = case["requirements"]
+        self.assumptions: list[Json] = case["assumptions"]
+        self.views: list[Json] = case["obligations"]
+        self.guarantees = [v for v in self.views if v["obligation"]["kind"] == "guarantee"]
+        self.gates = [g for g in case["gates"] if not g.get("idle")]
+        self.failing = [g for g in case["gates"] if not g["passed"]]
+        self.quoted = {" ".join(text.split()) for text in self._texts()}
+
+    def _texts(self) -> Iterator[str]:
+        for name in _QUOTED:
+            yield from _strings(self.case.get(name) or ())
+        for r in self.requirements:
+            yield from (r["id"], r["text"], r["formula"], r.get("temporal") or "")
+        for v in self.views:
+            yield from (
+                v["obligation"]["claim"],
+                v["obligation"]["claim"].rstrip("."),
+                v["obligation"]["name"],
+                id_of(v),
+            )
+            yield from (r["numbers"] for r in records(v))
+        yield from (f"{name} {version}" for name, version in self.case["kernel"]["solvers"].items())
+        yield from (p for proof in self.case["proofs"] for p in proof.get("tools") or ())
+        for gate in self.case["gates"]:
+            yield from (gate["title"], *gate["reason"].split("; "), gate["reason"][:199].rstrip() + "…")
+            yield from (re.sub("`([^`]+)`", r"\1", s["text"]) for s in gate["suggestions"])
+
+    def level(self, *levels: str) -> list[str]:
+        return [r["id"] for r in self.requirements if r["level"] in levels]
+
+    def lost(self) -> int:
+        """Requirements that lack more than a person who reads the sentence against the formula."""
+        waits = [r for r in self.requirements if r["status"] in (*_SUPPORTS, "argued") and not r.get("expired")]
+        waiting = [r["id"] for r in waits if not r.get("failing") and not r["unknown_names"]]
+        return len([name for name in self.level("not shown") if name not in waiting])
+
+    def supposed(self, requirement: str) -> int:
+        return sum(requirement in a["needed_by"] for a in self.assumptions)
+
+    def owned_ones(self) -> list[Json]:
+        return [a for a in self.assumptions if a["who"] and (a["until"] or a["sort"] == "meaning")]
+
+    def owned(self) -> int:
+        return len(self.owned_ones())
+
+    def numbers(self, sort: str) -> list[int]:
+        return [int(a["number"][1:]) for a in self.assumptions if a["sort"] == sort]
+
+    def wrong(self) -> list[Json]:
+        advice = {item["claim"] for item in self.case["open_items"] if item["kind"] == "advice"}
+        bad = [v for v in self.views if v["status"] in ("refuted", "contradictory")]
+        return [v for v in bad if not v["obligation"].get("advisory") and id_of(v) not in advice]
+
+    def known(self) -> int:
+        """Findings that the plan speaks of and that support nothing."""
+        return sum(bool(v["handled"]) and v["standing"] not in (*_SUPPORTS, "argued") for v in self.views)
+
+    def old(self) -> int:
+        return sum(r["run"] != self.case["run"]["id"] for v in self.views for r in records(v))
+
+    def proofs(self, *grades: str) -> int:
+        asked = [p for p in self.case["proofs"] if p["obligation"].split("/")[2] in ("composition", "requirement")]
+        return sum(not grades or p["grade"] in grades for p in asked)
+
+    def proved_by(self, tool: str) -> int:
+        return sum((p.get("tools") or ()).count(tool) for p in self.case["proofs"])
+
+    def stands(self, node: str, status: str, what: str) -> tuple[int, int]:
+        """At least and at most so many guarantees of a node stand so, by evidence of such an object (any: ``-``)."""
+        ways = []
+        for v in self.guarantees:
+            if v["obligation"]["node"] == node:
+                open_ = v["standing"] not in (*_SUPPORTS, "argued")
+                ways.append({(v["standing"], "")} if open_ else {_way(r) for r in supporting(v)})
+        fits = [{w[0] == status and what in (w[1], "-") for w in way} for way in ways]
+        return sum(fit == {True} for fit in fits), sum(True in fit for fit in fits)
+
+    def deficit(self, key: str) -> tuple[int, int] | None:
+        """At least and at most so many, as the records have it; None for a kind that is not known here."""
+        basis = {name for r in self.requirements for name in r.get("closure", ())}
+        if not self.requirements:  # of the whole case: what its evidence is about
+            basis = {id_of(v) for v in self.views}
+        within = [v for v in self.guarantees if id_of(v) in basis]
+        sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in within]
+        read = [{support(r) == "reviewed" for r in supporting(v)} for v in within]
+        model = [{_way(r)[1] == "model" for r in supporting(v)} for v in within]
+        hand = [{r["link"] != "generated" for r in supporting(v)} for v in within]
+        run = self.case["run"]["id"]
+        exact = {
+            "argued": len(self.level("argued")),
+            "unvalidated": sum(not r.get("validated") for r in self.requirements),
+            "bounded": sum(bool(r.get("bounded")) and r["level"] in HOLDS for r in self.requirements),
+            "unowned": len(self.assumptions) - self.owned(),
+            "unrun": sum(_silent(v, method) for v in within for method, _ in v["planned"]),
+            "programs": sum(v["obligation"]["kind"] == "program" and v["status"] == "not-run" for v in self.views),
+            "conditional": sum(any(support(r) == "reviewed" and r["hypotheses"] for r in records(v)) for v in within),
+            "advice": sum(i["kind"] == "advice" and not i["handled"] for i in self.case["open_items"]),
+            "excused": sum(
+                len(f["obligations"]) for f in self.case["findings"] if f["how"] == "accepted" and not f["expired"]
+            ),
+            "believed": sum(id_of(v) in basis and any(r["run"] != run for r in records(v)) for v in self.views),
+        }
+        loose = {"sampled": sampled, "read": read, "models": model, "tied": hand}
+        if key in exact:
+            most = exact[key]
+            return (most if self.requirements else 0), most
+        if key in loose:
+            return sum(found == {True} for found in loose[key]), sum(True in found for found in loose[key])
+        if key == "single":
+            alone = [len({r["method"] for r in supporting(v)}) for v in within]
+            return sum(many == 1 for many in alone), sum(many > 0 for many in alone)
+        return None
+
+    def seen(self, title: str) -> set[str]:
+        """What records of the node with that title show, in the words of the page, with the bound that follows."""
+        nodes = {n["name"] for n in self.case["nodes"] if (n["title"] or n["name"]) == title}
+        found = [v for v in self.views if v["obligation"]["node"] in nodes or title == "the whole"]
+        return {words for v in found for r in supporting(v) for words in _seen(r)}
+
+    def rate(self, words: str) -> str:
+        """The least favourable rate of the requirements, as the page has it, from the samples of its leaves."""
+        found = [rate for r in self.requirements if (rate := r.get("rate")) and rate["bound"]]
+        for rate in found:
+            strata = [list(leaf["strata"]) for leaf in rate["leaves"]]
+            bound = sum((max(Fraction(s["bound"]) for s in leaf) for leaf in strata), Fraction(0))
+            sure = 1 - sum((1 - min(Fraction(s["confidence"]) for s in leaf) for leaf in strata), Fraction(0))
+            true = all(
+                float(s["bound"]) >= _STRICT * upper(s["failures"], s["trials"], float(s["confidence"]))
+                for leaf in strata
+                for s in leaf
+            )
+            told = f"at most {_percent(bound, ROUND_CEILING, 3)} of trials fail, at {_percent(sure, ROUND_FLOOR, 3)}"
+            if true and told == words:
+                return told
+        return "none" if not found else "another rate"
+
+
+def id_of(view: Json) -> str:
+    o = view["obligation"]
+    return f"{o['system']}/{o['node']}/{o['kind']}/{o['name']}"
+
+
+def records(view: Json) -> list[Json]:
+    """The records that count today."""
+    return [item["entry"]["evidence"] for item in view["evidence"] if item["counts"]]
+
+
+def supporting(view: Json) -> list[Json]:
+    """The records that may be relied upon: none where something refutes the claim."""
+    return [record for record in records(view) if support(record) and view["status"] in _SUPPORTS]
+
+
+def support(record: Json) -> str:
+    """What a record supports with: no more than its method can show, and nothing where it is vacuous."""
+    told, most = record["verdict"], record["strength"]
+    if record["vacuous"] or told not in _SUPPORTS or most not in _SUPPORTS:
+        return ""
+    return _SUPPORTS[max(_SUPPORTS.index(told), _SUPPORTS.index(most))]
+
+
+def _way(record: Json) -> tuple[str, str]:
+    said = support(record)
+    return said, record["of"] if said in ("proved", "checked", "tested", "monitored") else ""
+
+
+def _silent(view: Json, method: str) -> bool:
+    return all(r["verdict"] in ("not-run", "error", "unknown") for r in records(view) if r["method"] == method)
+
+
+def _seen(record: Json) -> Iterator[str]:
+    bound = record["bound"]
+    known = [v for k, v in bound.items() if "failure" in k and ("below" in k or "at most" in k) and _is(v)]
+    runs, cases, hit = bound.get("runs"), bound.get("cases"), bound.get("triggered")
+    most = ", with no bound on failures"
+    if known:
+        sure, failed = bound.get("confidence"), bound.get("failures", 0)
+        trials = next((bound[k] for k in ("triggered", "judged", "runs", "cases") if isinstance(bound.get(k), int)), 0)
+        whole = "worst stratum" in bound or not _is(sure) or not isinstance(failed, int)
+        if not whole and max(known) < _STRICT * upper(failed, trials, sure):
+            return  # it says more than its sample shows
+        told = f"{_percent(Fraction(str(sure)), ROUND_FLOOR, 2)} confidence" if _is(sure) else "confidence not recorded"
+        most = f" ({told}: at most {_percent(Fraction(str(max(known))), ROUND_CEILING, 2)} fail)"
+    if isinstance(runs, int):
+        hit = runs if hit is None else hit
+        of = _count(runs, "run") if hit == runs else f"{_count(hit, 'triggered run')} of {runs}"
+        worst = f"; the worst stratum: {bound['worst stratum']}" if "worst stratum" in bound else ""
+        yield f"{of}, {bound.get('failures', 0)} failed{worst}{most}"
+    if isinstance(cases, int):
+        few = "only " if isinstance(hit, int) and hit < cases / 2 else ""
+        met = (
+            f"{few}{hit} of {_count(cases, 'case')} met its condition"
+            if isinstance(hit, int)
+            else _count(cases, "case")
+        )
+        yield f"{met}, none failed{most}"
+    if isinstance(bound.get("judged"), int):
+        traces = bound.get("traces")
+        on = f" on {_count(len(traces), 'recorded run')}" if traces and isinstance(traces, dict | list) else ""
+        yield f"observed {_count(bound['judged'], 'time')}{on}, none against it"
+
+
+def upper(failures: int, trials: int, confidence: float) -> float:
+    """The greatest rate of failure at which so few failures have a probability of 1 - confidence (Clopper, Pearson)."""
+    if failures >= trials:
+        return 1.0
+    low, high = failures / trials, 1.0
+    for _ in range(60):
+        p = (low + high) / 2
+        chance = sum(
+            math.exp(
+                math.lgamma(trials + 1)
+                - math.lgamma(k + 1)
+                - math.lgamma(trials - k + 1)
+                + (k * math.log(p) if k else 0)
+                + (trials - k) * math.log1p(-p)
+            )
+            for k in range(failures + 1)
+        )
+        low, high = (p, high) if chance > 1 - confidence else (low, p)
+    return low
+
+
+def _percent(part: Fraction, way: str, digits: int) -> str:
+    exact = Decimal(part.numerator * 100) / Decimal(part.denominator)
+    return f"{Context(prec=digits, rounding=way).create_decimal(exact).normalize():f} %"
+
+
+def _is(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _strings(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield str(key)
+            yield from _strings(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _strings(item)

@@ -1,0 +1,302 @@
+"""Which number on the page is recomputed how. A rule applies in one section, or in all of them.
+
+Its pattern finds a phrase; its function says, from the facts, what the groups of the match have to be. None: the phrase
+is of another kind, and other rules see it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from avow.recount.facts import HOLDS, Facts
+from avow.recount.page import CELL, Block
+
+_Numbers = tuple[str | None, ...] | None
+_SORTS = {
+    "the world": "the world",
+    "the platform": "the platform",
+    "models": "models",
+    "samples": "sampling",
+    "requirements' meaning": "meaning",
+    "trusted tools": "tools",
+}
+_DEFICITS = {
+    "argued, not derived": "argued",
+    "sentences? without a validation": "unvalidated",
+    "guarantees? shown of a model only": "models",
+    "derived within bounds only": "bounded",
+    "assumptions? without owner or date": "unowned",
+    "guarantees? sampled, not proved": "sampled",
+    "guarantees? on a person's reading only": "read",
+    "guarantees? with one method only": "single",
+    "guarantees? translated by a person for the tool": "tied",
+    "planned methods? without an answer": "unrun",
+    "claims? about a node's program not run": "programs",
+    "reviews? with conditions": "conditional",
+    "open remarks?": "advice",
+    "findings? accepted by a person": "excused",
+    "answers? from earlier runs": "believed",
+}
+
+
+@dataclass(frozen=True)
+class Rule:
+    section: str
+    """Empty: everywhere."""
+    pattern: re.Pattern[str]
+    numbers: Callable[[Facts, re.Match[str], Block], _Numbers]
+
+
+def _rule(section: str, pattern: str, numbers: Callable[[Facts, re.Match[str], Block], _Numbers]) -> Rule:
+    return Rule(section, re.compile(pattern), numbers)
+
+
+def _gates(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    return str(sum(g["passed"] for g in facts.gates)), str(len(facts.gates))
+
+
+def _level(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    return str(len(facts.level(match[2]))), match[2]
+
+
+def _kinds(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    return (str(sum((facts.deficit(d["key"]) or (0, 1))[1] > 0 for d in facts.case["deficits"])),)
+
+
+def _deficit(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    key = next(key for words, key in _DEFICITS.items() if re.fullmatch(words, match[2]))
+    told = next((len(set(d["claims"])) for d in facts.case["deficits"] if d["key"] == key), 0)
+    least, most = facts.deficit(key) or (told, told)
+    return str(min(max(told, least), most)), match[2]
+
+
+def _basis(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """``5 proved (model)``, in the row of a node: between the fewest and the most that its records can mean, and all
+    numbers of the row together as many as the node has guarantees."""
+    title = _cells(block.text)[0]
+    node = next((n["name"] for n in facts.case["nodes"] if (n["title"] or n["name"]) == title), "")
+    after = re.search(r"\((model|source|binary|recordings)?", match.string[match.end() :].split(";")[0])
+    what = {"recordings": "recording"}.get(after[1] or "", after[1] or "") if after else ""
+    least, most = facts.stands(node, match[2], what)
+    shown = [int(n) for n, _ in re.findall(rf"(\d+) ({_STATUS})\b", block.text.partition(title)[2])]
+    own = sum(v["obligation"]["node"] == node for v in facts.guarantees)
+    if sum(shown) != own:
+        return f"{own} in all", match[2]
+    return str(min(max(int(match[1]), least), most)), match[2]
+
+
+def _sort(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    return str(len(facts.numbers(_SORTS[match[2]]))), match[2]
+
+
+def _others(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """``A1 …, also A3 to A6``: with the first one in the row, all of a sort."""
+    about = re.search(rf"\d+ about ({'|'.join(_SORTS)})", block.text)
+    first = re.search(r"\bA(\d+) ", block.text)
+    ranges = re.findall(r"A(\d+)(?: to A(\d+))?", match[1])
+    named = [n for low, high in ranges for n in range(int(low), int(high or low) + 1)]
+    if about is None or first is None:
+        return None
+    of_sort = facts.numbers(_SORTS[about[1]])
+    return (match[1],) if sorted([*named, int(first[1])]) == of_sort else (", ".join(f"A{n}" for n in of_sort),)
+
+
+def _cells(text: str) -> list[str]:
+    return [cell.strip() for cell in text.strip().strip(CELL.strip()).split(CELL)]
+
+
+def _row(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """A requirement's row: its sentence beside its name, and how many assumptions it needs."""
+    name, words, *_ = _cells(block.text)
+    found = next((r for r in facts.requirements if " ".join(r["id"].split()) == name), None)
+    texts = [] if found is None else [found["text"], found["formula"], found.get("temporal") or ""]
+    if found is None or words not in [" ".join(text.split()) for text in texts]:
+        return f"the requirement that says “{words}”", None
+    return match[1], str(facts.supposed(found["id"]))
+
+
+def _named(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """The requirements of a level, where there are too many for a row each."""
+    found = facts.level(match[2])
+    return str(len(found)), match[2], " ".join(" ".join(name.split()) for name in found)
+
+
+def _hazard(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """A hazard's row: its name beside its text, its mitigations, and one of them that is shown no further than it."""
+    hazard = next((h for h in facts.case["hazards"] if " ".join(h["hazard"]["text"].split()) == match[2]), None)
+    if hazard is None:
+        return None
+    least = [m["name"] for m in hazard["mitigations"] if m["level"] == hazard["level"]]
+    return hazard["hazard"]["id"], match[2], least[0], ", ".join(hazard["hazard"]["mitigated_by"])
+
+
+def _seen(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """What was seen, with its bound: as a record of the node says that is named before it."""
+    titles = [n["title"] or n["name"] for n in facts.case["nodes"]] + ["the whole"]
+    before = match.string[: match.start()]
+    title = max(titles, key=lambda t: before.rfind(t)) if titles else ""
+    told = facts.seen(title)
+    words = match[1][:1].lower() + match[1][1:]
+    return (match[1],) if words in told else ("; ".join(sorted(told)) or "nothing",)
+
+
+def _owners(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    who = Counter(a["who"] for a in facts.owned_ones())
+    return match[1], str(who[match[1].strip()])
+
+
+def _reasons(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """Why a gate fails: its reasons in their order, and how many are not told (``…; and 6 more``)."""
+    titles = [gate for gate in facts.failing if " ".join(gate["title"].split()) in block.text]
+    gate = max(titles, key=lambda gate: len(gate["title"]), default=None)
+    if gate is None:
+        return None
+    shown = match[1].split("; ")
+    parts = [" ".join(part.split()) for part in re.sub("`([^`]+)`", r"\1", gate["reason"]).split("; ")]
+    told = [
+        part[: len(said) - 1] + "…" if said.endswith("…") else part for said, part in zip(shown, parts, strict=False)
+    ]
+    left = len(parts) - len(shown)
+    return "; ".join(told), str(left) if left else None
+
+
+def _listed(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """``REQ1, REQ2 and 3 more``: requirements that do not hold, or that need the weakest evidence."""
+    shown = len(match[1].split(", "))
+    of = [r["id"] for r in facts.requirements if r["level"] not in HOLDS]
+    if match.group().startswith("On it"):
+        claim = facts.case["answers"]["weakest"]["claim"]
+        of = [r["id"] for r in facts.requirements if claim in r.get("closure", ())]
+    elif match.group().startswith("Refuted"):
+        of = facts.level("refuted")
+    names = ", ".join(" ".join(name.split()) for name in of[:shown])
+    return names, str(len(of) - shown) if len(of) > shown else None
+
+
+def _days(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    own = facts.owned_ones()
+    made, ends = sorted(a.get("date", "") for a in own), sorted(a["until"] for a in own if a["until"])
+    if match.re.pattern.startswith("assumed"):
+        return made[0], made[-1] if made[-1] != made[0] else None
+    return (ends[0],)
+
+
+def _says(facts: Facts, match: re.Match[str], block: Block) -> _Numbers:
+    """``A7 The map does not change``: the number of that assumption, if it has words."""
+    after = match.string[match.end() :].strip()
+    fits = [a for a in facts.assumptions if after.startswith(" ".join(a["says"].split())) and a["says"]]
+    fits = [a for a in fits if a["number"][1:] == match[1]] or fits
+    if after.startswith("(no plain words yet"):
+        once = block.text.count(f" A{match[1]} (no plain") == 1
+        fits = [a for a in facts.assumptions if not a["says"] and f"A{match[1]}" == a["number"] and once]
+    return (fits[0]["number"][1:] if fits else "none with these words",)
+
+
+def _beside(facts: Facts, _match: re.Match[str], _block: Block) -> _Numbers:
+    """Requirements with their weakest evidence in another guarantee of the node that has the weakest of all."""
+    claim = facts.case["answers"]["weakest"]["claim"]
+    rest = [r["weakest_evidence"] for r in facts.requirements if claim not in r["closure"] and r["weakest_evidence"]]
+    node = claim.split("/")[1]
+    return (str(sum(w["claim"].split("/")[1] == node and w["claim"] != claim for w in rest)),)
+
+
+def _objectives(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    found = Counter(o["state"] for o in facts.case["standard"]["objectives"])
+    return str(found[match[2]]), match[2]
+
+
+def _policy(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    """A demand's own numbers: the policy's."""
+    asked = [str(gate["asks"]) for gate in facts.case["gates"]]
+    return match.groups() if any(match[1] in text for text in asked) else ("what the policy asks",)
+
+
+def _bare(facts: Facts, match: re.Match[str], _block: Block) -> _Numbers:
+    own = [a["number"] for a in facts.owned_ones()]
+    bare = [a["number"] for a in facts.assumptions if a["number"] not in own]
+    shown = len(match[1].split(", "))
+    return ", ".join(bare[:shown]), str(len(bare) - shown) if len(bare) > shown else None
+
+
+def _whole(number: Callable[[Facts], int]) -> Callable[[Facts, re.Match[str], Block], _Numbers]:
+    return lambda facts, _match, _block: (str(number(facts)),)
+
+
+_LEVELS = "|".join((*HOLDS, "not shown", "refuted"))
+_STATUS = "proved|checked|tested|monitored|reviewed|justified|argued|partial|unwritten|vacuous|unknown|not-run|error"
+_STATUS += "|stale|missing|unsupported|circular|refuted|contradictory"
+_BOUND = r"(?:, with no bound on failures| \([^()]*: at most [\d.]+ % fail\))?"
+_SEEN = r"[Oo]bserved \d+ times?(?: on \d+ recorded runs?)?, none against it"
+_SEEN += rf"|(?:[Oo]nly )?\d+ of \d+ cases? met its condition, none failed{_BOUND}|\d+ cases?, none failed{_BOUND}"
+_SEEN += rf"|\d+ (?:triggered )?runs?(?: of \d+)?, \d+ failed(?:; the worst stratum: [^()]*)?{_BOUND}"
+
+_WHY = r"fails\. (.*?)(?:; and (\d+) more)?(?=\.? Next:|\.? $)"
+_DAY = r"(\d{4}-\d\d-\d\d)"
+
+RULES = (
+    _rule("", rf"\b({_SEEN})", _seen),
+    _rule("", r"\b(at most [\d.]+ % of trials fail, at [\d.]+ %) confidence", lambda f, m, _: (f.rate(m[1]),)),
+    _rule("", r"Not shown: (\d+) of (\d+) requirements? not validated", lambda f, _m, _b: _unread(f)),
+    _rule("", r"Not shown: (\d+) of (\d+) requirements?", lambda f, _m, _b: (str(f.lost()), str(len(f.requirements)))),
+    _rule("", r"Not shown: (\d+) gates? fails?", _whole(lambda f: len(f.failing))),
+    _rule("", r"(\d+) claims? about programs not run", lambda f, _m, _b: (str((f.deficit("programs") or (0, 0))[1]),)),
+    _rule("", r"WARNED: (\d+) findings? known", _whole(Facts.known)),
+    _rule("", r"(\d+) kinds? of assurance deficit", _kinds),
+    _rule("head", r"Refuted: ([^␟]*?)(?: and (\d+) more)?(?=; | $| · |[ ,] ?\d| WARNED)", _listed),
+    _rule("q6", r"All (\d+) kinds?", _kinds),
+    _rule("head", r"policy: (\d+) of (\d+) gates? pass", _gates),
+    _rule("head", rf"(\d+) ({_LEVELS})(?= [·␟]|, | $)", _level),
+    _rule("q1", rf"^ ␟ (\d+) ({_LEVELS}) ␟ (.*?) $", _named),
+    _rule("q1", r"^ (␟ .* ␟ )(\d+) $", _row),
+    _rule("q2", rf"(\d+) ({_STATUS})\b", _basis),
+    _rule("q2", r"and (\d+) nodes? on no less", _whole(lambda f: len(f.case["nodes"]) - 8)),
+    _rule("q3", r"and (\d+) more claims?", _whole(lambda f: len(f.wrong()) - 1)),
+    _rule("q3", r"On it rests? ([^␟;]*?)(?: and (\d+) more)?(?=\.? $|;)", _listed),
+    _rule("q3", r"Open: ([^␟]*?)(?: and (\d+) more)?(?=\. $)", _listed),
+    _rule("q3", r"; (\d+) on other guarantees of this node", _beside),
+    _rule("q4", r"also ((?:A\d+(?: to A\d+)?(?:, )?)+)", _others),
+    _rule("q4", rf"(\d+) about ({'|'.join(_SORTS)})\b", _sort),
+    _rule("q4", r"(\d+) of (\d+) with owner and date", lambda f, _m, _b: (str(f.owned()), str(len(f.assumptions)))),
+    _rule("q4", r"([^,:]+?) \((\d+)\)(?=[,;.]| and )", _owners),
+    _rule("q4", rf"assumed since {_DAY}(?: to {_DAY})?", _days),
+    _rule("q4", rf"(?:until|the first ends) {_DAY}", _days),
+    _rule("q4", r"\bA(\d+)(?= )", _says),
+    _rule("q5", r"All (\d+)", _whole(lambda f: len(f.case["changes"]["entries"]))),
+    _rule("q5", r"re-run: (\d+) guarantees?, same answer", _whole(lambda f: f.case["changes"]["again"])),
+    _rule("q6", rf"(\d+) ({'|'.join(_DEFICITS)})(?= $)", _deficit),
+    _rule("deficits", rf"(\d+) ␟ ({'|'.join(_DEFICITS)})(?= ␟)", _deficit),
+    _rule(
+        "q7",
+        r"(\d+) of (\d+) proofs? re-established in this run",
+        lambda f, _m, _b: (str(f.proofs("certified-1", "certified-2")), str(f.proofs())),
+    ),
+    _rule("q7", r"\((\d+) proofs?\)", _whole(lambda f: f.proofs())),
+    _rule(
+        "q7",
+        r"(\d+) of (\d+) answered by two solvers",
+        lambda f, _m, _b: (str(f.proofs("certified-2")), str(f.proofs("certified-1", "certified-2"))),
+    ),
+    _rule("q7", r"(?:[(,] ?)([^(),]+) \((\d+)\)", lambda f, m, _b: (m[1], str(f.proved_by(m[1].strip())))),
+    _rule("q7", r"without an owner \((.*?)(?: and (\d+) more)?\)", _bare),
+    _rule("signature", r"assumptions (A\d+ to A\d+)", lambda f, _m, _b: (f"A1 to A{len(f.assumptions)}",)),
+    _rule("signature", r"assumption A(\d+)\b", _whole(lambda f: len(f.assumptions))),
+    _rule(
+        "signature", r"the digest ([0-9a-f]+)…", lambda _f, m, _b: m.groups()
+    ),  # `avow sign` and the audit compute it
+    _rule("head", r"(\d+) answers? from earlier runs", _whole(Facts.old)),
+    _rule("head", r"^ and (\d+) more $", _whole(lambda f: len(f.failing) - 2)),
+    _rule("head", _WHY, _reasons),
+    _rule("gates", _WHY, _reasons),
+    _rule("head", r"SHA-(256)", lambda _f, m, _b: m.groups()),
+    _rule("gates", r"\(([^()]*\d[^()]*)\)(?=: )", _policy),
+    _rule("hazards", r"^ ␟ (.*?) ␟ (.*?)(?: \(security\))? ␟ .*? ␟ .*? weakest: (.*?); (.*?) ␟ ", _hazard),
+    _rule("standard", r"(\d+) (served|open|outside)\b", _objectives),
+)
+
+
+def _unread(facts: Facts) -> _Numbers:
+    missing = len([r for r in facts.requirements if r["level"] not in HOLDS])
+    return str(missing), str(len(facts.requirements))

@@ -1,0 +1,179 @@
+"""The checker of the first page: it bears out every number of a true page, and finds any that is changed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import pytest
+from assurance.sample import case as make_case
+from assurance.sample import evidence, guarantee, system
+
+from avow.assurance.model import Case
+from avow.base.verdict import Verdict
+from avow.evidence.ledger import Ledger
+from avow.kernel.rates import tail
+from avow.pipeline.report_check import check
+from avow.recount import NUMBER, recounted
+from avow.recount.__main__ import main
+from avow.recount.facts import upper
+from avow.recount.page import blocks
+from avow.report import formats, render_all
+from report.test_answers_page import CASES, REPORTS
+
+
+@cache
+def made(name: str) -> tuple[str, bytes]:
+    found = dict(formats(CASES[name]()))
+    return found["index.html"], found["report.json"].encode()
+
+
+def changed(page: str) -> Iterator[tuple[str, str]]:
+    """Each number that a reader sees, one greater than it is: (what stands around it, the page). Left out: the digest of
+    what is signed, which `avow sign` computes, and captions of bow-ties, which may name any hazard."""
+    told = blocks(page)
+    body = page.index("<body")
+    for text in re.finditer(r">([^<>]+)<", page[body:]):
+        for number in NUMBER.finditer(text[1]):
+            at, end = (body + text.start(1) + place for place in number.span())
+            digits = number.group()
+            other = page[:at] + digits[:-1] + str((int(digits[-1]) + 1) % 10) + page[end:]
+            entity = page[:at].endswith("&#")
+            if (
+                not entity and blocks(other) != told and "…</code>" not in page[at : at + 40]
+            ):  # the digest of what is signed
+                yield page[at - 30 : end + 30], other
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_true_page_is_borne_out(name: str) -> None:
+    assert recounted(*made(name)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rover", "large"])
+def test_any_changed_number_is_found(name: str) -> None:
+    page, data = made(name)
+    seeded = list(changed(page))
+    assert len(seeded) > 80
+    assert [near for near, other in seeded if not recounted(other, data)] == []
+
+
+def test_some_changed_numbers_are_found() -> None:
+    page, data = made("rover")
+    for told, lie in (("3 of 7 gates", "4 of 7 gates"), ("A1 to A", "A2 to A"), ("46 of 50", "47 of 50")):
+        if told in page:
+            assert recounted(page.replace(told, lie), data) != [], told
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
+def test_numbers_of_shipped_systems_are_borne_out_and_changed_ones_found(folder: Path) -> None:
+    page, data = (folder / "index.html").read_text(), (folder / "report.json").read_bytes()
+    assert recounted(page, data) == []
+    assert [near for near, other in changed(page) if not recounted(other, data)] == []
+
+
+def with_facts(name: str, change) -> list[str]:  # type: ignore[no-untyped-def]
+    """What is found where the page is as it was and a fact in report.json is another one."""
+    page, data = made(name)
+    case = json.loads(data)
+    change(case)
+    altered = json.dumps(case).encode()
+    import hashlib
+
+    page = page.replace(hashlib.sha256(data).hexdigest(), hashlib.sha256(altered).hexdigest())
+    return recounted(page, altered)
+
+
+def _drop(key: str, within: str = ""):  # type: ignore[no-untyped-def]
+    def change(case) -> None:  # type: ignore[no-untyped-def]
+        found = next(item for item in case[key] if not within or item[within])
+        if within:
+            found[within] = not found[within] if isinstance(found[within], bool) else []
+        else:
+            case[key].remove(found)
+
+    return change
+
+
+def _refute(case) -> None:  # type: ignore[no-untyped-def]
+    view = next(v for v in case["obligations"] if v["obligation"]["kind"] == "guarantee" and v["standing"] == "proved")
+    view["standing"] = view["status"] = "refuted"
+
+
+def _fewer_trials(case) -> None:  # type: ignore[no-untyped-def]
+    for view in case["obligations"]:
+        for item in view["evidence"]:
+            bound = item["entry"]["evidence"]["bound"]
+            bound |= {key: bound[key] - 1 for key in ("triggered",) if key in bound}
+
+
+FACTS = {
+    "a requirement less": _drop("requirements"),
+    "an assumption less": _drop("assumptions"),
+    "a gate less": _drop("gates"),
+    "a gate that fails": _drop("gates", "passed"),
+    "an assumption that nobody needs": _drop("assumptions", "needed_by"),
+    "a refuted guarantee": _refute,
+    "fewer trials": _fewer_trials,
+}
+
+
+@pytest.mark.parametrize("fault", FACTS)
+def test_a_number_that_its_facts_do_not_bear_out_is_found(fault: str) -> None:
+    assert with_facts("large", FACTS[fault]) != []
+
+
+def test_what_report_json_itself_counts_for_the_page_is_not_believed() -> None:
+    """The same lie on the page and in the answers of report.json."""
+    page, data = made("large")
+    lie = data.decode().replace("30 argued", "31 argued")
+    assert lie != data.decode()
+    page = page.replace("30 argued", "31 argued")
+    assert any("31 argued" in line for line in recounted(page, lie.encode()))
+
+
+def test_a_bound_is_computed_again_from_its_sample() -> None:
+    """A record that claims less than 95 of 100 cases can show is not quoted as evidence of it."""
+    assert upper(0, 47, 0.95) == pytest.approx(1 - 0.05 ** (1 / 47))
+    for failures, trials, sure in ((2, 50, 0.9), (0, 3, 0.5), (7, 300, 0.99)):
+        assert float(tail(failures, trials, Fraction(upper(failures, trials, sure)))) == pytest.approx(1 - sure)
+    assert upper(5, 5, 0.9) == 1
+
+    def shown(bound: float) -> list[str]:
+        told = {"runs": 47, "failures": 0, "failure probability at most": bound, "confidence": 0.95}
+        target = guarantee("n", "g")
+        found = make_case(system({"n": ["g"]}), [target], [evidence(target, Verdict.TESTED, "experiment", bound=told)])
+        texts = dict(formats(found))
+        return recounted(texts["index.html"], texts["report.json"].encode())
+
+    assert shown(0.0618) == []
+    assert any("47 runs, 0 failed" in line for line in shown(0.05))
+
+
+def test_report_check_recounts(tmp_path: Path) -> None:
+    found: Case = CASES["rover"]()
+    render_all(found, tmp_path)
+    page = tmp_path / "index.html"
+    ledger = Ledger(tmp_path / "none.jsonl")
+    assert not any("the evidence gives" in line for line in check(tmp_path, ledger))
+    page.write_text(re.sub(r"(\d+) of (\d+) gates", "99 of 99 gates", page.read_text()))
+    assert any(
+        "index.html: head: “policy: 99 of 99 gates pass”: the evidence gives" in x for x in check(tmp_path, ledger)
+    )
+
+
+def test_it_is_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path)]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+    render_all(CASES["rover"](), tmp_path)
+    assert main([str(tmp_path)]) == 0
+    page = tmp_path / "index.html"
+    page.write_text(page.read_text().replace("policy: ", "policy: 1"))
+    assert main([str(tmp_path)]) == 1
+    assert "the evidence gives" in capsys.readouterr().out
