@@ -4,8 +4,9 @@ It checks, each step on its own: every record that the report quotes is in the l
 other record that counts, no other refutation and no newer one; every conclusion (status, gate, exit code) follows from
 those records; the kernel establishes its share from the certificates in the report; the contracts' texts have the
 digests that the report names; every other format equals, byte for byte, what the case renders to; `avow.recount`, which
-shares no code with the rest, recomputes each number of the first page. Contract and plan are compared by digest if the files are here; changed files of the evidence are reported (`stale`) and are no difference
-from the ledger. It cannot know whether the obligations are still those of today's contract: `avow verify` does.
+shares no code with the rest, recomputes each number of the first page. Contract and plan are compared by digest if the
+files are here; changed files of the evidence are reported (`stale`) and are no difference from the ledger. It
+cannot know whether the obligations are still those of today's contract: `avow verify` does.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def made(name: str) -> tuple[str, bytes]:
 
 
 def changed(page: str) -> Iterator[tuple[str, str]]:
-    """Each number that a reader sees, one greater than it is: (what stands around it, the page). Left out: the digest of
+    """Each number that a reader sees, one greater than it is: (text around it, the page). Left out: the digest of
     what is signed, which `avow sign` computes, and captions of bow-ties, which may name any hazard."""
     told = blocks(page)
     body = page.index("<body")
