@@ -140,6 +140,8 @@ def test_faults_of_layout_are_found(tmp_path: Path) -> None:
     assert [fault for fault in FAULTS if not measured[fault][FAULTS[fault][1]]] == []
 
 
+FRONT_WORDS = 1500
+"""Words of the first page, folds and all."""
 REPORTS = sorted(path.parent for path in (Path(__file__).parents[2] / "reports").glob("*/report.json"))
 """Of the shipped systems, where `doit verify` was run here, as CI does before the tests."""
 
@@ -151,6 +153,15 @@ REPORTS = sorted(path.parent for path in (Path(__file__).parents[2] / "reports")
 def test_the_shipped_systems_reports_keep_to_it(folder: Path, tmp_path: Path) -> None:
     found = read_case(folder)
     assert departures(found, render_answers(found), tmp_path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not REPORTS, reason="no system has been verified here: `doit verify`")
+@pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
+def test_the_front_page_of_a_shipped_system_is_short(folder: Path) -> None:
+    text = render_answers(read_case(folder))
+    shown = " ".join(Page(text[text.index("<body") : text.index("<script")]).text)
+    assert len(shown.split()) < FRONT_WORDS
 
 
 def test_words_that_differ_are_told() -> None:
