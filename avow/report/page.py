@@ -92,7 +92,6 @@ def environment() -> Environment:
         "anchor": wording.anchor,
         "page_of": wording.page_of,
         "ticks": _ticks,
-        "banner_tone": wording.banner_tone,
         "bound_text": wording.bound_text,
         "gate_line": wording.gate_line,
         "derivation": _derivation,
@@ -132,7 +131,6 @@ def render_page(case: Case, json_digest: str = "") -> str:
     return _fill(
         "claims.html.j2",
         case,
-        line=wording.verdict_line(case),
         groups=[(node, _stands(view.standing for view in views), views) for node, views in by_node.items()],
         total=len(case.obligations),
         counts=_counts(case.obligations),

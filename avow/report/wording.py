@@ -144,19 +144,6 @@ def clean(text: str) -> str:
     return _NO_XML.sub("\ufffd", text)
 
 
-def verdict_line(case: Case) -> str:
-    """The case in a sentence."""
-    failed = sum(not gate.passed for gate in case.gates)
-    if not failed and case.strict:
-        answered = sum(r.level.holds for r in case.requirements)
-        asked = f"; {answered} of {len(case.requirements)} requirements are shown to hold" if case.requirements else ""
-        found = count(sum(f.how == "expected" for f in case.findings), "expected finding")
-        return f"Examined, not relied upon: there are exactly the {found}, and no others{asked}."
-    if not failed:
-        return f"All {len(case.gates)} gates of the policy pass."
-    return f"{failed} of {len(case.gates)} gates of the policy fail{'s' if failed == 1 else ''}."
-
-
 def open_line(case: Case) -> str:
     """How the open items and the plan's expected findings add up; empty where the plan speaks of none of them."""
     said = {advice: sum(i.advice is advice and bool(i.handled) for i in case.open_items) for advice in (False, True)}
