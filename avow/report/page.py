@@ -127,11 +127,11 @@ def render_page(case: Case, json_digest: str = "") -> str:
     single = set(case.single_method)
     matrix = _matrix(case)
     listed = [item for item in case.open_items if not item.advice]
-    by_node = _by_node(case)
+    nodes = by_node(case)
     return _fill(
         "claims.html.j2",
         case,
-        groups=[(node, _stands(view.standing for view in views), views) for node, views in by_node.items()],
+        groups=[(node, _stands(view.standing for view in views), views) for node, views in nodes.items()],
         total=len(case.obligations),
         counts=_counts(case.obligations),
         matrix=matrix if len(case.guarantees) <= GUARANTEE_ROWS else [],
@@ -159,16 +159,16 @@ def render_details(case: Case) -> Iterator[tuple[str, str]]:
     """Every claim in full, as (file name, page): the whole system with its derivations, each node, the contracts.
 
     They name neither run nor date: a run that changes nothing of a node leaves its page as it is."""
-    by_node = {SYSTEM_LEVEL: list[ObligationView](), **_by_node(case)}
-    pages = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in by_node]
+    nodes = {SYSTEM_LEVEL: list[ObligationView](), **by_node(case)}
+    pages = [("the whole system" if node == SYSTEM_LEVEL else node, wording.page_of(node)) for node in nodes]
     pages += [("contracts", "contracts.html")] if case.sources else []
     shared = {
         "pages": pages,
-        "full": _in_full([view for views in by_node.values() for view in views]),
+        "full": _in_full([view for views in nodes.values() for view in views]),
         "places": source.places(case),
         "remarked": _by_item([item for item in case.open_items if item.kind == REMARK]),
     }
-    for (title, name), views in zip_longest(pages, by_node.values()):
+    for (title, name), views in zip_longest(pages, nodes.values()):
         kind = {"system.html": "system", "contracts.html": "contracts"}.get(name, "node")
         yield name, _fill("details.html.j2", case, title=title, kind=kind, views=views or [], **shared)
 
@@ -192,7 +192,7 @@ def known_pages(case: Case) -> dict[str, str]:
     return {view.id: wording.page_of(view.obligation.node) for view in case.obligations}
 
 
-def _by_node(case: Case) -> dict[str, list[ObligationView]]:
+def by_node(case: Case) -> dict[str, list[ObligationView]]:
     """Every obligation, in reading order: the nodes as the contract has them, then the whole system."""
     found: dict[str, list[ObligationView]] = {}
     for view in sorted(case.obligations, key=_reading_order(case)):

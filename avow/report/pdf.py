@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib import resources
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,12 @@ from avow.base.files import write
 from avow.base.plain import listed
 from avow.base.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 from avow.base.verdict import Counterexample
-from avow.evidence.obligation import Kind
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 from avow.report import PDF, example
 from avow.report.answers_page import full_reason, others, worded
 from avow.report.maps import map_picture
+from avow.report.page import by_node
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
 
@@ -38,7 +40,12 @@ def render_pdf(case: Case) -> bytes:
 
         source = resources.files("avow.report").joinpath("templates/report.typ").read_bytes()
         data: bytes = typst.compile(
-            source, format="pdf", sys_inputs={"case": json.dumps(_data(case))}, ignore_system_fonts=True, timestamp=0
+            source,
+            format="pdf",
+            sys_inputs={"case": json.dumps(_data(case))},
+            ignore_system_fonts=True,
+            timestamp=0,
+            pdf_standards="ua-1",
         )
     except ImportError as error:
         raise Rejected(Diagnostic("CLI023", "typst is not installed", hint="pip install typst")) from error
@@ -56,7 +63,7 @@ def write_pdf(case: Case, folder: Path) -> Path:
 
 
 def _data(case: Case) -> dict[str, Any]:
-    views = case.obligations[:PDF_OBLIGATIONS]
+    views = list(chain.from_iterable(by_node(case).values()))[:PDF_OBLIGATIONS]
     levels = {node.name: node.criticality for node in case.nodes}
     nodes = dict.fromkeys(v.obligation.node for v in views if v.obligation.kind is Kind.GUARANTEE)
     facts = [
@@ -172,7 +179,8 @@ def _first(case: Case) -> dict[str, Any]:
         "more_nodes": a.more_nodes,
         "objects": f"{a.objects}." if a.objects else "",
         "weakest": a.refuted or _weakest(case),
-        "weakened_by": f"Deficit: {a.weakened_by}." if a.weakened_by else "",
+        "deficits": [f"{w.count} {w.words}" for w in case.deficits[:6]] or ["No deficit is known."],
+        "trusted": [f"{t.what[:1].upper()}{t.what[1:]} ({t.which}): {t.mitigation}." for t in a.trusted],
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
         "supposed": [[line.about, *_supposed(case, line)] for line in a.supposed],
         "owned": _owned(case),
@@ -232,6 +240,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
     said = case.said(view.id)
     return {
         "name": short(view.id),
+        "node": "the whole system" if view.obligation.node == SYSTEM_LEVEL else view.obligation.node,
         "claim": view.obligation.claim,
         "formula": in_lines(view.obligation.formula),
         "reason": f"{said.how.capitalize()}: {said.reason}" if said and said.reason else "",
