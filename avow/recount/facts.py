@@ -157,16 +157,13 @@ class Facts:
         """The least favourable rate of the requirements, as the page has it, from the samples of its leaves."""
         found = [rate for r in self.requirements if (rate := r.get("rate")) and rate["bound"]]
         for rate in found:
-            strata = [list(leaf["strata"]) for leaf in rate["leaves"]]
-            bound = sum((max(Fraction(s["bound"]) for s in leaf) for leaf in strata), Fraction(0))
-            sure = 1 - sum((1 - min(Fraction(s["confidence"]) for s in leaf) for leaf in strata), Fraction(0))
-            true = all(
-                float(s["bound"]) >= _STRICT * upper(s["failures"], s["trials"], float(s["confidence"]))
-                for leaf in strata
-                for s in leaf
-            )
-            told = f"at most {_percent(bound, ROUND_CEILING, 3)} of trials fail, at {_percent(sure, ROUND_FLOOR, 3)}"
-            if true and told == words:
+            leaves = [leaf["strata"] for leaf in rate["leaves"]]
+            strata = [s for leaf in leaves for s in leaf]
+            bound = sum((max(Fraction(s["bound"]) for s in leaf) for leaf in leaves), Fraction(0))
+            sure = 1 - sum((1 - Fraction(s["confidence"]) for s in strata), Fraction(0))
+            what = f"{strata[0].get('trial', 'step')}s"
+            told = f"at most {_percent(bound, ROUND_CEILING, 3)} of {what} fail, at {_percent(sure, ROUND_FLOOR, 3)}"
+            if told == words and all(_sampled(s) for s in strata):
                 return told
         return "none" if not found else "another rate"
 
@@ -197,6 +194,12 @@ def support(record: Json) -> str:
 def _way(record: Json) -> tuple[str, str]:
     said = support(record)
     return said, record["of"] if said in ("proved", "checked", "tested", "monitored") else ""
+
+
+def _sampled(stratum: Json) -> bool:
+    """Whether the failures in a stratum's trials show its bound."""
+    sure = float(Fraction(stratum["confidence"]))
+    return float(Fraction(stratum["bound"])) >= _STRICT * upper(stratum["failures"], stratum["trials"], sure)
 
 
 def _silent(view: Json, method: str) -> bool:

@@ -27,7 +27,7 @@ _DEFICITS = {
     "argued, not derived": "argued",
     "sentences? without a validation": "unvalidated",
     "guarantees? shown of a model only": "models",
-    "derived within bounds only": "bounded",
+    "requirements? within bounds only": "bounded",
     "assumptions? without owner or date": "unowned",
     "guarantees? sampled, not proved": "sampled",
     "guarantees? on a person's reading only": "read",
@@ -238,7 +238,7 @@ _DAY = r"(\d{4}-\d\d-\d\d)"
 
 RULES = (
     _rule("", rf"\b({_SEEN})", _seen),
-    _rule("", r"\b(at most [\d.]+ % of trials fail, at [\d.]+ %) confidence", lambda f, m, _: (f.rate(m[1]),)),
+    _rule("", r"\b(at most [\d.]+ % of (?:steps|runs) fail, at [\d.]+ %) confidence", lambda f, m, _: (f.rate(m[1]),)),
     _rule("", r"Not shown: (\d+) of (\d+) requirements? not validated", lambda f, _m, _b: _unread(f)),
     _rule("", r"Not shown: (\d+) of (\d+) requirements?", lambda f, _m, _b: (str(f.lost()), str(len(f.requirements)))),
     _rule("", r"Not shown: (\d+) gates? fails?", _whole(lambda f: len(f.failing))),

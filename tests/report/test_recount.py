@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from assurance.sample import case as make_case
 from assurance.sample import evidence, guarantee, system
+from assurance.test_rates import sampled, three
 
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
@@ -23,7 +24,15 @@ from avow.recount.__main__ import main
 from avow.recount.facts import upper
 from avow.recount.page import blocks
 from avow.report import formats, render_all
-from report.test_answers_page import CASES, REPORTS
+from report.test_answers_page import CASES as PAGES
+from report.test_answers_page import REPORTS
+
+
+def with_a_rate() -> Case:
+    return three(sampled("a.g"), sampled("b.g", "0.049", 60), sampled("c.g"))
+
+
+CASES: dict[str, Callable[[], Case]] = {"rate": with_a_rate, **PAGES}  # type: ignore[dict-item]
 
 
 @cache
@@ -54,11 +63,11 @@ def test_a_true_page_is_borne_out(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rover", "large"])
+@pytest.mark.parametrize("name", ["rover", "large", "rate"])
 def test_any_changed_number_is_found(name: str) -> None:
     page, data = made(name)
     seeded = list(changed(page))
-    assert len(seeded) > 80
+    assert len(seeded) > 40
     assert [near for near, other in seeded if not recounted(other, data)] == []
 
 
