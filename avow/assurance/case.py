@@ -130,7 +130,8 @@ def conclude(facts: Facts) -> Case:
         for o in facts.obligations
     )
     said = Statements(facts.statements, facts.today)
-    relied = {v.id: r for v in views if (r := relied_upon(v, said.judge))}
+    programs = [v for v in views if v.obligation.kind is Kind.PROGRAM]
+    relied = {v.id: r for v in views if (r := relied_upon(v, said.judge, programs))}
     closure = Closure(views, facts.nodes, rests, standings)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     whole = closure.of([v.id for v in views if v.obligation.kind in (Kind.GUARANTEE, Kind.PROGRAM)])

@@ -41,7 +41,7 @@ _WORDS = {
     "unrun": (
         "planned method{s} without an answer",
         "not answered",
-        "A tool is missing, gave up or failed; other methods support these claims.",
+        "A tool is missing, gave up or failed.",
     ),
     "programs": (
         "claim{s} about a node's program not run",

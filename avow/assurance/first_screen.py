@@ -31,8 +31,8 @@ from avow.assurance.relied import (
     LETTERS,
     OBJECTS,
     Relied,
+    agrees,
     examined,
-    linked,
     looked_at,
     seen,
     weakness,
@@ -210,9 +210,8 @@ def _basis(
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
-    link = linked(views)
     for (said, _), view in marks:
-        by_object.setdefault(_examined(view, relied, link), Counter())[said] += 1
+        by_object.setdefault(_examined(view, relied, views), Counter())[said] += 1
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
     words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
@@ -221,9 +220,11 @@ def _basis(
     return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words), (worst, -share)
 
 
-def _examined(view: ObligationView, relied: Mapping[str, Relied], link: str) -> str:
+def _examined(view: ObligationView, relied: Mapping[str, Relied], views: Sequence[ObligationView]) -> str:
     """What was looked at, where the claim is relied upon; else nothing."""
-    return examined(relied[view.id], link) if view.id in relied and view.standing.supports else ""
+    if view.id not in relied or not view.standing.supports:
+        return ""
+    return examined(relied[view.id], agrees(views, view.obligation, relied[view.id].record.method))
 
 
 def _objects(views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> str:
@@ -281,7 +282,8 @@ def _owners(assumptions: Sequence[Assumption]) -> str:
     named = listed([f"{who} ({many})" if len(number) > 1 else who for who, many in number], OWNERS)
     made = sorted({s.date for s in owned})
     since = f", assumed since {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
-    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first ends {ends[0]}" if ends else ""
+    all_end = len(ends) == 1 and all(s.until for s in owned)
+    until = f", until {ends[0]}" if all_end else f"; the first ends {ends[0]}" if ends else ""
     return f"{named}{since}{until}"
 
 

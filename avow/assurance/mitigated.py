@@ -53,19 +53,17 @@ def hazard_views(
             and clause in ("", view.obligation.name)
             and (not slash or method in {planned for planned, _ in view.planned})
         ]
-        level, tone = judged(
-            [view.id for view in own], {v.id: _of_method(v, method, opinion) for v in own} if slash else relied
-        )
+        by = {v.id: one for v in own if (one := _of_method(v, method, opinion))} if slash else relied
+        level, tone = judged([view.id for view in own], by)
         title = titles.get(owner, owner)
         words = own[0].obligation.claim if clause and own else f"{title}: {method}" if slash else title
         return Mitigation(name, words, level, tuple(view.id for view in own)), tone
 
-    def judged(own: Sequence[str], by: Mapping[str, Relied | None]) -> tuple[Level, Tone]:
+    def judged(own: Sequence[str], by: Mapping[str, Relied]) -> tuple[Level, Tone]:
         """How far guarantees are shown by their records `by`, and by those of all that they rest on."""
         closed = closure.of(own)
         mine = [s for s in supposed if not set(closed.claims).isdisjoint(s.where)]
-        found = {**relied, **{name: by[name] for name in own if name in by}}
-        taken = {name: one for name, one in found.items() if one is not None}
+        taken = {name: one for name, one in {**relied, **by}.items() if name not in own or name in by}
         if any(views[name].standing in (Status.REFUTED, Status.CONTRADICTORY) for name in own):
             return Level.REFUTED, Tone.RED
         if not own or closed.failing or any(name not in taken for name in own) or any(s.expired for s in mine):

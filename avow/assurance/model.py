@@ -384,12 +384,13 @@ class Gate:
 
     @property
     def state(self) -> str:
-        return "not asked" if self.idle else "passes" if self.passed else "fails"
+        passes = "passes but for findings that the plan excuses" if self.excused else "passes"
+        return "not asked" if self.idle else passes if self.passed else "fails"
 
     @property
     def mark(self) -> str:
         """Stands beside the state."""
-        return "–" if self.idle else "✔" if self.passed else "✘"
+        return "–" if self.idle else "✘" if not self.passed else "◐" if self.excused else "✔"
 
 
 class Grade(StrEnum):

@@ -15,8 +15,8 @@ from avow.assurance.model import ObligationView
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Isolation, Object, in_words
-from avow.evidence.obligation import Kind, ProgramClaim
-from avow.evidence.record import ISOLATION, Evidence
+from avow.evidence.obligation import Kind, Obligation, ProgramClaim
+from avow.evidence.record import AGREES, ISOLATION, Evidence
 from avow.evidence.status import Status, weigh
 
 LETTERS = {"proved": "P", "checked": "C", "tested": "T", "monitored": "M", "reviewed": "R", "justified": "J"}
@@ -53,8 +53,9 @@ Opinion = Callable[[str, str], Judged]
 """(method, hypothesis) → what is thought of it."""
 
 
-def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
-    """None where nothing supports the claim."""
+def relied_upon(view: ObligationView, opinion: Opinion, views: Iterable[ObligationView] = ()) -> Relied | None:
+    """None where nothing supports the claim. Of two models, one that the program was compared with (`views`) counts
+    first."""
     if not view.status.supports:
         return None
     ways = []
@@ -73,6 +74,7 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
             outdone,
             not all(t.owned for t in thought),
             -status.rank,
+            agrees(views, view.obligation, record.method) is None,
             len(open_ones),
             record.method,
         )
@@ -105,23 +107,25 @@ def looked_at(relied: Relied) -> Object | None:
     return relied.record.of if relied.status in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED) else None
 
 
-def linked(views: Iterable[ObligationView]) -> str:
-    """Where a node's program was held against the models that were verified in its place: how that stands, in words;
-    empty where it was not. `views`: the node's."""
+def agrees(views: Iterable[ObligationView], guarantee: Obligation, method: str) -> Status | None:
+    """How it stands that the node's program answers as the model by which a method supports a guarantee; None where it
+    was not compared with that model, or not in what the guarantee is about."""
     for view in views:
         o = view.obligation
-        if o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED:
-            return f"program agrees: {view.standing.value}"
-    return ""
+        if (o.kind, o.name, o.node) == (Kind.PROGRAM, ProgramClaim.LINKED, guarantee.node):
+            compared = [r.details.get(AGREES) for r in view.records if weigh(r).support]
+            same = any(isinstance(c, Mapping) and guarantee.name in c.get(method, ()) for c in compared)
+            return view.standing if same or not view.standing.supports else None
+    return None
 
 
-def examined(relied: Relied, link: str = "") -> str:
-    """What was looked at: ``(source in float64)``; empty of a person's word. `link` is what `linked` says."""
+def examined(relied: Relied, link: Status | None = None) -> str:
+    """What was looked at: ``(source in float64)``; empty of a person's word. `link` is what `agrees` says."""
     match looked_at(relied):
         case None:
             return ""
         case Object.MODEL:
-            return f"(model; {link})" if link else "(model)"
+            return f"(model; program agrees: {link.value})" if link else "(model)"
         case Object.SOURCE:
             return f"(source in {relied.record.numbers})"
         case Object.BINARY:

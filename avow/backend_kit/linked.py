@@ -20,7 +20,9 @@ from avow.base.records import dataclass
 from avow.base.tuning.bounds import RECORDED_STEPS, ROUNDED_PART
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
+from avow.evidence.record import AGREES
 from avow.formulas.values import Element, SequenceValue, Value, show
+from avow.language.subterms import ports_of
 from avow.system.plan import Method, System
 
 Step = Mapping[str, Value]
@@ -163,6 +165,7 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
     if not steps:
         return unknown
     told, rounded, unsaid = [], 0, 0
+    agrees: dict[str, list[str]] = {}
     for method in models(job.system, job.node.name):
         try:
             run = backend(method.backend, job.system.plan.plugins).model(
@@ -170,17 +173,15 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
             )
         except (Rejected, NoModel) as error:
             return replace(unknown, summary=f"the model of {method.id} cannot be run: {error}"[:300])
-        compared = 0
+        compared, outputs = 0, set[str]()
         for step in steps:
             said = _said(run, step)
-            if said is None:
-                unsaid += 1
-                continue
-            both = [name for name in said if name in step]
-            if not both:
+            both = [name for name in said or () if name in step]
+            if said is None or not both:
                 unsaid += 1
                 continue
             compared += 1
+            outputs.update(both)
             differing = [name for name in both if not _same(said[name], step[name])]
             if differing:
                 return _differs(claim, method, step, said, differing)
@@ -188,10 +189,12 @@ def _held(job: Job, claim: Obligation, steps: Sequence[Step], why: str) -> Outco
         if not compared:
             return replace(unknown, summary=f"the model of {method.id} answers none of {len(steps)} steps")
         told.append(f"{method.id} on {compared}")
-    about = f"the program answers as the model of {', '.join(told)} steps"
+        about = {c.name: {v.qualified for v in ports_of(c.formula)} for c in job.node.guarantees}
+        agrees[method.id] = [name for name, ports in about.items() if {p for p in ports if p[:4] == "out."} <= outputs]
+    text = f"the program answers as the model of {', '.join(told)} steps"
     but = (f"in {rounded} of them but for rounding",) if rounded else ()
     bound: dict[str, object] = {"cases": len(steps), "rounded": rounded, "unanswered": unsaid}
-    return Outcome(claim.id, Verdict.TESTED, "; ".join((about, *but)), hypotheses=(*but, *others), bound=bound)
+    return Outcome(claim.id, Verdict.TESTED, "; ".join((text, *but)), None, (*but, *others), bound, {AGREES: agrees})
 
 
 def _said(run: Callable[[Step], Step], step: Step) -> Step | None:

@@ -37,6 +37,10 @@ COMPOSES = "composes"
 """Among the details of a requirement's proof: of what samples its failure rate may be composed
 (`avow.calculus.trials`)."""
 
+AGREES = "agrees"
+"""Among the details of a program's agreement with models: method → the node's guarantees about outputs that were
+compared."""
+
 STANDS_ON = (OBSERVED, ISOLATION, RETRY, "certificate", "mutation", "valid_until")
 """The details by which one of two records that say the same may count and the other not."""
 

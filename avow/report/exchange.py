@@ -67,7 +67,8 @@ def render_junit(case: Case) -> str:
 def _gates_suite(case: Case) -> tuple[str, list[int]]:
     rows, failures = [], 0
     for gate in case.gates:
-        inside = '<skipped message="the policy asks nothing here"/>' if gate.idle else ""
+        inside = f"<system-out>{escape(clean(gate.reason))}</system-out>"
+        inside = '<skipped message="the policy asks nothing here"/>' if gate.idle else inside
         if not gate.passed:
             failures += 1
             inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'

@@ -15,11 +15,12 @@ from avow.assurance.certification import ProofGrade
 from avow.assurance.model import Case, EvidenceView, ObligationView, RequirementView
 from avow.assurance.modules import RequirementModule, node_modules, requirement_modules
 from avow.assurance.naming import derivation_claim, is_foundation
-from avow.assurance.relied import upper_bound
+from avow.assurance.relied import agrees, upper_bound
 from avow.base.plain import count, listed
 from avow.base.records import dataclass
 from avow.base.verdict import Link, Object
 from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.qualification import independence
@@ -232,9 +233,9 @@ class _Argument:
             return None
         linked = [v for v in self.links if v.obligation.node in of_models]
         goals, solutions = self.claims(linked)
-        shown = {v.obligation.node for v in linked if v.standing.supports}
+        whole = all(self.linked(v, r) for v in self.case.guarantees for r in v.records if r.of is Object.MODEL)
         text = "Each model that was verified behaves as the program that runs"
-        return self.general("model-fidelity", text, [*goals, *solutions], of_models <= shown, goals)
+        return self.general("model-fidelity", text, [*goals, *solutions], whole, goals)
 
     def contracts(self) -> Module | None:
         """Whether contracts are worth verifying: consistent, realizable, not vacuous."""
@@ -379,7 +380,7 @@ class _Argument:
             seen = f" ({told})" if told and not whole else ""
             yield Defeater(f"the method would accept a wrong node as well{seen}", told if whole else "")
         if promised and status in (Status.PROVED, Status.CHECKED) and record.of is Object.MODEL:
-            yield Defeater("the model differs from the program that runs", self.linked(view.obligation.node))
+            yield Defeater("the model differs from the program that runs", self.linked(view, record))
         if status in (Status.TESTED, Status.MONITORED):
             known = upper_bound(record) is not None
             yield Defeater("a case that was not tried fails", wording.bound_text(record.bound) if known else "")
@@ -388,9 +389,9 @@ class _Argument:
             other = "a method with another tool supports the claim" if independence(view).tools > 1 else ""
             yield Defeater("the solver is wrong", "two solvers answered each question" if twice else other)
 
-    def linked(self, node: str) -> str:
-        agreed = (v for v in self.links if v.obligation.node == node and v.standing.supports)
-        return next((f"the program agrees with it: {view.standing}" for view in agreed), "")
+    def linked(self, view: ObligationView, record: Evidence) -> str:
+        found = agrees(self.case.obligations, view.obligation, record.method)
+        return f"the program agrees with it: {found}" if found is not None and found.supports else ""
 
 
 def by_name(modules: Iterable[Module]) -> Mapping[str, Element]:

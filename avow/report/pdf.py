@@ -86,7 +86,7 @@ def _data(case: Case) -> dict[str, Any]:
             {
                 "title": g.title,
                 "reason": g.reason,
-                "status": {"word": g.state, "tone": _GATES[g.state]},
+                "status": {"word": g.state, "tone": _GATES.get(g.state, "plain")},
             }
             for g in case.gates
         ],

@@ -34,6 +34,22 @@ def test_a_proof_of_the_source_is_named_before_one_of_a_model() -> None:
     assert words(MODEL) == "1 proved (model; program agrees: missing)"
 
 
+@pytest.mark.parametrize(
+    "compared", [{}, {"hoare": ["g"]}, {"dafny": ["g"]}, {"hoare": ["other"]}, {"dafny": ["g"], "hoare": ["g"]}]
+)
+def test_the_program_agrees_with_a_model_that_it_was_compared_with(compared: dict[str, list[str]]) -> None:
+    """Of two models the one that was compared is relied upon; of one that was not, nothing is said."""
+    agreed = evidence(LINKED, Verdict.TESTED, "hypothesis", details={"agrees": compared})
+    both = [MODEL, evidence(G, Verdict.PROVED, "dafny")]
+    said = "1 proved (model; program agrees: tested)"
+    assert words(agreed, *both) == (said if any("g" in names for names in compared.values()) else "1 proved (model)")
+    for model in both:
+        one = words(agreed, model)
+        assert one == (said if "g" in compared.get(model.method, ()) else "1 proved (model)")
+    unknown = evidence(LINKED, Verdict.UNKNOWN, "hypothesis", details={"agrees": compared})
+    assert words(unknown, MODEL) == "1 proved (model; program agrees: unknown)"
+
+
 def test_a_test_of_the_source_is_no_proof() -> None:
     assert words(MODEL, TESTED).startswith("1 proved (model")
     assert words(SOURCE, TESTED) == "1 proved (source in float64)"

@@ -18,6 +18,7 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import ISOLATION, SIGNED_BY, Evidence
 from avow.evidence.status import Status
+from avow.report import formats
 from avow.system.plan import Finding, Located, Requirement
 
 
@@ -313,6 +314,22 @@ def test_what_is_weaker_than_asked_is_told_with_what_is_asked() -> None:
     assert "justified, but proved or checked or reviewed is asked" in reason
     told = next(g for g in found.gates if g.id == "composition").suggestions
     assert "accepted" in told[0].text
+
+
+def test_a_gate_that_passes_by_excuses_says_so() -> None:
+    """In every format that lists gates: no sentence says more than the policy let pass."""
+    excuse = Finding("n/guarantee/g", "refuted", "known", "A. Person", "2026-11-01", "2027-11-01")
+    subject, about = (
+        system({"n": ["g"]}, plans=[node_plan("n", "low", "hoare")], accepted=[excuse]),
+        guarantee("n", "g"),
+    )
+    found = case(subject, [about], [evidence(about, Verdict.REFUTED)])
+    gate = next(gate for gate in found.gates if gate.id == "refuted")
+    assert (gate.passed, gate.mark) == (True, "◐")
+    made = {name: str(text) for name, text in formats(found)}
+    for name in ("index.html", "claims.html", "report.md"):
+        assert gate.state in made[name]
+    assert f"<system-out>{gate.reason}</system-out>" in made["junit.xml"]
 
 
 def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:

@@ -13,7 +13,7 @@ import yaml
 from helpers import some
 from python_backend.source_nodes import LIMITER, LIMITER_RCL
 
-from avow.assurance.relied import linked
+from avow.assurance.relied import agrees
 from avow.backend_kit.linked import recorded
 from avow.backend_kit.protocol import Limits, Report
 from avow.backends.python import BACKEND
@@ -56,6 +56,10 @@ def test_they_agree(tmp_path: Path) -> None:
     found = {o.obligation.rpartition("/")[2]: o for o in asked(tmp_path / "s").outcomes}
     assert found["agrees-with-model"].verdict is Verdict.TESTED
     assert int(str(found["agrees-with-model"].bound["cases"])) > 100
+    system = load_system(tmp_path / "s")
+    assert found["agrees-with-model"].details["agrees"] == {
+        "hoare": [c.name for c in system.contract.nodes[0].guarantees]
+    }
     assert found["bounded"].verdict is Verdict.PROVED
 
 
@@ -203,7 +207,7 @@ def test_a_model_that_is_not_run_is_refused_by_name(tmp_path: Path) -> None:
 
 def test_the_report_says_how_the_link_stands(tmp_path: Path) -> None:
     written(tmp_path / "s")
-    (claim,) = (o for o in catalogue(load_system(tmp_path / "s")).obligations if o.name == "agrees-with-model")
-    views: Any = [SimpleNamespace(obligation=claim, standing=Status.REFUTED)]
-    assert linked(views) == "program agrees: refuted"
-    assert linked(()) == ""
+    listed = {o.name: o for o in catalogue(load_system(tmp_path / "s")).obligations if o.node == "limiter"}
+    views: Any = [SimpleNamespace(obligation=listed["agrees-with-model"], standing=Status.REFUTED, records=())]
+    assert agrees(views, listed["bounded"], "hoare") is Status.REFUTED
+    assert agrees((), listed["bounded"], "hoare") is None
