@@ -353,8 +353,8 @@ def watch(clause: Clause, tally: Tally, setup: Setup) -> Watched:
         steps.alone = bool(arrivals) and names == set(map(_port_of, arrivals))
         if clause.pace is not None:  # its steps are the node's answers
             names = {n for n in setup.rules if n.startswith(f"{Role.OUTPUT}.") and n not in setup.hidden}
-        said = clause.text or show_term(clause.formula, "unicode")
-        clause = replace(clause, formula=formula, text=said)
+        # as it was written: what it is compiled to has names of our own
+        clause = replace(clause, formula=formula, text=clause.text or show_term(clause.formula, "unicode"))
     return Watched(
         clause,
         tuple(sorted(names if steps is not None else free_names(formula))),
