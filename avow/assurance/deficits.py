@@ -20,11 +20,7 @@ _WORDS = {
         "Nobody has read the sentence against the formula (`avow validate`).",
     ),
     "models": ("guarantee{s} shown of a model only", "of models", "What runs may differ from the model."),
-    "bounded": (
-        "requirement{s} within bounds only",
-        "bounded",
-        "Nothing is said outside the finite scenario or model that was searched.",
-    ),
+    "bounded": ("requirement{s} within bounds only", "bounded", "Nothing is said outside what was searched."),
     "unowned": (
         "assumption{s} without owner or date",
         "without owner",

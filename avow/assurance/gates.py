@@ -422,7 +422,7 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
     """What a gate that passes says: never more than is so."""
     if not supported:
         return "there are none"
-    counts = f"{sum(supported)} of {len(supported)} hold"
+    counts = f"{sum(supported)} of {len(supported)} are supported"
     if not asked:
         return f"the policy asks nothing of them; {counts}"
     return f"{counts}; {excused} excused by the plan" if excused else counts

@@ -13,6 +13,7 @@ from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +49,9 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
             if own:
                 away.append((node.name, node.title, f"{len(own)} of its guarantees: {_standings(own)}"))
         side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
-        shown = [v for v in side if v.standing.supports]
-        conditions = f"{len(shown)} of {count(len(side), 'condition')} met" if side else ""
+        assumed = sum(v.status is Status.JUSTIFIED for v in side)
+        shown = sum(v.standing.supports for v in side) - assumed
+        conditions = f"{shown} of {count(len(side), 'condition')} shown, {assumed} assumed" if side else ""
         supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
         because = _because(case, r) + (f" F{r.rate.words[1:]}." if r.rate and r.level.holds else "")

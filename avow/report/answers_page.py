@@ -175,8 +175,8 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
     else:
         rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
         tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
-        supposing = ", on assumptions" if any(case.assumptions for case in relied) else ""
-        line = f"{count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{supposing}{rest}"
+        least = max((case.answers.headline for case in relied), key=tuple(Level).index)
+        line = f"{count(len(relied), 'system')}, {'at least ' * (len(relied) > 1)}{least}{rest}"
     if earlier:
         line += f"; {count(len(earlier), 'report')} as of an earlier state"
         tone = Tone.AMBER if tone is Tone.GREEN else tone

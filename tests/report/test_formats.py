@@ -26,6 +26,7 @@ from avow.assurance.model import Case, Grade
 from avow.assurance.traceability import COLUMNS, trace
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
+from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import PDF, formats, render_all, write_index
 from avow.report.exchange import render_attestation
@@ -335,7 +336,14 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert examined.answers.tone is Tone.AMBER
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
-    assert "1 system holds, on assumptions; 1 only examined" in render_index([examined, relied])
+    assert "1 system, argued; 1 only examined" in render_index([examined, relied])
+    better = case(
+        system({"n": ["g"]}, requirements=[Requirement("R", "t", "n.x", None, ("n.g",))]),
+        [g, own := obligation("system", Kind.REQUIREMENT, "R", clauses=("n.g",))],
+        [evidence(g), evidence(own, method="compose")],
+    )
+    assert "2 systems, at least argued; 1 only examined" in render_index([examined, relied, better])
+    assert "1 system, shown of models" in render_index([better])
 
 
 # -- trend ----------------------------------------------------------------------------------------------------------
