@@ -55,7 +55,7 @@ def command(system: str, requirements: tuple[str, ...], who: str, as_json: bool)
     today = datetime.now().astimezone().date().isoformat()
     for requirement in chosen:
         text = with_validation(text, requirement, name, today)
-    after = {r.id: r for r in load_texts(path, text, found.contract).plan.requirements}
+    after = {r.id: r for r in load_texts(path, text).plan.requirements}
     missing = [r.id for r in chosen if not after[r.id].validated]
     if missing:
         message = f"{path}: the entry of {', '.join(missing)} could not be written"

@@ -86,7 +86,9 @@ def asked_otherwise(case: Case, root: Path) -> tuple[str, ...]:
     planned = {(view.id, method): key for view in case.obligations for method, key in view.planned}
     keys = {(name, work.method): key for work in works for name, key in work.keys.items()}
     changed = sorted({name for (name, _), key in keys.items() - planned.items()})
-    return tuple(f"{name} is not what the report answers" for name in changed[:DIFF_REASONS])
+    return tuple(
+        f"{name} is another question now (contract, plan, scenario or engine)" for name in changed[:DIFF_REASONS]
+    )
 
 
 def _folder(case: Case, root: Path) -> Path:

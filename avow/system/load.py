@@ -58,12 +58,17 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], she
     return _linked(folder, plan, root, faults, contract, within, known, shelf)
 
 
-def load_texts(path: Path, text: str, contract: Contract) -> System:
-    """The system that a plan's file would be the plan of, if `text` were its text and its files declared `contract`.
+def load_texts(path: Path, text: str, contract: Contract | None = None) -> System:
+    """The system that a plan's file would be the plan of, if `text` were its text and its files declared `contract`;
+    without one, what they declare as they are.
 
     Raises Rejected, with what stops the loading.
     """
     plan, root, faults = read_plan(path, text)
+    if contract is None:
+        contract, more = _contract(plan.contract_files, None)
+        if contract is None:
+            raise Rejected(*faults, *more)
     return _linked(path.parent, plan, root, faults, contract, (), {}, None)
 
 

@@ -55,6 +55,15 @@ def test_a_validation_is_written_and_counts(tmp_path: Path, style: str, capsys: 
     assert load_system(tmp_path).plan.requirements[0].outdated
 
 
+def test_a_requirement_on_a_system_that_is_taken_in_is_validated(tmp_path: Path) -> None:
+    for name, text in (("inner", "{}\n"), ("outer", STYLES["flow"] + "subsystems: {left: {system: ../inner}}\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "system.rcl").write_text(RCL)
+        (tmp_path / name / "plan.yaml").write_text(text)
+    assert cli("validate", tmp_path / "outer", "R", "--as", "A. Person") == 0
+    assert load_system(tmp_path / "outer").plan.requirements[0].validated
+
+
 @pytest.mark.parametrize(("more", "code"), [(["Q", "--as", "A. B."], "CLI022"), (["R", "--as", "?"], "SIGN005")])
 def test_nobody_validates_what_is_not_there(
     tmp_path: Path, more: list[str], code: str, capsys: pytest.CaptureFixture[str]
