@@ -161,8 +161,6 @@ def test_a_claim_has_one_status_in_every_format(verdict: str) -> None:
     for label in (*labels, *(f"{name} [{level}" for name, level in (levels | dangers).items())):
         assert sum(text.startswith(label) for text in sacm) == 1, label
     shown = {name: " ".join(_TAGS.sub(" ", made[name]).split()) for name in ("argument.html", "claims.html", "gsn.svg")}
-    for r in found.requirements:
-        assert f"goal {r.id} [{r.stands}]" in shown["claims.html"]
     trace = " ".join(_TAGS.sub(" ", made["traceability.html"]).split())
     assert f"and {sum(r.level.holds for r in found.requirements)} of them are at least argued" in trace
     for name, level in levels.items():
