@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from typing import TYPE_CHECKING
 
 from avow.assurance.answers import Tone
-from avow.assurance.model import ObligationView
 from avow.base.plain import count
 from avow.base.records import dataclass
 from avow.base.verdict import HypothesisKind, Isolation, Object, in_words
 from avow.evidence.obligation import Kind, Obligation, ProgramClaim
 from avow.evidence.record import AGREES, ISOLATION, Evidence
 from avow.evidence.status import Status, weigh
+
+if TYPE_CHECKING:
+    from avow.assurance.model import ObligationView
 
 LETTERS = {"proved": "P", "checked": "C", "tested": "T", "monitored": "M", "reviewed": "R", "justified": "J"}
 EXHAUSTIVE = frozenset({Status.PROVED, Status.CHECKED})

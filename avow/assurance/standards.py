@@ -11,11 +11,12 @@ from enum import StrEnum
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from avow.assurance.relied import agrees
 from avow.base.packaged import packaged
 from avow.base.plain import listed
 from avow.base.records import dataclass
 from avow.base.verdict import Object
-from avow.evidence.obligation import Kind, ProgramClaim
+from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 
 if TYPE_CHECKING:
@@ -218,15 +219,16 @@ class _Queries:
         return _named("gates that fail", failing)
 
     def models_linked(self) -> str:
-        models = {v.obligation.node for v in self.guarantees if v.standing.supports and not _of(v, *_PROGRAMS)}
         if not self.guarantees:
             return "no guarantee is there"
-        shown = {
-            v.obligation.node
-            for v in self.views
-            if v.obligation.kind is Kind.PROGRAM and v.obligation.name == ProgramClaim.LINKED and v.standing.supports
-        }
-        return _named("models that no program was compared with", sorted(models - shown))
+        models = [v for v in self.guarantees if v.standing.supports and not _of(v, *_PROGRAMS)]
+        alone = {v.obligation.node for v in models if not self.compared(v)}
+        return _named("models that no program was compared with", sorted(alone))
+
+    def compared(self, view: ObligationView) -> bool:
+        """Whether the node's program answers as one of the models that support a guarantee."""
+        found = (agrees(self.views, view.obligation, r.method) for r in view.records if weigh(r).support)
+        return any(status is not None and status.supports for status in found)
 
 
 _NONE_HIGH = "no node of high criticality has a guarantee"

@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
-from assurance.sample import case, evidence, guarantee, node_plan, system
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.model import Case
 from avow.assurance.policy import profile, profile_names
 from avow.assurance.standards import Query, State, _Queries, standards
 from avow.base.verdict import Object, Verdict
+from avow.evidence.obligation import Kind, ProgramClaim
 from avow.report import formats
 from avow.system.plan import Requirement
 
@@ -77,6 +78,15 @@ def asked(found: Case, query: Query) -> str:
 def test_a_query_is_answered_both_ways(query: Query, good: Case, bad: Case) -> None:
     assert asked(good, query) == ""
     assert asked(bad, query) != ""
+
+
+@pytest.mark.parametrize("compared", ["hoare", "dafny"])
+def test_a_model_is_linked_where_the_program_was_compared_with_that_one(compared: str) -> None:
+    claim = obligation("n", Kind.PROGRAM, ProgramClaim.LINKED)
+    agreed = evidence(claim, Verdict.TESTED, "hypothesis", details={"agrees": {compared: ["g"]}})
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "high", "hoare", "hypothesis")])
+    found = case(subject, [G, claim], [evidence(G), agreed])
+    assert (asked(found, Query.MODELS_LINKED) == "") == (compared == "hoare")
 
 
 def test_nothing_is_served_by_the_absence_of_what_is_asked_about() -> None:

@@ -112,7 +112,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
             "not-vacuous-g1",
         ),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: blue}]", "PLAN112", 1, "blue", ""),
-        ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.q}]", "PLAN112", 1, "is no value of", ""),
+        ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.q}]", "PLAN112", 1, "is no value", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.r}]", "PLAN112", 1, "of in.r", ""),
     ],
 )
