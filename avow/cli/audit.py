@@ -144,7 +144,7 @@ def _audit_system(
 
 def _edited(place: Workspace, surveyed: Survey) -> Iterable[Discrepancy]:
     """The generated files that somebody has edited: people read them in place of the contract and the ledger."""
-    paths = [*edited_pages(place, surveyed.system.name)]
+    paths = [*edited_pages(place, surveyed)]
     for work in surveyed.catalogue.works:
         if not work.is_engine:
             with contextlib.suppress(Rejected):  # what a backend refuses is an error of the plan: see `avow check`

@@ -45,7 +45,7 @@ from avow.pipeline.results import Result
 from avow.pipeline.run_info import today
 from avow.pipeline.settings import EXPLAIN, asked_seconds, signing_key
 from avow.pipeline.state import State
-from avow.pipeline.workload import Survey
+from avow.pipeline.workload import LISTED, Survey, write_obligations
 from avow.report import render_all, write_index
 from avow.report.page import environment
 from avow.report.short import terminal_lines
@@ -89,7 +89,9 @@ def render(state: State, surveyed: Survey) -> Result:
         written = render_all(case, state.workspace.report(surveyed.system.name), signing_key())
         result = _summarise(state, surveyed, case)
         pages = write_indexes(state.workspace, surveyed.catalogue.works, case)
-        files = {state.workspace.relative(p): digest_file(p) for p in (*written, *pages)}
+        listed = state.workspace.artifacts / surveyed.system.name / LISTED
+        made = (*written, *pages, *([listed] if listed.is_file() else []))
+        files = {state.workspace.relative(p): digest_file(p) for p in made}
         write_note(_stamp(state, surveyed), Rendering(key, files, result))
         state.changed.append(surveyed.system.name)
     confirm(state.workspace, ledger)
@@ -283,12 +285,15 @@ class Rendering:
     result: Result
 
 
-def edited_pages(workspace: Workspace, system: str) -> tuple[Path, ...]:
-    """The nodes' pages that differ from those written with the last report, if this user wrote it."""
-    known = read_note(Rendering, workspace.artifacts / system / "report.json")
+def edited_pages(workspace: Workspace, surveyed: Survey) -> tuple[Path, ...]:
+    """The nodes' pages and the list of obligations that differ from those of the last report, if this user wrote it.
+    A list of what contract and plan ask today was written anew."""
+    known = read_note(Rendering, workspace.artifacts / surveyed.system.name / "report.json")
     files = known.files if known is not None else {}
-    pages = {workspace.root / name: sha for name, sha in files.items() if Path(name).name == INDEX}
-    return tuple(path for path, sha in pages.items() if path.is_file() and digest_file(path) != sha)
+    made = {workspace.root / name: sha for name, sha in files.items() if Path(name).name in (INDEX, LISTED)}
+    other = (path for path, sha in made.items() if path.is_file() and digest_file(path) != sha)
+    current = write_obligations(workspace, surveyed, dry=True)
+    return tuple(path for path in other if not (current and path.name == LISTED))
 
 
 _OVERVIEW = ".overview.json"

@@ -68,6 +68,9 @@ def survey(folder: Path, offered: Offered = None, fresh: bool = False) -> Survey
     return Survey(system, listed, sha256(json.dumps(texts)), shelf)
 
 
+LISTED = "obligations.json"
+
+
 @dataclass(frozen=True, slots=True)
 class ListedClaim:
     """An obligation in obligations.json: `at` is its source position, `methods` are those that discharge it."""
@@ -91,7 +94,7 @@ class Listing:
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:
     """artifacts/<system>/obligations.json: every claim, with its formula and its methods. `dry`: is it current?"""
     text = _listed(workspace, surveyed)
-    path = workspace.artifacts / surveyed.system.name / "obligations.json"
+    path = workspace.artifacts / surveyed.system.name / LISTED
     if dry:
         return path.is_file() and read_regular(path) == text.encode()
     return write(path, text)
