@@ -44,6 +44,11 @@ _WORDS = {
         "programs not run",
         "The tool that would run the program is missing: nothing is known of these claims.",
     ),
+    "withdrawn": (
+        "refutation{s} by what the plan no longer uses",
+        "no longer used",
+        "A method or a file refuted a claim, and was then taken out of the plan.",
+    ),
     "conditional": (
         "review{s} with conditions",
         "reviewed with conditions",
@@ -100,6 +105,7 @@ def deficits(
         "tied": [v.id for v in guarantees if v.id in relied and _by_hand(v, relied[v.id])],
         "unrun": [f"{v.id}: {method}" for v, method in unrun],
         "programs": [v.id for v in programs],
+        "withdrawn": [item.claim for item in open_items if item.kind == "withdrawn"],
         "conditional": [v.id for v in guarantees if _on_conditions(v)],
         "advice": [item.claim for item in open_items if item.kind == "advice" and not item.handled],
         "excused": [name for f in findings if f.how == "accepted" and not f.expired for name in f.obligations],

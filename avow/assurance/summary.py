@@ -10,6 +10,7 @@ from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.base.plain import listed
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 
 _WORST_FIRST = (
@@ -125,16 +126,25 @@ def worst_first(names: Iterable[str], statuses: Mapping[str, Status]) -> tuple[s
 
 
 def _given_up(view: ObligationView) -> Iterable[OpenItem]:
-    """A refutation of the claim as it is now, by a method that the plan no longer uses for it: that does not refute the
-    refutation."""
+    """A refutation of the claim as it is now, by a method that the plan no longer uses for it, or with a file that the
+    method no longer reads: that does not refute the refutation."""
     for item in view.evidence:
         record = item.entry.evidence
-        same = record.obligation_digest == view.obligation.digest
-        if item.currency is Currency.WITHDRAWN and same and weigh(record).refuted:
-            text = (
-                f"{record.method} refuted it on {record.started[:10]}; the plan no longer uses {record.method} for it"
-            )
+        if record.obligation_digest != view.obligation.digest or not weigh(record).refuted:
+            continue
+        missed = _no_longer_read(record, view.records) if item.currency is Currency.STALE else ()
+        if item.currency is Currency.WITHDRAWN or missed:
+            what = f"uses {record.method} for it" if not missed else f"has it read {listed(missed, 3)}"
+            text = f"{record.method} refuted it on {record.started[:10]}; the plan no longer {what}"
             yield OpenItem("withdrawn", view.id, text, title=view.obligation.claim)
+
+
+def _no_longer_read(refuting: Evidence, counting: Iterable[Evidence]) -> list[str]:
+    """The files that a method read when it refuted a claim, and leaves out now, where all others are as they were."""
+    for now in counting:
+        if now.method == refuting.method and now.inputs.items() < refuting.inputs.items():
+            return sorted(refuting.inputs.keys() - now.inputs.keys())
+    return []
 
 
 def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:

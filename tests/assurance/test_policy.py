@@ -381,6 +381,21 @@ def test_who_gives_up_the_method_that_refutes_is_told_of() -> None:
     assert not any(i.kind == "withdrawn" for i in found.open_items)
 
 
+@pytest.mark.parametrize(
+    ("read", "told"),
+    [({"good": "1"}, True), ({"good": "1", "bad": "3"}, False), ({"good": "4"}, False), ({"other": "5"}, False)],
+)
+def test_a_refutation_by_a_file_that_is_no_longer_read_is_told_of(read: dict[str, str], told: bool) -> None:
+    """A recording that refutes does not go away by no longer being named; a changed program or recording is another."""
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hypothesis")])
+    refuted = evidence("n.g", Verdict.REFUTED, "hypothesis", key="before", inputs={"good": "1", "bad": "2"})
+    now = replace(TEST, inputs=read)
+    found = case(subject, [guarantee("n", "g")], [refuted, now], keys={(now.obligation, "hypothesis"): now.key})
+    assert found.obligations[0].status is Status.TESTED
+    assert any("the plan no longer has it read bad" in i.text and not i.advice for i in found.open_items) is told
+    assert ("withdrawn" in {d.key for d in found.deficits}) is told
+
+
 def test_reproduction_asks_nothing_of_guarantees() -> None:
     assert the_case("reproduction").exit_code == 0
     assert the_case("default").exit_code == 1
