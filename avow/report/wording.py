@@ -155,11 +155,11 @@ def open_line(case: Case) -> str:
 
 
 def banner_tone(case: Case) -> str:
-    """Green is for a case that supports what is asked: known-bad material, expected or accepted, is none."""
+    """Green is for a case whose requirements are shown: known-bad material, expected or accepted, is none, and neither
+    is a plan without a requirement."""
     if not case.good:
         return "bad"
-    held = all(r.level.holds for r in case.requirements)  # one that nobody has validated does not, and fails no gate
-    return "good" if held and not case.answers.warned else "open"
+    return "good" if case.answers.headline.holds and not case.answers.warned else "open"
 
 
 _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
