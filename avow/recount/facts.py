@@ -52,7 +52,7 @@ class Facts:
                 v["obligation"]["claim"],
                 v["obligation"]["claim"].rstrip("."),
                 v["obligation"]["name"],
-                id_of(v),
+                _id(v),
             )
             yield from (r["numbers"] for r in records(v))
         yield from (f"{name} {version}" for name, version in self.case["kernel"]["solvers"].items())
@@ -85,7 +85,7 @@ class Facts:
     def wrong(self) -> list[Json]:
         advice = {item["claim"] for item in self.case["open_items"] if item["kind"] == "advice"}
         bad = [v for v in self.views if v["status"] in ("refuted", "contradictory")]
-        return [v for v in bad if not v["obligation"].get("advisory") and id_of(v) not in advice]
+        return [v for v in bad if not v["obligation"].get("advisory") and _id(v) not in advice]
 
     def known(self) -> int:
         """Findings that the plan speaks of and that support nothing."""
@@ -115,8 +115,8 @@ class Facts:
         """At least and at most so many, as the records have it; None for a kind that is not known here."""
         basis = {name for r in self.requirements for name in r.get("closure", ())}
         if not self.requirements:  # of the whole case: what its evidence is about
-            basis = {id_of(v) for v in self.views}
-        within = [v for v in self.guarantees if id_of(v) in basis]
+            basis = {_id(v) for v in self.views}
+        within = [v for v in self.guarantees if _id(v) in basis]
         sampled = [{support(r) in ("tested", "monitored") for r in supporting(v)} for v in within]
         read = [{support(r) == "reviewed" for r in supporting(v)} for v in within]
         model = [{_way(r)[1] == "model" for r in supporting(v)} for v in within]
@@ -134,7 +134,7 @@ class Facts:
             "excused": sum(
                 len(f["obligations"]) for f in self.case["findings"] if f["how"] == "accepted" and not f["expired"]
             ),
-            "believed": sum(id_of(v) in basis and any(r["run"] != run for r in records(v)) for v in self.views),
+            "believed": sum(_id(v) in basis and any(r["run"] != run for r in records(v)) for v in self.views),
         }
         loose = {"sampled": sampled, "read": read, "models": model, "tied": hand}
         if key in exact:
@@ -168,7 +168,7 @@ class Facts:
         return "none" if not found else "another rate"
 
 
-def id_of(view: Json) -> str:
+def _id(view: Json) -> str:
     o = view["obligation"]
     return f"{o['system']}/{o['node']}/{o['kind']}/{o['name']}"
 
