@@ -34,11 +34,7 @@ _WORDS = {
         "translated by a person",
         "Nothing shows that the person's table or measure is right.",
     ),
-    "unrun": (
-        "planned method{s} without an answer",
-        "not answered",
-        "A tool is missing, gave up or failed.",
-    ),
+    "unrun": ("planned method{s} without an answer", "not answered", "A tool is missing, gave up or failed."),
     "programs": (
         "claim{s} about a node's program not run",
         "programs not run",
@@ -47,13 +43,9 @@ _WORDS = {
     "withdrawn": (
         "refutation{s} by what the plan no longer uses",
         "no longer used",
-        "A method or a file refuted a claim, and was then taken out of the plan.",
+        "It refuted, and then left the plan.",
     ),
-    "conditional": (
-        "review{s} with conditions",
-        "reviewed with conditions",
-        "The reviewer names further conditions.",
-    ),
+    "conditional": ("review{s} with conditions", "reviewed with conditions", "The reviewer names further conditions."),
     "advice": ("open remark{s}", "remarks", "They fail no gate; read them."),
     "excused": ("finding{s} accepted by a person", "excused", "A named person takes responsibility for a finding."),
     "believed": (

@@ -141,10 +141,8 @@ def _given_up(view: ObligationView) -> Iterable[OpenItem]:
 
 def _no_longer_read(refuting: Evidence, counting: Iterable[Evidence]) -> list[str]:
     """The files that a method read when it refuted a claim, and leaves out now, where all others are as they were."""
-    for now in counting:
-        if now.method == refuting.method and now.inputs.items() < refuting.inputs.items():
-            return sorted(refuting.inputs.keys() - now.inputs.keys())
-    return []
+    same = (r for r in counting if r.method == refuting.method and r.inputs.items() < refuting.inputs.items())
+    return sorted(next((refuting.inputs.keys() - now.inputs.keys() for now in same), ()))
 
 
 def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
