@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -14,11 +15,12 @@ from avow.formulas.ltl import Automaton
 
 from .explore import Graph, System
 from .intentions import Frame
-from .interpreter import Agent, State
+from .interpreter import BITS, QUEUE, Agent
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
 from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
 from .tautology import Laws, is_valid, standing
+from .tuning import LAZY_STATES
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,19 @@ class Kripke:
 
     def __len__(self) -> int:
         return len(self.labels)
+
+
+def shortened(graph: Graph, labels: Sequence[int]) -> Kripke:
+    """The graph without states whose only way leads to a later one of their own label: most are of that kind, as an
+    agent decides next to nothing between two draws."""
+    offsets, targets = graph.offsets, graph.targets
+    ends = array("i", range(len(graph)))
+    for state in range(len(graph) - 1, -1, -1):
+        first = offsets[state]
+        if offsets[state + 1] == first + 1 and (target := targets[first]) > state and labels[target] == labels[state]:
+            ends[state] = ends[target]
+    initial = dict.fromkeys(ends[state] for state in graph.initial)
+    return _reachable(initial, lambda state: {ends[target] for target in graph.after(state)}, labels)
 
 
 def reduce(graph: Kripke) -> Kripke:
@@ -76,22 +91,18 @@ def reduce(graph: Kripke) -> Kripke:
         new_successors.append(tuple(targets))
     initial = tuple(dict.fromkeys(merged[number[s]] for s in graph.initial))
     successors_now = [tuple(dict.fromkeys(merged[t] for t in targets)) for targets in new_successors]
-    return _reachable(Kripke(initial, successors_now, new_labels))
+    return _reachable(initial, successors_now.__getitem__, new_labels)
 
 
-def _reachable(graph: Kripke) -> Kripke:
-    order: dict[int, int] = {s: i for i, s in enumerate(graph.initial)}
-    queue = list(graph.initial)
-    for node in queue:
-        for target in graph.successors[node]:
+def _reachable(initial: Iterable[int], after: Callable[[int], Iterable[int]], labels: Sequence[int]) -> Kripke:
+    order = {state: at for at, state in enumerate(initial)}
+    first, queue = tuple(order.values()), list(order)
+    for state in queue:
+        for target in after(state):
             if target not in order:
                 order[target] = len(order)
                 queue.append(target)
-    return Kripke(
-        tuple(range(len(graph.initial))),
-        [tuple(order[t] for t in graph.successors[node]) for node in queue],
-        [graph.labels[node] for node in queue],
-    )
+    return Kripke(first, [tuple(order[t] for t in after(state)) for state in queue], [labels[s] for s in queue])
 
 
 def find_lasso(graph: Kripke, automaton: Automaton[Formula], fair: Sequence[Fair] = ()) -> Lasso | None:
@@ -157,12 +168,9 @@ class Checker:
         self.laws = standing([agent.program for agent in system.agents], percepts)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = label_states(self.graph.system, self.graph.states, self.atoms)
-        self.reduced = reduce(self.whole(self.labels))
+        self.reduced = reduce(shortened(self.graph, self.labels))
         while len(smaller := reduce(self.reduced)) < 0.95 * len(self.reduced):
             self.reduced = smaller
-
-    def whole(self, labels: Sequence[int]) -> Kripke:
-        return Kripke(self.graph.initial, [self.graph.after(s) for s in range(len(self.graph))], labels)
 
     def check(self, wanted: Property, deadline: float | None = None) -> Result:
         """Raises OutOfTime, ltl.TooLarge."""
@@ -188,15 +196,16 @@ class Checker:
         the occasion is no answer to it, and what was so before may stay so only until then."""
         if wanted.trigger is None or wanted.forbidden is None or self.graph.unfinished is not None:
             return False
-        graph, labels, states = self.graph, self.labels, self.graph.states
+        graph, labels, core = self.graph, self.labels, self.graph.system.core
+        states = graph.states
         meant, banned = compiled(wanted.trigger, self.places), compiled(wanted.forbidden, self.places)
         needs_act = any(atom.modality is Modality.DID for atom in atoms(wanted.forbidden))
 
         def acted(state: int, target: int) -> bool:
-            return bool(states[target].last != states[state].last)
+            return bool(core(states[target]).last != core(states[state]).last)
 
         def waiting(state: int) -> list[int]:
-            return [t for t in graph.after(state) if not acted(state, t) and not states[t].drawn]
+            return [t for t in graph.after(state) if not acted(state, t) and not core(states[t]).drawn]
 
         triggered = [meant(label) for label in labels]
         occasions = {s for s in graph.initial if triggered[s]}
@@ -212,9 +221,17 @@ class Checker:
         return not good.isdisjoint(occasions)
 
     def lasso(self, refuted: Property) -> Lasso | None:
-        """A run of the agent itself on which the property fails."""
+        """A run of the agent itself on which the property fails; if there is one, among the states found first."""
         automaton, fair, labels = self._projected(refuted, self.labels)
-        return find_lasso(self.whole(labels), automaton, fair)
+        graph, few = self.graph, range(LAZY_STATES)
+
+        def nearby(state: int) -> list[int]:
+            return [target for target in graph.after(state) if target in few]
+
+        found = accepted_run(graph.initial, nearby, labels.__getitem__, automaton, fair)
+        if found is None and len(graph) > len(few):
+            found = accepted_run(graph.initial, graph.after, labels.__getitem__, automaton, fair)
+        return found
 
     def _where(self, formula: Formula) -> frozenset[int]:
         """The labels of reachable states at which the formula holds."""
@@ -254,22 +271,26 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
     def drawn(choice: int) -> int:
         return _of_draw(system.world.offers(choice), fair)
 
-    result = []
-    for state in states:
+    def label(state: Any) -> int:
         bits = 0
         for own, mind in zip(labels, system.minds(state), strict=True):
             bits |= own.of(mind)
+        now = system.core(state)
         if done:
-            if state.last not in last:
-                last[state.last] = _of_last(system.did(state), done)
-            bits |= last[state.last]
+            if now.last not in last:
+                last[now.last] = _of_last(system.did(state), done)
+            bits |= last[now.last]
         if perceived:
             offered = system.sees(state)
             bits |= sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
-        if fair and state.drawn:
-            bits |= drawn(state.choice)
-        result.append(bits)
-    return result
+        if fair and now.drawn:
+            bits |= drawn(now.choice)
+        return bits
+
+    if not isinstance(system, Agent) or labels[0].intended:
+        return list(map(label, states))
+    of_core = cache(lambda core: label(core << BITS))  # what is not asked of intentions, the queue does not bear on
+    return [of_core(state >> BITS) for state in states]
 
 
 def _of_last(did: tuple[int, Struct] | None, done: Sequence[tuple[int, int, Term]]) -> int:
@@ -291,31 +312,35 @@ class Labels:
         self.believed = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
         self.wanted = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
         self.intended = [(bit, a.modality, named_apart(a.term)) for bit, a in numbered if a.modality in mental]
-        self.by_beliefs = cache(self._of_beliefs)
-        self.by_goals = cache(self._of_goals)
-        self.by_intention = cache(self._of_intention)
+        self.by_beliefs, self.by_goals = cache(self._of_beliefs), cache(self._of_goals)
+        self.by_intention, self.by_core = cache(self._of_intention), cache(self._of_core)
 
-    def of(self, mind: State) -> int:
-        bits = self.by_beliefs(mind.beliefs) if self.believed else 0
-        if self.wanted:
-            bits |= self.by_goals(mind.goals)
+    def of(self, mind: int) -> int:
+        bits = self.by_core(mind >> BITS)
         if self.intended:
-            for number in (*mind.queue, mind.current):
+            for number in self.agent.queues.all[mind & QUEUE]:
                 bits |= self.by_intention(number)
         return bits
 
+    def _of_core(self, number: int) -> int:
+        core = self.agent.cores.all[number]
+        bits = self.by_beliefs(core.beliefs) if self.believed else 0
+        if self.wanted:
+            bits |= self.by_goals(core.goals)
+        return bits | self.by_intention(core.current) if self.intended else bits
+
     def _of_beliefs(self, number: int) -> int:
         agent = self.agent
-        beliefs = agent.beliefs.items[number]
+        beliefs = agent.beliefs.all[number]
         holds = ((bit, agent.reasoner.derived(beliefs, term)) for bit, term in self.believed)
         return sum(bit for bit, found in holds if found is not None)
 
     def _of_goals(self, number: int) -> int:
-        goals = self.agent.goals.items[number]
+        goals = self.agent.goals.all[number]
         return sum(bit for bit, term in self.wanted if any(unify(term, g.term, {}) is not None for g in goals))
 
     def _of_intention(self, number: int) -> int:
-        return 0 if number == NONE else _mental(self.agent.intentions.items[number].frames, self.intended)
+        return 0 if number == NONE else _mental(self.agent.intentions.all[number].frames, self.intended)
 
 
 def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]]) -> int:

@@ -12,14 +12,16 @@ from typing import Any, Protocol
 from .beliefs import TooDeep
 from .builtin import Crash
 from .environment import Environment
-from .interpreter import Agent, Semantics, State, World
+from .interpreter import Agent, Semantics, World
+from .mind import Table
 from .syntax import Struct
 from .tuning import INTENTIONS, STATES
 
 
 class System(Protocol):
-    """One agent (`interpreter.Agent`) or several (`society.Society`): a transition system over states of its own, which
-    tell whether the environment has just drawn (`drawn`), what is on offer (`choice`) and whether the run is over."""
+    """One agent (`interpreter.Agent`) or several (`society.Society`): a transition system over states of its own. The
+    core of a state tells whether the environment has just drawn (`drawn`), what is on offer (`choice`) and whether the
+    run is over."""
 
     world: World
     environment: Environment
@@ -30,7 +32,8 @@ class System(Protocol):
     def agents(self) -> tuple[Agent, ...]: ...
     def start(self) -> tuple[Any, ...]: ...
     def successors(self, state: Any, /) -> tuple[Any, ...]: ...
-    def minds(self, state: Any, /) -> tuple[State, ...]: ...
+    def core(self, state: Any, /) -> Any: ...
+    def minds(self, state: Any, /) -> tuple[int, ...]: ...
     def did(self, state: Any, /) -> tuple[int, Struct] | None: ...
     def sees(self, state: Any, /) -> tuple[Struct, ...]: ...
 
@@ -40,7 +43,7 @@ class Graph:
     """States by their numbers; of their successors `after` tells."""
 
     system: System
-    states: tuple[Any, ...]
+    states: Sequence[Any]
     initial: tuple[int, ...]
     offsets: array[int]
     targets: array[int]
@@ -63,7 +66,8 @@ class Graph:
 
 
 def _backlog(system: System, newest: Sequence[Any]) -> str:
-    most = max(len(mind.queue) for state in newest for mind in system.minds(state))
+    minds = ((agent, mind) for state in newest for agent, mind in zip(system.agents, system.minds(state), strict=True))
+    most = max(len(agent.state(mind).queue) for agent, mind in minds)
     if most < INTENTIONS:
         return ""
     return (
@@ -92,21 +96,14 @@ def explore(
     the runs that it leaves."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
-    numbers: dict[Any, int] = {}
-    found: list[Any] = []
-    offsets, targets = array("q", [0]), array("q")
+    table: Table[Any] = Table()
+    found = table.all
+    offsets, targets = array("i", [0]), array("i")
 
-    def number(state: Any) -> int:
-        known = numbers.get(state)
-        if known is None:
-            known = numbers[state] = len(found)
-            found.append(state)
-        return known
-
-    initial = tuple(dict.fromkeys(number(state) for state in (reduced or system).start()))
+    initial = tuple(dict.fromkeys(map(table.number, (reduced or system).start())))
     at = 0
     unfinished = None
-    successors = system.successors if reduced is None else lambda state: reduced.successors(state, numbers)
+    successors = system.successors if reduced is None else lambda state: reduced.successors(state, table)
     while at < len(found):
         if len(found) > states:
             unfinished = f"more than {states} states"
@@ -125,12 +122,11 @@ def explore(
         except Crash as error:
             unfinished = f"the agent ends with an error of its own: {error}"
             break
-        for state in reached:
-            targets.append(number(state))
+        targets.extend(map(table.number, reached))
         offsets.append(len(targets))
         at += 1
     offsets.extend([len(targets)] * (len(found) - at))
-    return Graph(system, tuple(found), initial, offsets, targets, unfinished)
+    return Graph(system, found, initial, offsets, targets, unfinished)
 
 
 def _memory() -> float:

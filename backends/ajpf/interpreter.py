@@ -15,12 +15,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .environment import Choice, Environment
 from .intentions import PERCEPTION, START, of_deed, of_event, post
 from .mind import NONE, Done, Mind, Table
-from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
+from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, plain, unify
 
 
 class Semantics(StrEnum):
@@ -51,22 +51,22 @@ class World:
 
     def drawn(self, choice: int) -> tuple[Struct, ...]:
         """What is on offer, in the order of the environment's groups."""
-        return self.environment.percepts(self.choices.items[choice])
+        return self.environment.percepts(self.choices.all[choice])
 
     def _after(self, choice: int, action: str) -> tuple[int, ...]:
         """Everything that can be drawn after an action; the draw of an idle agent is that after ``""``."""
-        return self._draws(self.choices.items[choice], self.environment.after.get(action, {}))
+        return self._draws(self.choices.all[choice], self.environment.after.get(action, {}))
 
     def _draws(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
         return tuple(self.choices.number(d) for d in self.environment.draws(choice, narrowed))
 
     def _offers(self, choice: int) -> tuple[Struct, ...]:
         """Percepts in the order in which they are taken up: that of their texts."""
-        return tuple(sorted(set(self.environment.percepts(self.choices.items[choice])), key=plain))
+        return tuple(sorted(set(self.environment.percepts(self.choices.all[choice])), key=plain))
 
 
 class State(NamedTuple):
-    """What there is after a job. All parts by their numbers."""
+    """What there is after a job, written out. All parts by their numbers. A core is a State with an empty queue."""
 
     beliefs: int
     goals: int
@@ -94,6 +94,10 @@ class State(NamedTuple):
     """The environment has just drawn."""
 
 
+BITS = 32
+"""Of a state's number, for its queue."""
+QUEUE = (1 << BITS) - 1
+
 PRINT = "print"
 """Not an action in the world: it neither draws percepts nor counts as the last action done."""
 
@@ -112,8 +116,12 @@ class Agent(Mind):
         self.semantics = semantics
         self.probed = probed
         self._draws, self._offers = self.world.after, self.world.offers
-        self._percepts = cache(self._perceptions)
-        self._direct = cache(self._changes)
+        self.cores: Table[State] = Table()
+        self.queues: Table[tuple[int, ...]] = Table()
+        self._percepts, self._direct = cache(self._perceptions), cache(self._changes)
+        self._perceived, self._planned = cache(self._perceive), cache(self._choose_plan)
+        self._woken = cache(self._after_change)
+        self._effects, self._outcomes, self._owned = cache(self._effect), cache(self._outcome), cache(self._own)
 
     # The state graph
 
@@ -121,28 +129,44 @@ class Agent(Mind):
     def agents(self) -> tuple[Agent, ...]:
         return (self,)
 
-    def minds(self, state: State) -> tuple[State, ...]:
-        """The state of each of `agents`."""
-        return (state,)
+    def numbered(self, state: State) -> int:
+        return self.cores.number(state._replace(queue=())) << BITS | self.queues.number(state.queue)
 
-    def believed(self, state: State) -> frozenset[Struct]:
+    def state(self, number: int) -> State:
+        """The state that has the number."""
+        return self.core(number)._replace(queue=self.queues.all[number & QUEUE])
+
+    def core(self, number: int) -> State:
+        """The state without its queue."""
+        return self.cores.all[number >> BITS]
+
+    def altered(self, number: int, **fields: Any) -> int:
+        """The number of the state with other values of some fields, but for the queue."""
+        return self.cores.number(self.core(number)._replace(**fields)) << BITS | number & QUEUE
+
+    def minds(self, number: int) -> tuple[int, ...]:
+        """The state of each of `agents`."""
+        return (number,)
+
+    def believed(self, number: int) -> frozenset[Struct]:
         """All that is believed, without what the agent remembers of its own messages."""
-        beliefs = self.beliefs.items[state.beliefs]
+        beliefs = self.beliefs.all[self.core(number).beliefs]
         return frozenset(b for b in beliefs.own | beliefs.perceived if b.functor != SENT)
 
-    def did(self, state: State) -> tuple[int, Struct] | None:
+    def did(self, number: int) -> tuple[int, Struct] | None:
         """Which of `agents` acted last, and its action."""
-        return None if state.last == NONE else (0, self.actions.items[state.last])
+        last = self.core(number).last
+        return None if last == NONE else (0, self.actions.all[last])
 
-    def start(self) -> tuple[State, ...]:
+    def start(self) -> tuple[int, ...]:
         return (self.first(),)
 
-    def first(self) -> State:
+    def first(self) -> int:
         goals = [
             self.intentions.number(of_deed(START, Deed(DeedKind.ADD_GOAL, goal.term, goal.kind)))
             for goal in self.program.goals
         ]
-        return State(
+        first = State(
             beliefs=self.base(frozenset(self.program.beliefs), frozenset()),
             goals=self.goals.number(frozenset()),
             current=goals[0] if goals else self.empty,
@@ -157,163 +181,181 @@ class Agent(Mind):
             over=False,
             drawn=False,
         )
+        return self.numbered(first)
 
-    def successors(self, state: State) -> tuple[State, ...]:
+    def successors(self, number: int) -> tuple[int, ...]:
         """Never empty: a run that has ended stays where it is, and nothing is drawn any more."""
-        if state.over:
-            return (state._replace(drawn=False),)
-        if state.planned:
-            return self._deed(state)
-        if state.asleep:
-            return self._idle(state)
-        if not state.begun:
-            return tuple(self.cycle(state, draw, again=not self.probed) for draw in self.world.first())
-        return (self.cycle(state._replace(drawn=False)),)
+        now = self.cores.all[number >> BITS]
+        if now.over:
+            return (self.altered(number, drawn=False),)
+        if now.planned:
+            after, action = self.act(number)
+            queue = after & QUEUE
+            return tuple([core << BITS | queue for core in self._outcomes(after >> BITS, action)])
+        if now.asleep:
+            return self._idle(number)
+        if not now.begun:
+            return tuple(self.cycle(number, draw, again=not self.probed) for draw in self.world.first())
+        return (self.cycle(number),)
 
-    def sees(self, state: State) -> tuple[Struct, ...]:
+    def sees(self, number: int) -> tuple[Struct, ...]:
         """The percepts on offer that AJPF's P speaks of: those of an action, until the agent has perceived them."""
-        return self._offers(state.choice) if state.new and state.begun and not state.over else ()
+        now = self.core(number)
+        return self._offers(now.choice) if now.new and now.begun and not now.over else ()
 
     # The first half of a cycle: perceive, select an intention, choose a plan
 
-    def _idle(self, state: State) -> tuple[State, ...]:
+    def _idle(self, number: int) -> tuple[int, ...]:
         """There was nothing to do: the environment moves on, or the run is over."""
-        when = self.environment.at_quiescence
-        if when == "never" or state.waited:
-            return (state._replace(over=True, drawn=False),)
+        when, now = self.environment.at_quiescence, self.core(number)
+        if when == "never" or now.waited:
+            return (self.altered(number, over=True, drawn=False),)
         result = []
-        for draw in self._draws(state.choice, ""):
+        for draw in self._draws(now.choice, ""):
             offer = self._offers(draw)
-            new = state.new or bool(offer) or bool(self._offers(state.choice))
-            after = self.cycle(state._replace(new=new, waited=when == "once"), draw)
+            new = now.new or bool(offer) or bool(self._offers(now.choice))
+            after = self.cycle(self.altered(number, new=new, waited=when == "once"), draw)
             # Only a percept wakes the agent: without one it has this half of a cycle, and the run is over.
-            result.append(after if offer or when == "repeatedly" else after._replace(over=True))
+            result.append(after if offer or when == "repeatedly" else self.altered(after, over=True))
         return tuple(result)
 
-    def cycle(self, state: State, draw: int = NONE, *, again: bool = False, letters: tuple[int, ...] = ()) -> State:
+    def cycle(self, number: int, draw: int = NONE, *, again: bool = False, letters: tuple[int, ...] = ()) -> int:
         """`draw` is what the environment has just drawn; `again`: it is perceived once more in the next cycle;
         `letters` are the intentions that messages make."""
-        if draw != NONE:
-            state = state._replace(choice=draw, begun=True, drawn=True, asleep=False)
-        beliefs, current, queue = state.beliefs, state.current, state.queue
-        if state.new:
-            beliefs, current, queue = self._perceive(state)
-        queue += letters
-        state = state._replace(beliefs=beliefs, new=again)
-        current, queue, asleep = self._select(current, queue)
-        if current == NONE or asleep:
-            return state._replace(current=NONE, queue=queue, asleep=asleep)
-        if current == self.empty:
-            return state._replace(current=current, queue=queue)
-        chosen, goals = current, state.goals
-        if self.intentions.items[current].frames[-1].deeds is None:
-            chosen, goals = self.chosen(state.beliefs, goals, current)
-        return state._replace(current=chosen, goals=goals, queue=queue, planned=chosen != self.empty)
-
-    def _perceive(self, state: State) -> tuple[int, int, tuple[int, ...]]:
+        core, queue = number >> BITS, self.queues.all[number & QUEUE]
+        state, posted, changed = self._perceived(core, draw)
         if self.semantics is Semantics.MCAPL:
-            found = self._percepts(state.beliefs, state.choice)
-            return state.beliefs, state.current, state.queue + tuple(n for n in found if n not in state.queue)
+            queue += tuple([n for n in posted if n not in queue]) if posted else ()
+        else:
+            queue = self._wake(state.beliefs, queue, changed) + posted
+        current, queue, asleep = self._select(state.current, queue + letters)
+        return self._planned(core, draw, again, current, asleep) << BITS | self.queues.number(queue)
+
+    def _perceive(self, core: int, draw: int) -> tuple[State, tuple[int, ...], tuple[int, ...]]:
+        """The core with what was perceived, the intentions that are posted for that, and what has changed."""
+        state = self.cores.all[core]._replace(drawn=draw != NONE)
+        if draw != NONE:
+            state = state._replace(choice=draw, begun=True, asleep=False)
+        if not state.new:
+            return state, (), ()
+        if self.semantics is Semantics.MCAPL:
+            return state, self._percepts(state.beliefs, state.choice), ()
         beliefs, posted, changed = self._direct(state.beliefs, state.choice)
-        queue = self._wake(beliefs, state.queue, changed) + posted
         current = state.current
         if current not in (NONE, self.empty):
             (current,) = self._wake(beliefs, (current,), changed)
-        return beliefs, current, queue
+        return state._replace(beliefs=beliefs, current=current), posted, changed
+
+    def _choose_plan(self, core: int, draw: int, again: bool, current: int, asleep: bool) -> int:
+        """The core once this intention is the current one."""
+        state = self._perceived(core, draw)[0]._replace(new=again)
+        if current == NONE or asleep:
+            return self.cores.number(state._replace(current=NONE, asleep=asleep))
+        if current == self.empty:
+            return self.cores.number(state._replace(current=current))
+        chosen, goals = current, state.goals
+        if self.intentions.all[current].frames[-1].deeds is None:
+            chosen, goals = self.chosen(state.beliefs, goals, current)
+        return self.cores.number(state._replace(current=chosen, goals=goals, planned=chosen != self.empty))
 
     def _perceptions(self, base: int, choice: int) -> tuple[int, ...]:
         """Intentions to drop all that is perceived, and to add all that is on offer."""
-        old = (of_deed(PERCEPTION, Deed(DeedKind.DROP_BELIEF, p)) for p in self.beliefs.items[base].percepts)
+        old = (of_deed(PERCEPTION, Deed(DeedKind.DROP_BELIEF, p)) for p in self.beliefs.all[base].percepts)
         new = (of_deed(PERCEPTION, Deed(DeedKind.ADD_BELIEF, p)) for p in self._offers(choice))
         return tuple(self.intentions.number(intention) for intention in (*old, *new))
 
-    def _changes(self, base: int, choice: int) -> tuple[int, tuple[int, ...], tuple[Term, ...]]:
-        beliefs = self.beliefs.items[base]
+    def _changes(self, base: int, choice: int) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
+        beliefs = self.beliefs.all[base]
         offered = self._offers(choice)
         gone = [p for p in beliefs.percepts if p not in offered]
         come = [p for p in offered if p not in beliefs.perceived]
         new = self.base(beliefs.own.difference(gone), (beliefs.perceived.difference(gone) | set(come)) - beliefs.own)
         events = [*(Event(Sign.DROP, p) for p in gone), *(Event(Sign.ADD, p) for p in come)]
-        return new, tuple(self.intentions.number(of_event(e)) for e in events), (*gone, *come)
+        posted = tuple(self.intentions.number(of_event(e)) for e in events)
+        return new, posted, tuple(map(self.terms.number, (*gone, *come)))
 
     def _select(self, current: int, queue: tuple[int, ...]) -> tuple[int, tuple[int, ...], bool]:
         """The next current intention, the others, and whether there is nothing to do."""
-        intentions = self.intentions.items
+        intentions = self.intentions.all
+        if current not in (NONE, self.empty):
+            if intentions[current].locked:
+                return current, queue, False
+            queue = (*queue, current)
         ready = [n for n in queue if intentions[n].waiting is None]
-        if current in (NONE, self.empty):
-            if not ready:
-                return NONE, queue, True
-            return ready[0], self._rest(ready, queue), False
-        mine = intentions[current]
-        if mine.locked:
-            return current, queue, False
-        if mine.waiting is not None:
-            if not ready:
-                return NONE, (*queue, current), True
-            return ready[0], (*self._rest(ready, queue), current), False
-        ready.append(current)
-        return ready[0], self._rest(ready, queue), False
-
-    def _rest(self, ready: list[int], queue: tuple[int, ...]) -> tuple[int, ...]:
-        return (*ready[1:], *(n for n in queue if self.intentions.items[n].waiting is not None))
+        if not ready:
+            return NONE, queue, True
+        if len(ready) == len(queue):
+            return queue[0], queue[1:], False
+        return ready[0], (*ready[1:], *[n for n in queue if intentions[n].waiting is not None]), False
 
     # The second half: one deed
 
-    def _deed(self, state: State) -> tuple[State, ...]:
-        new, action = self.act(state)
+    def _outcome(self, core: int, action: int) -> tuple[int, ...]:
+        """The cores that the environment may make of one whose agent has just done the action."""
         if action == NONE:
-            return (new,)
-        name = self.actions.items[action].functor
-        new = new._replace(waited=False)
+            return (core,)
+        state, name = self.cores.all[core]._replace(waited=False), self.actions.all[action].functor
         if name == PRINT:
-            return (new,)
-        new = new._replace(last=action)
+            return (self.cores.number(state),)
+        state = state._replace(last=action)
         if name in self.environment.quiet:
-            return (new,)
+            return (self.cores.number(state),)
         had = state.new or bool(self._offers(state.choice))
-        return tuple(
-            new._replace(choice=draw, new=had or bool(self._offers(draw)), drawn=True)
-            for draw in self._draws(state.choice, name)
-        )
+        draws = self._draws(state.choice, name)
+        drawn = (state._replace(choice=d, new=had or bool(self._offers(d)), drawn=True) for d in draws)
+        return tuple(map(self.cores.number, drawn))
 
-    def act(self, state: State) -> tuple[State, int]:
+    def act(self, number: int) -> tuple[int, int]:
         """The next deed of the current intention done, and the action that it was; what the world makes of that is not
         yet in the state."""
-        done = self.done(state.beliefs, state.goals, state.current)
-        deed = self.next_deed(state)
-        if deed is not None and deed.kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL):
-            done, queue = self._goal_deed(state, deed, done)
-        else:
-            queue = state.queue
+        queue = self.queues.all[number & QUEUE]
+        done, core = self._effects(number >> BITS)
+        if core == NONE:
+            done, queue = self._goal_deed(self.state(number), done)
+            core = self._after_deed(number >> BITS, done)
         queue = self._wake(done.beliefs, queue, done.changed) + done.posted
-        new = state._replace(
-            beliefs=done.beliefs, goals=done.goals, current=done.intention, queue=queue, planned=False, drawn=False
-        )
-        return (self._suspend(new) if done.suspended else new), done.action
+        if done.suspended:  # it stays the current one for now, unless nothing else can go on
+            if all(self.intentions.all[n].waiting is not None for n in queue):
+                queue = (*queue, done.intention)
+                core = self.cores.number(self.cores.all[core]._replace(current=self.empty, asleep=True))
+            queue = self._sorted(queue)
+        return core << BITS | self.queues.number(queue), done.action
+
+    def _effect(self, core: int) -> tuple[Done, int]:
+        """What the next deed does, and the core after it; NONE if that depends on the queue, as with goals."""
+        state = self.cores.all[core]
+        done, deed = self.done(state.beliefs, state.goals, state.current), self.next_deed(state)
+        on_goals = deed is not None and deed.kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL)
+        return done, NONE if on_goals else self._after_deed(core, done)
+
+    def _after_deed(self, core: int, done: Done) -> int:
+        state = self.cores.all[core]._replace(planned=False, drawn=False)
+        return self.cores.number(state._replace(beliefs=done.beliefs, goals=done.goals, current=done.intention))
 
     def next_deed(self, state: State) -> Deed | None:
         """The deed that the next job does, if it does one."""
-        deeds = self.intentions.items[state.current].frames[-1].deeds if state.planned else None
+        deeds = self.intentions.all[state.current].frames[-1].deeds if state.planned else None
         return deeds[0] if deeds else None
 
-    def _goal_deed(self, state: State, deed: Deed, done: Done) -> tuple[Done, tuple[int, ...]]:
+    def _goal_deed(self, state: State, done: Done) -> tuple[Done, tuple[int, ...]]:
         """Goals are added to, and dropped from, what all intentions are at. The answer has the queue in it."""
-        intention = self.intentions.items[state.current]
+        intention, deed = self.intentions.all[state.current], self.next_deed(state)
+        assert deed is not None
         goal = Goal(deed.term, deed.goal)
-        wanted = self.goals.items[state.goals]
+        wanted = self.goals.all[state.goals]
         if deed.kind is DeedKind.DROP_GOAL:
             return self.drop_goal(state.beliefs, state.goals, intention, state.queue, goal)
         if deed.goal is GoalKind.PERFORM:
             number = self.number(post(intention, goal))
             return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
-        beliefs = self.beliefs.items[state.beliefs]
+        beliefs = self.beliefs.all[state.beliefs]
         met = self.reasoner.derived(beliefs, goal.term)
         if met is not None:
             left = self.after(state.beliefs, state.goals, intention, met)
             elsewhere = any(
                 unify(goal.term, other.term, {}) is not None
                 for number in state.queue
-                for other in self.intentions.items[number].goals()
+                for other in self.intentions.all[number].goals()
             )
             return left._replace(goals=left.goals if elsewhere else self.without(left.goals, goal)), state.queue
         for other in sorted((g for g in wanted if g.kind is goal.kind), key=lambda g: plain(g.term)):
@@ -323,38 +365,35 @@ class Agent(Mind):
         number = self.number(post(intention, goal))
         return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
 
-    def _suspend(self, state: State) -> State:
-        """The current intention waits; it stays the current one for now, unless nothing else can go on."""
-        queue = self._sorted(state.queue)
-        if any(self.intentions.items[n].waiting is None for n in queue):
-            return state._replace(queue=queue)
-        return state._replace(queue=self._sorted((*state.queue, state.current)), current=self.empty, asleep=True)
-
     def _sorted(self, queue: tuple[int, ...]) -> tuple[int, ...]:
         """Those that can go on in their order, then those that wait in theirs."""
-        intentions = self.intentions.items
+        intentions = self.intentions.all
         ready = [n for n in queue if intentions[n].waiting is None]
         waiting = [n for n in queue if intentions[n].waiting is not None]
         return (*ready, *sorted(waiting, key=lambda n: intentions[n].weight))
 
     # Parts
 
-    def _wake(self, base: int, queue: tuple[int, ...], changed: tuple[Term, ...]) -> tuple[int, ...]:
-        """Those that waited for what has changed go on."""
-        intentions = self.intentions.items
-        if not changed or all(intentions[n].waiting is None for n in queue):
-            return queue
-        return tuple(
-            self.intentions.number(replace(intentions[n], waiting=None)) if self._wakes(base, n, changed) else n
-            for n in queue
-        )
+    def own(self, number: int) -> int:
+        """The state without what is the environment's, or the scheduler's."""
+        return self._owned(number >> BITS) << BITS | number & QUEUE
 
-    def _wakes(self, base: int, number: int, changed: tuple[Term, ...]) -> bool:
-        intention = self.intentions.items[number]
+    def _own(self, core: int) -> int:
+        own = self.cores.all[core]._replace(last=NONE, choice=NONE, begun=True, asleep=False, waited=False, over=False)
+        return self.cores.number(own._replace(drawn=False))
+
+    def _wake(self, base: int, queue: tuple[int, ...], changed: tuple[int, ...]) -> tuple[int, ...]:
+        """Those that waited for what has changed go on."""
+        return tuple([self._woken(base, n, changed) for n in queue]) if changed else queue
+
+    def _after_change(self, base: int, number: int, changed: tuple[int, ...]) -> int:
+        intention = self.intentions.all[number]
         if intention.waiting is None:
-            return False
+            return number
         if self.semantics is Semantics.MCAPL:
-            return any(unify(intention.waiting, belief, {}) is not None for belief in changed)
-        deeds = intention.frames[-1].deeds
-        derivable = self.reasoner.derived(self.beliefs.items[base], intention.waiting) is not None
-        return derivable is not (deeds is not None and deeds[0].kind is DeedKind.WAIT_NOT)
+            wakes = any(unify(intention.waiting, self.terms.all[term], {}) is not None for term in changed)
+        else:
+            deeds = intention.frames[-1].deeds
+            derivable = self.reasoner.derived(self.beliefs.all[base], intention.waiting) is not None
+            wakes = derivable is not (deeds is not None and deeds[0].kind is DeedKind.WAIT_NOT)
+        return self.intentions.number(replace(intention, waiting=None)) if wakes else number

@@ -24,7 +24,7 @@ class _Part:
     def __init__(self, system: System) -> None:
         self.system = system
         self.table: Table[Any] = Table()
-        self.states, self.number = self.table.items, self.table.number
+        self.states, self.number = self.table.all, self.table.number
         self.successors: dict[int, tuple[int, ...]] = {}
 
     def after(self, number: int) -> tuple[int, ...]:
@@ -35,12 +35,12 @@ class _Part:
         return found
 
     def graph(self, initial: tuple[int, ...]) -> Graph:
-        offsets, targets = array("q", [0]), array("q")
+        offsets, targets = array("i", [0]), array("i")
         for number in range(len(self.states)):
             targets.extend(self.successors.get(number, ()))
             offsets.append(len(targets))
         why = "only as far as the property is open"
-        return Graph(self.system, tuple(self.states), initial, offsets, targets, why, settles=True)
+        return Graph(self.system, self.states, initial, offsets, targets, why, settles=True)
 
 
 def open_part(system: System, wanted: Property, states: int, seconds: float) -> Graph | None:

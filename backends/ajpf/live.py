@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .environment import Environment
 from .interpreter import PRINT, Agent, Semantics, World
-from .mind import NONE
+from .mind import NONE, Table
 from .parser import parse_fact, read_system
 from .syntax import Struct, plain
 from .tuning import LIVE_JOBS
@@ -25,11 +25,12 @@ class _Told(World):
     """What there is to perceive, as it was told."""
 
     def __init__(self) -> None:
-        self.shown: list[tuple[Struct, ...]] = [()]
+        self.shown: Table[tuple[Struct, ...]] = Table()
+        self.shown.number(())
         super().__init__(Environment((), {}, {}, frozenset(), False, "repeatedly", ()))
 
     def _offers(self, choice: int) -> tuple[Struct, ...]:
-        return self.shown[choice]
+        return self.shown.all[choice]
 
 
 class Running:
@@ -51,18 +52,19 @@ class Running:
                 raise ValueError(f"{text!r} is no percept")
             found.append(fact)
         shown = tuple(sorted(set(found), key=plain))
-        if shown != self._world.shown[self._state.choice]:
-            self._world.shown.append(shown)
-            self._state = self._state._replace(choice=len(self._world.shown) - 1, new=True, asleep=False)
+        choice = self._world.shown.number(shown)
+        if choice != self._agent.core(self._state).choice:
+            self._state = self._agent.altered(self._state, choice=choice, new=True, asleep=False)
         for _ in range(LIVE_JOBS):
-            if not self._state.planned:
-                if self._state.asleep and not self._state.new:
+            now = self._agent.core(self._state)
+            if not now.planned:
+                if now.asleep and not now.new:
                     return None
                 self._state = self._agent.cycle(self._state)
                 continue
             self._state, action = self._agent.act(self._state)
-            if action != NONE and (done := self._agent.actions.items[action]).functor != PRINT:
-                self._state = self._state._replace(last=action)
+            if action != NONE and (done := self._agent.actions.all[action]).functor != PRINT:
+                self._state = self._agent.altered(self._state, last=action)
                 return done.functor, tuple(plain(argument) for argument in done.args)
         raise Endless(f"{LIVE_JOBS} steps without an action")
 

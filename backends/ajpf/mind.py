@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Generic, NamedTuple, TypeVar, assert_never
+from typing import NamedTuple, TypeVar, assert_never
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
@@ -34,19 +34,20 @@ T = TypeVar("T")
 NONE = -1
 
 
-class Table(Generic[T]):
-    """Numbers for things, in order of appearance."""
+class Table(dict[T, int]):
+    """Numbers for things, in order of appearance; the thing of a number is in `all`. A number that is known is found
+    without a call of a Python function."""
 
     def __init__(self) -> None:
-        self.items: list[T] = []
-        self._numbers: dict[T, int] = {}
+        super().__init__()
+        self.all: list[T] = []
 
-    def number(self, item: T) -> int:
-        found = self._numbers.get(item)
-        if found is None:
-            found = self._numbers[item] = len(self.items)
-            self.items.append(item)
-        return found
+    number = dict[T, int].__getitem__
+
+    def __missing__(self, item: T) -> int:
+        number = self[item] = len(self.all)
+        self.all.append(item)
+        return number
 
 
 class Done(NamedTuple):
@@ -56,7 +57,8 @@ class Done(NamedTuple):
     goals: int
     intention: int
     posted: tuple[int, ...] = ()
-    changed: tuple[Term, ...] = ()
+    changed: tuple[int, ...] = ()
+    """Beliefs added or dropped, by their numbers."""
     action: int = NONE
     suspended: bool = False
 
@@ -71,6 +73,7 @@ class Mind:
         self.goals: Table[frozenset[Goal]] = Table()
         self.intentions: Table[Intention] = Table()
         self.actions: Table[Struct] = Table()
+        self.terms: Table[Term] = Table()
         self.empty = self.intentions.number(EMPTY)
         self.uses_goals = any(c.is_goal for plan in program.plans for c in plan.guard)
         self._triggers = _trigger_index(program.plans)
@@ -80,7 +83,7 @@ class Mind:
     # Plans
 
     def choose(self, base: int, goals: int, number: int) -> tuple[int, int]:
-        intention = self.intentions.items[number]
+        intention = self.intentions.all[number]
         event, below = intention.frames[-1].event, intention.frames[:-1]
         suffix = f"^{len(intention.frames)}"
         for plan in self._triggered(event):
@@ -91,7 +94,7 @@ class Mind:
             if bindings is None:
                 continue
             guard = tuple(renamed_condition(c, suffix) for c in plan.guard)
-            met = self.reasoner.first_way(self.beliefs.items[base], guard, bindings, self._wanted(goals))
+            met = self.reasoner.first_way(self.beliefs.all[base], guard, bindings, self._wanted(goals))
             if met is None:
                 continue
             if not plan.deeds:
@@ -121,11 +124,11 @@ class Mind:
     # Deeds
 
     def effect(self, base: int, goals: int, number: int) -> Done:
-        intention = self.intentions.items[number]
+        intention = self.intentions.all[number]
         top = intention.frames[-1]
         if not top.deeds:  # an event -!g that no plan takes up
             return Done(base, goals, number)
-        deed, beliefs = top.deeds[0], self.beliefs.items[base]
+        deed, beliefs = top.deeds[0], self.beliefs.all[base]
         term = computed(deed.term)
         match deed.kind:
             case DeedKind.SEND:
@@ -166,7 +169,7 @@ class Mind:
         intention: Intention,
         bindings: Bindings,
         posted: tuple[int, ...] = (),
-        changed: tuple[Term, ...] = (),
+        changed: tuple[int, ...] = (),
         action: int = NONE,
     ) -> Done:
         """The deed is done."""
@@ -182,14 +185,14 @@ class Mind:
             else:
                 new = self.base(beliefs.own | {belief}, beliefs.perceived)
         posted = () if known else (self.intentions.number(of_event(Event(Sign.ADD, belief))),)
-        return self.after(new, goals, intention, {}, posted, (belief,))
+        return self.after(new, goals, intention, {}, posted, (self.terms.number(belief),))
 
     def _drop_belief(self, goals: int, intention: Intention, beliefs: Beliefs, term: Term) -> Done:
         gone = beliefs.matching(term) if isinstance(term, Struct) else ()
         new = self.base(beliefs.own.difference(gone), beliefs.perceived.difference(gone))
         event = self.intentions.number(of_event(Event(Sign.DROP, term)))
         bindings = (unify(term, apart(gone[0], "''"), {}) if gone else None) or {}
-        return self.after(new, goals, intention, bindings, (event,) * len(gone), (term,))
+        return self.after(new, goals, intention, bindings, (event,) * len(gone), (self.terms.number(term),))
 
     def drop_goal(
         self, base: int, goals: int, intention: Intention, queue: tuple[int, ...], goal: Goal
@@ -205,7 +208,7 @@ class Mind:
             lost = ()
             others = []
             for number in queue:
-                other = self.intentions.items[number]
+                other = self.intentions.all[number]
                 short = _cut(other, goal)
                 if short is not None:
                     lost = other.goals()
@@ -236,12 +239,12 @@ class Mind:
         return self.beliefs.number(Beliefs.of(own, perceived))
 
     def without(self, goals: int, goal: Goal | None) -> int:
-        if goal is None or goal not in self.goals.items[goals]:
+        if goal is None or goal not in self.goals.all[goals]:
             return goals
-        return self.goals.number(self.goals.items[goals] - {goal})
+        return self.goals.number(self.goals.all[goals] - {goal})
 
     def _wanted(self, goals: int) -> tuple[Goal, ...]:
-        return tuple(sorted(self.goals.items[goals], key=lambda g: plain(g.term))) if self.uses_goals else ()
+        return tuple(sorted(self.goals.all[goals], key=lambda g: plain(g.term))) if self.uses_goals else ()
 
 
 def _kind_met(trigger: Event, event: Event) -> GoalKind | None:

@@ -46,7 +46,7 @@ def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
     state = system.start()[0]
     for _ in range(steps):
         after = rng.choice(system.successors(state))
-        if after.over:
+        if system.core(after).over:
             yield Told("", "there is nothing to do: the run is over")
             return
         yield _told(system, state, after)
@@ -55,8 +55,9 @@ def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
 
 def _told(system: System, state: Any, following: Any) -> Told:
     place = following.turn if len(system.agents) > 1 else 0
-    agent, before, after = system.agents[place], system.minds(state)[place], system.minds(following)[place]
-    had, has = agent.believed(before), agent.believed(after)
+    agent, old, new = system.agents[place], system.minds(state)[place], system.minds(following)[place]
+    had, has, before, after = agent.believed(old), agent.believed(new), agent.state(old), agent.state(new)
+    seen = system.core(following)
     action = None
     did = system.did(following)
     if did is not None and before.planned and _deed(agent, before).startswith("does "):
@@ -64,7 +65,7 @@ def _told(system: System, state: Any, following: Any) -> Told:
     return Told(
         agent.program.name if len(system.agents) > 1 else "",
         _deed(agent, before) if before.planned else _choice(agent, before, after),
-        tuple(map(show, system.world.drawn(following.choice))) if following.drawn else None,
+        tuple(map(show, system.world.drawn(seen.choice))) if seen.drawn else None,
         tuple(sorted(map(show, has - had))),
         tuple(sorted(map(show, had - has))),
         action,
@@ -73,7 +74,7 @@ def _told(system: System, state: Any, following: Any) -> Told:
 
 
 def _deed(agent: Agent, state: State) -> str:
-    top = agent.intentions.items[state.current].frames[-1]
+    top = agent.intentions.all[state.current].frames[-1]
     if not top.deeds:
         return f"has no plan for {show_event(top.event)}: it stands still"
     deed = top.deeds[0]
@@ -93,10 +94,10 @@ def _choice(agent: Agent, before: State, after: State) -> str:
         return "has nothing to do"
     if not after.planned:
         gone = [n for n in (before.current, *before.queue) if n not in (NONE, agent.empty, *after.queue)]
-        event = show_event(agent.intentions.items[gone[0]].frames[-1].event) if gone else "an event"
+        event = show_event(agent.intentions.all[gone[0]].frames[-1].event) if gone else "an event"
         return f"finds no deeds for {event}, and drops it"
     old = {before.current, *before.queue}
-    intention = agent.intentions.items[after.current]
+    intention = agent.intentions.all[after.current]
     top = intention.frames[-1]
     event = show_event(top.event)
     if event.startswith("+:"):

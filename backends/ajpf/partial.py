@@ -148,11 +148,12 @@ class Reduction:
         return None
 
     def _deed(self, state: Common, place: int) -> Deed | None:
-        return self.society.agents[place].next_deed(self.society.minds(state)[place])
+        agent = self.society.agents[place]
+        return agent.next_deed(agent.core(state.minds[place]))
 
     def _shown(self, state: Common, place: int) -> int:
         """What the properties see of the agent."""
-        return self._labels[place].of(self.society.minds(state)[place])
+        return self._labels[place].of(state.minds[place])
 
     def _silently(self, deed: Deed) -> bool:
         """Whether an action draws no percepts, and no property asks for actions."""
@@ -211,5 +212,5 @@ def unfolded(reduction: Reduction, graph: Graph, lasso: Lasso) -> tuple[Graph, L
         for number in cycle[1:]:
             states.append(step(society.successors(states[-1]), number))
     offsets, targets = range(len(states) + 1), (*range(1, len(states)), heads[head])
-    run = Graph(society, tuple(states), (0,), array("q", offsets), array("q", targets))
+    run = Graph(society, tuple(states), (0,), array("i", offsets), array("i", targets))
     return run, Lasso(tuple(range(len(states))), heads[head])

@@ -49,39 +49,41 @@ def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], Script]:
     system = graph.system
     path = [*lasso.path, *lasso.path[lasso.loop :], lasso.path[lasso.loop]]
     moments, draws, turns = [], [], []
-    first = graph.states[path[0]]
+    first = system.core(graph.states[path[0]])
     if first.drawn:
-        moments.append(_told(system, first, "start"))
-        draws.append(system.world.choices.items[first.choice])
+        moments.append(_told(system, graph.states[path[0]], "start"))
+        draws.append(system.world.choices.all[first.choice])
     for at in range(len(path) - 1):
-        before, after = graph.states[path[at]], graph.states[path[at + 1]]
+        before, after = (system.core(graph.states[path[n]]) for n in (at, at + 1))
         if before.over or (after.over and not after.drawn):
             break
         if len(system.agents) > 1 and (before.changed or not any(before.awake)) and (before.begun or not system.probed):
             turns.append(system.agents[after.turn].program.name)
-        moment = _moment(system, before, after)
+        moment = _moment(system, graph.states[path[at]], graph.states[path[at + 1]])
         if moment is not None:
             moments.append(moment)
             if after.drawn:
-                draws.append(system.world.choices.items[after.choice])
+                draws.append(system.world.choices.all[after.choice])
     return tuple(moments), Script(tuple(draws), tuple(turns), system.probed)
 
 
-def _moment(system: System, before: Any, after: Any) -> Moment | None:
+def _moment(system: System, state: Any, following: Any) -> Moment | None:
+    before, after = system.core(state), system.core(following)
     if before.over or after.over:
         return None
     place = after.turn if len(system.agents) > 1 else 0
-    agent, mind = system.agents[place], system.minds(before)[place]
+    agent = system.agents[place]
+    mind = agent.core(system.minds(state)[place])
     if not mind.planned:
         asleep = before.asleep if len(system.agents) == 1 else not any(before.awake)
-        return _told(system, before, "idle" if asleep else "start") if after.drawn else None
+        return _told(system, state, "idle" if asleep else "start") if after.drawn else None
     deed = agent.next_deed(mind)
-    did = system.did(after)
+    did = system.did(following)
     if deed is None or deed.kind not in (DeedKind.ACTION, DeedKind.SEND) or did is None:
         return None
     if plain(deed.term).partition("(")[0] == PRINT:
         return None
-    return _told(system, before, _named(system, place) + plain(did[1]))
+    return _told(system, state, _named(system, place) + plain(did[1]))
 
 
 def _named(system: System, place: int) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 from .beliefs import apart
 from .environment import Environment
 from .intentions import of_event
-from .interpreter import PRINT, Agent, Semantics, State, World
+from .interpreter import PRINT, Agent, Semantics, World
 from .mind import NONE, Table
 from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, Term, name_of, plain
 
@@ -22,7 +22,8 @@ T = TypeVar("T")
 
 
 class Common(NamedTuple):
-    """What there is after a job. Minds, actions and draws by their numbers, agents by their places."""
+    """What there is after a job. Minds (`interpreter.State`), actions and draws by their numbers, agents by their
+    places."""
 
     minds: tuple[int, ...]
     mail: tuple[tuple[int, ...], ...]
@@ -53,21 +54,27 @@ class Society:
         self.probed = probed
         self.agents = tuple(Agent(program, self.world, semantics, probed=probed) for program in programs)
         self._places = {program.name: place for place, program in enumerate(programs)}
-        self._minds: tuple[Table[State], ...] = tuple(Table() for _ in programs)
         self._actions: Table[tuple[int, Struct]] = Table()
         self._cycled, self._acted = cache(self._after_cycle), cache(self._after_deed)
 
-    def minds(self, state: Common) -> tuple[State, ...]:
+    def core(self, state: Common) -> Common:
+        return state
+
+    def minds(self, state: Common) -> tuple[int, ...]:
         """The state of each of `agents`."""
-        return tuple(table.items[number] for table, number in zip(self._minds, state.minds, strict=True))
+        return state.minds
 
     def did(self, state: Common) -> tuple[int, Struct] | None:
         """Which of `agents` acted last, and its action."""
-        return None if state.last == NONE else self._actions.items[state.last]
+        return None if state.last == NONE else self._actions.all[state.last]
 
     def sees(self, state: Common) -> tuple[Struct, ...]:
         """The percepts on offer that AJPF's P speaks of: until every agent has perceived them."""
-        if not state.begun or state.over or not any(mind.new for mind in self.minds(state)):
+        if (
+            not state.begun
+            or state.over
+            or not any(a.core(mind).new for a, mind in zip(self.agents, state.minds, strict=True))
+        ):
             return ()
         return self.world.offers(state.choice)
 
@@ -84,9 +91,8 @@ class Society:
         return tuple(state._replace(choice=draw, begun=True, drawn=True) for draw in self.world.first())
 
     def _first(self) -> Common:
-        everybody = range(len(self.agents))
         return Common(
-            minds=tuple(self._keep(place, self.agents[place].first()) for place in everybody),
+            minds=tuple(agent.own(agent.first()) for agent in self.agents),
             mail=((),) * len(self.agents),
             awake=(True,) * len(self.agents),
             turn=0,
@@ -124,7 +130,7 @@ class Society:
     # Jobs of the agent whose turn it is
 
     def _job(self, state: Common) -> Iterator[Common]:
-        if self._minds[state.turn].items[state.minds[state.turn]].planned:
+        if self.agents[state.turn].core(state.minds[state.turn]).planned:
             yield from self._deed(state)
         elif state.begun:
             yield self._cycle(state)
@@ -136,9 +142,9 @@ class Society:
     def _cycle(self, state: Common, *, again: bool = False) -> Common:
         """Perceive, read messages, select an intention, choose a plan."""
         place = state.turn
-        mind = self._minds[place].items[state.minds[place]]
-        letters = state.mail[place]
-        after = self._cycled(place, state.minds[place], state.choice if mind.new else NONE, letters, again)
+        mind, letters = state.minds[place], state.mail[place]
+        new = self.agents[place].core(mind).new
+        after = self._cycled(place, mind, state.choice if new else NONE, letters, again)
         if letters:
             state = state._replace(mail=_put(state.mail, place, ()))
         return self._done(state, *after)
@@ -147,25 +153,26 @@ class Society:
         self, place: int, number: int, choice: int, letters: tuple[int, ...], again: bool
     ) -> tuple[int, bool]:
         """The agent's own state then, and whether it sleeps. `choice` is what it perceives, if that is new."""
-        mind = self._minds[place].items[number]._replace(choice=choice)
-        after = self.agents[place].cycle(mind, again=again, letters=letters)
-        return self._keep(place, after), after.asleep
+        agent = self.agents[place]
+        after = agent.cycle(agent.altered(number, choice=choice), again=again, letters=letters)
+        return agent.own(after), agent.core(after).asleep
 
     def _after_deed(self, place: int, number: int) -> tuple[int, bool, int]:
         """The agent's own state then, whether it sleeps, and its action."""
-        after, action = self.agents[place].act(self._minds[place].items[number])
-        return self._keep(place, after), after.asleep, action
+        agent = self.agents[place]
+        after, action = agent.act(number)
+        return agent.own(after), agent.core(after).asleep, action
 
     def _deed(self, state: Common) -> Iterator[Common]:
         place, agent = state.turn, self.agents[state.turn]
         number = state.minds[place]
         kept, asleep, action = self._acted(place, number)
-        deed = agent.next_deed(self._minds[place].items[number])
+        deed = agent.next_deed(agent.core(number))
         state = self._done(state, kept, asleep)
         if action == NONE or deed is None:
             yield state
             return
-        done = agent.actions.items[action]
+        done = agent.actions.all[action]
         state = state._replace(waited=False)
         if done.functor == PRINT:
             yield state
@@ -196,11 +203,6 @@ class Society:
 
     # Parts
 
-    def _keep(self, place: int, mind: State) -> int:
-        """What is an agent's own of its state."""
-        own = mind._replace(last=NONE, choice=NONE, begun=True, asleep=False, waited=False, over=False, drawn=False)
-        return self._minds[place].number(own)
-
     def _done(self, state: Common, mind: int, asleep: bool) -> Common:
         state = state._replace(minds=_put(state.minds, state.turn, mind))
         if asleep:
@@ -211,7 +213,7 @@ class Society:
         """A draw was made. All agents look again, if there was or is anything to see; what there is wakes them."""
         now = self.world.offers(draw)
         if now or self.world.offers(state.choice):
-            seen = [self._keep(place, mind._replace(new=True)) for place, mind in enumerate(self.minds(state))]
+            seen = (agent.altered(mind, new=True) for agent, mind in zip(self.agents, state.minds, strict=True))
             state = state._replace(minds=tuple(seen))
         state = state._replace(choice=draw, drawn=True)
         return state._replace(awake=(True,) * len(self.agents), changed=True) if now else state
@@ -228,7 +230,7 @@ class Society:
         names = (Struct(self.agents[sender].program.name), Struct(agent.program.name))
         term = Struct(RECEIVED, (*names, force, content))
         letter = agent.intentions.number(of_event(Event(Sign.ADD, apart(term, "''"))))
-        mail = sorted({*state.mail[place], letter}, key=lambda n: _text(agent.intentions.items[n].frames[0].event.term))
+        mail = sorted({*state.mail[place], letter}, key=lambda n: _text(agent.intentions.all[n].frames[0].event.term))
         return state._replace(mail=_put(state.mail, place, tuple(mail)), awake=_put(state.awake, place, True))
 
 

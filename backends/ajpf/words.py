@@ -233,7 +233,8 @@ def _agent_cells(system: System, state: Any) -> Step:
         missing = sorted(map(show, always - believed))
         if missing:
             words.append((f"({name}no longer believes)", ", ".join(missing)))
-    if state.drawn:
-        offered = system.world.drawn(state.choice)
+    now = system.core(state)
+    if now.drawn:
+        offered = system.world.drawn(now.choice)
         words.append(("(is about to perceive)", ", ".join(map(show, offered)) or "nothing"))
     return tuple(words)

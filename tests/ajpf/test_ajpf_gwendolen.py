@@ -44,11 +44,11 @@ def run(plans, *groups, semantics=Semantics.MCAPL, at_quiescence="never", **sect
     while state not in seen:
         seen.add(state)
         targets = set(graph.targets[graph.offsets[state] : graph.offsets[state + 1]])
-        beliefs = agent.beliefs.items[graph.states[state].beliefs]
-        last = graph.states[state].last
+        now = agent.core(graph.states[state])
+        beliefs, last = agent.beliefs.all[now.beliefs], now.last
         shown = (
             sorted(show(b) for b in beliefs.own | beliefs.perceived),
-            "" if last == NONE else show(agent.actions.items[last]),
+            "" if last == NONE else show(agent.actions.all[last]),
         )
         if not said or said[-1] != shown:
             said.append(shown)
@@ -319,8 +319,8 @@ def test_draws_branch_and_quiescence():
 def test_percepts_are_believed_no_longer_than_they_are_drawn():
     agent = system(program("+p : { True } <- act;"), environment(["p", None]), Semantics.EDGE)
     graph = explore(agent)
-    for state in graph.states:
-        beliefs = agent.beliefs.items[state.beliefs]
+    for state in map(agent.core, graph.states):
+        beliefs = agent.beliefs.all[state.beliefs]
         if not state.drawn:
             assert set(agent.world.drawn(state.choice)) == set(beliefs.perceived)
 
