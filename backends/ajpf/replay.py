@@ -22,7 +22,7 @@ from .asking import keep, key, recall
 from .explore import Graph, System
 from .files import system_files
 from .interpreter import PRINT
-from .java import MARK, RUNS, RUNS_CLASS, SCRIPT, Script
+from .java import MARK, RUNS, SCRIPT, Script, runs_class
 from .options import Setup
 from .syntax import DeedKind, plain
 from .tuning import REPLAY_MILLISECONDS, REPLAY_START, SAMPLED_STEPS
@@ -145,7 +145,7 @@ def _run(
 ) -> tuple[Answer, ...]:
     wrong, output = None, ""
     try:
-        wrong = prepare(installation, folder, {**files, f"{RUNS}.java": RUNS_CLASS}, outside)
+        wrong = prepare(installation, folder, {**files, f"{RUNS}.java": runs_class()}, outside)
         if wrong is None:
             names = [f"{at}.txt" for at in range(len(scripts))]
             for name, script in zip(names, scripts, strict=True):
