@@ -7,23 +7,8 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 
 from .builtin import compare
-from .syntax import (
-    SENT,
-    Bindings,
-    Condition,
-    Goal,
-    Rule,
-    Struct,
-    Term,
-    Var,
-    apply,
-    is_ground,
-    name_of,
-    plain,
-    rename,
-    unify,
-    variables,
-)
+from .syntax import SENT, Condition, Goal, Rule
+from .terms import Bindings, Struct, Term, Var, apart, apply, is_ground, name_of, plain, unify
 from .tuning import RULE_DEPTH, RULE_STEPS
 
 
@@ -57,13 +42,6 @@ class Beliefs:
         """The beliefs that unify with the pattern."""
         found = self.index.get((pattern.functor, len(pattern.args)), ())
         return tuple(b for b in found if unify(pattern, apart(b, "''"), {}) is not None)
-
-
-def apart(term: Term, suffix: str) -> Term:
-    """The term with variables of its own: what was added as a belief with variables speaks of anything, and a plan or a
-    rule is used more than once."""
-    names = set(variables(term))
-    return rename(term, {name: Var(name + suffix) for name in names}) if names else term
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from .syntax import Bindings, Struct, Term, Var, plain
+from .terms import Bindings, Struct, Term, Var, plain
 
 
 class Crash(Exception):  # noqa: N818 - it names what the agent does

@@ -18,8 +18,9 @@ from .intentions import Frame
 from .interpreter import BITS, QUEUE, Agent
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, automaton_of, compiled, conjunction
-from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
+from .syntax import DeedKind, Sign
 from .tautology import Laws, is_valid, standing
+from .terms import Struct, Term, named_apart, unify
 from .tuning import LAZY_STATES
 
 

@@ -26,7 +26,7 @@ from avow.system.schema import violations
 from avow.system.strict_yaml import read_yaml
 
 from .parser import parse_fact
-from .syntax import Struct, show
+from .terms import Struct, show
 from .tuning import DRAWS
 
 NOTHING = "nothing"

@@ -14,7 +14,7 @@ from .builtin import Crash
 from .environment import Environment
 from .interpreter import Agent, Semantics, World
 from .mind import Table
-from .syntax import Struct
+from .terms import Struct
 from .tuning import INTENTIONS, STATES
 
 

@@ -18,7 +18,8 @@ from .checker import Property
 from .instances import Instantiation
 from .java import CLASS, environment_class
 from .options import Setup
-from .syntax import SENT, Condition, DeedKind, Event, GoalKind, Plan, Program, Rule, Struct, show, show_deed, show_event
+from .syntax import SENT, Condition, DeedKind, Event, GoalKind, Plan, Program, Rule, show_deed, show_event
+from .terms import Struct, show
 
 CLAIMS = "claims.json"
 _BUILDER = "gwendolen.GwendolenMASBuilder"

@@ -25,7 +25,8 @@ from .psl import Always, Eventually, Formula, Modality
 from .psl_parser import instantiate
 from .reading import Left, read_properties
 from .shape import TooComplex
-from .syntax import DeedKind, Struct
+from .syntax import DeedKind
+from .terms import Struct
 from .timing import timed
 from .tuning import FORMULA_DEPTH, PROPERTIES
 from .words import runs, together

@@ -5,23 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from .syntax import (
-    NULL,
-    Bindings,
-    Deed,
-    Event,
-    Goal,
-    GoalKind,
-    Sign,
-    Struct,
-    Term,
-    Var,
-    apply,
-    is_ground,
-    rename,
-    show_event,
-    variables,
-)
+from .syntax import NULL, Deed, Event, Goal, GoalKind, Sign, show_event
+from .terms import Bindings, Struct, Term, Var, apply, is_ground, rename, variables
 
 START = Event(Sign.ADD, Struct(":start"))
 """The bottom of an intention that stands for an initial goal."""

@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 from .environment import Choice, Environment
 from .intentions import PERCEPTION, START, of_deed, of_event, post
 from .mind import NONE, Done, Mind, Table
-from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, plain, unify
+from .syntax import SENT, Deed, DeedKind, Event, Goal, GoalKind, Program, Sign
+from .terms import Struct, plain, unify
 
 
 class Semantics(StrEnum):

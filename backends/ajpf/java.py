@@ -17,7 +17,7 @@ from avow.base.files import read_text
 
 from .builtin import number
 from .environment import Choice, Environment
-from .syntax import CONS, NIL, Struct, Term, Var
+from .terms import CONS, NIL, Struct, Term, Var
 
 CLASS = "AvowEnvironment"
 SCRIPT = "script.txt"

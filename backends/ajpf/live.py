@@ -13,7 +13,7 @@ from .environment import Environment
 from .interpreter import PRINT, Agent, Semantics, World
 from .mind import NONE, Table
 from .parser import parse_fact, read_system
-from .syntax import Struct, plain
+from .terms import Struct, plain
 from .tuning import LIVE_JOBS
 
 

@@ -7,28 +7,11 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple, TypeVar, assert_never
 
-from .beliefs import Beliefs, Reasoner, apart, renamed_condition
+from .beliefs import Beliefs, Reasoner, renamed_condition
 from .builtin import COMPUTING, Crash, compute, computed
 from .intentions import EMPTY, PERCEPTION, Frame, Intention, bind, canonical, goal_of, of_event, tail
-from .syntax import (
-    RECEIVED,
-    SENT,
-    Bindings,
-    DeedKind,
-    Event,
-    Goal,
-    GoalKind,
-    Plan,
-    Program,
-    Sign,
-    Struct,
-    Term,
-    Var,
-    is_ground,
-    name_of,
-    plain,
-    unify,
-)
+from .syntax import RECEIVED, SENT, DeedKind, Event, Goal, GoalKind, Plan, Program, Sign
+from .terms import Bindings, Struct, Term, Var, apart, is_ground, name_of, plain, unify
 
 T = TypeVar("T")
 NONE = -1

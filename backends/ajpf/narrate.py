@@ -11,7 +11,8 @@ from typing import Any
 from .explore import System
 from .interpreter import Agent, State
 from .mind import NONE
-from .syntax import NULL, DeedKind, show, show_deed, show_event
+from .syntax import NULL, DeedKind, show_deed, show_event
+from .terms import show
 
 
 @dataclass(frozen=True, slots=True)

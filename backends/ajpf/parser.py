@@ -13,27 +13,8 @@ from avow.backend_kit.given import file_text
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.grammars import lark_of
 
-from .syntax import (
-    CONS,
-    NIL,
-    RECEIVED,
-    SENT,
-    Condition,
-    Deed,
-    DeedKind,
-    Event,
-    Goal,
-    GoalKind,
-    Plan,
-    Program,
-    Rule,
-    Sign,
-    Struct,
-    Var,
-    deeper,
-    is_ground,
-    show,
-)
+from .syntax import RECEIVED, SENT, Condition, Deed, DeedKind, Event, Goal, GoalKind, Plan, Program, Rule, Sign
+from .terms import CONS, NIL, Struct, Var, deeper, is_ground, show
 from .tuning import PROGRAM_BYTES, TERM_DEPTH
 
 _SAID = {

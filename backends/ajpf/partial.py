@@ -30,7 +30,8 @@ from .interpreter import PRINT, Semantics
 from .mind import NONE
 from .psl import Atom, Modality
 from .society import Common, Society
-from .syntax import Deed, DeedKind, Struct, is_ground
+from .syntax import Deed, DeedKind
+from .terms import Struct, is_ground
 from .tuning import TURN
 
 

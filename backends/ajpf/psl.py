@@ -17,8 +17,8 @@ from avow.formulas import ltl
 from avow.formulas.flattening import joined
 from avow.formulas.ltl import Automaton
 
-from .syntax import Struct
-from .syntax import show as show_fact
+from .terms import Struct
+from .terms import show as show_fact
 
 KEYWORDS = frozenset({"A", "E", "U", "R", "B", "G", "F", "I", "D", "P", "T", "ItD"})
 """Words of the language: an agent may not be called so."""
@@ -110,17 +110,12 @@ def parts(formula: Formula) -> tuple[Formula, ...]:
             return (left, right)
 
 
-def changed(formula: Formula, change: Callable[[Formula], Formula]) -> Formula:
-    """The formula, with each of its parts changed."""
-    match formula:
-        case Atom() | Truth():
-            return formula
-        case And(items=items) | Or(items=items):
-            return type(formula)(tuple(map(change, items)))
-        case Not(body=body) | Always(body=body) | Eventually(body=body):
-            return type(formula)(change(body))
-        case Implies(left=left, right=right) | Until(left=left, right=right) | Release(left=left, right=right):
-            return type(formula)(change(left), change(right))
+def with_atoms(formula: Formula, change: Callable[[Atom], Formula]) -> Formula:
+    """The formula, with each of its atoms changed."""
+    if isinstance(formula, Atom | Truth):
+        return change(formula) if isinstance(formula, Atom) else formula
+    made = tuple(with_atoms(part, change) for part in parts(formula))
+    return type(formula)(made) if isinstance(formula, And | Or) else type(formula)(*made)
 
 
 def atoms(formula: Formula) -> Iterator[Atom]:
@@ -163,50 +158,37 @@ def negation(formula: Formula) -> Formula:
             return Not(formula)
 
 
-@dataclass(frozen=True, slots=True)
-class Notation:
-    """How formulas are written, where brackets stand around whatever is no proposition."""
-
-    atom: Callable[[Atom], str]
-    truth: tuple[str, str]
-    """False and true."""
-    no: str
-    both: str
-    release: str
-
-
-def _atom(atom: Atom) -> str:
-    who = "" if atom.modality is Modality.PERCEPT else f"{atom.agent}, "
-    return f"{atom.modality}({who}{show_fact(atom.term)})"
+_WRITTEN = {
+    Not: "~",
+    Always: "[] ",
+    Eventually: "<> ",
+    And: " & ",
+    Or: " || ",
+    Implies: " -> ",
+    Until: " U ",
+    Release: " R ",
+}
 
 
-_AJPF = Notation(_atom, ("F", "T"), "~", "&", "R")
-
-
-def show(formula: Formula, written: Notation = _AJPF) -> str:
-    """As AJPF reads it, unless it is written for others."""
+def show(formula: Formula) -> str:
+    """As AJPF reads it: brackets stand around whatever is no proposition."""
     match formula:
-        case Atom():
-            return written.atom(formula)
+        case Atom(modality=modality, agent=agent, term=term):
+            return f"{modality}({f'{agent}, ' if agent else ''}{show_fact(term)})"
         case Truth(value=value):
-            return written.truth[value]
+            return "T" if value else "F"
         case And(items=()) | Or(items=()):
-            return written.truth[isinstance(formula, And)]
-        case Not() | Always() | Eventually():
-            sign = {Not: written.no, Always: "[] ", Eventually: "<> "}[type(formula)]
-            return f"{sign}{_operand(formula.body, written)}"
-        case And() | Or() | Implies() | Until() | Release():
-            between = {And: written.both, Or: "||", Implies: "->", Until: "U", Release: written.release}
-            return f" {between[type(formula)]} ".join(_operand(part, written) for part in parts(formula))
-        case _:
-            assert_never(formula)
+            return "T" if isinstance(formula, And) else "F"
+        case Not(body=body) | Always(body=body) | Eventually(body=body):
+            return _WRITTEN[type(formula)] + _operand(body)
+        case _:  # between its parts
+            return _WRITTEN[type(formula)].join(map(_operand, parts(formula)))
 
 
-def _operand(formula: Formula, written: Notation) -> str:
+def _operand(formula: Formula) -> str:
     while isinstance(formula, And | Or) and len(formula.items) == 1:
         (formula,) = formula.items
-    alone = isinstance(formula, Atom | Truth) or not parts(formula)
-    return show(formula, written) if alone else f"({show(formula, written)})"
+    return f"({show(formula)})" if parts(formula) else show(formula)
 
 
 def show_template(formula: Formula) -> str:

@@ -6,34 +6,24 @@ Beyond AJPF's syntax, arguments may be index variables and ``i + 1`` of them, to
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from .psl import (
-    AGENT_NAME,
-    FALSE,
-    KEYWORDS,
-    TRUE,
-    Always,
-    And,
-    Atom,
-    Eventually,
-    Formula,
-    Implies,
-    Modality,
-    Not,
-    Or,
-    Release,
-    Until,
-    atoms,
-    changed,
-)
-from .syntax import Struct, Term, Var
+from . import psl
+from .psl import Atom, Formula, Modality
+from .terms import Struct, Term, Var, subterms
 from .tuning import PROPERTY_LENGTH, PROPERTY_NESTING
 
 _TOKEN = re.compile(r"\s*(\[\]|<>|->|\|\||[~&(),+\-]|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\Z|.)", re.DOTALL)
 _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?\Z")
-_BINARY: Mapping[str, Callable[[Formula, Formula], Formula]] = {"U": Until, "R": Release, "->": Implies}
+_BINARY: Mapping[str, Callable[[Formula, Formula], Formula]] = {"U": psl.Until, "R": psl.Release, "->": psl.Implies}
+_JUNCTIONS: Mapping[str, Callable[[tuple[Formula, ...]], Formula]] = {"&": psl.And, "||": psl.Or}
+_UNARY: Mapping[str, tuple[Callable[[Formula], Formula], int]] = {
+    **dict.fromkeys(("[]", "A"), (psl.Always, 3)),
+    **dict.fromkeys(("<>", "E"), (psl.Eventually, 2)),
+    "~": (psl.Not, 1),
+}
+"""With how loosely AJPF binds it: directly within, it takes only what binds tighter."""
 
 
 class Malformed(Exception):  # noqa: N818 - it names the text
@@ -55,25 +45,13 @@ def parse_psl(text: str) -> Formula:
     """Raises Malformed."""
     if len(text) > PROPERTY_LENGTH:
         raise Malformed(f"longer than {PROPERTY_LENGTH} characters", 0)
-    parser = _Parser(_tokens(text))
+    parser = _Parser([_Token(found[1], found.start(1)) for found in _TOKEN.finditer(text)])
     formula = parser.property(0)
     if parser.now.text:
         raise Malformed(
             f"unexpected {parser.now.text!r} after the formula; AJPF would ignore the rest", parser.now.offset
         )
     return formula
-
-
-def _tokens(text: str) -> list[_Token]:
-    found = []
-    at = 0
-    while True:
-        match = _TOKEN.match(text, at)
-        assert match
-        found.append(_Token(match[1], match.start(1)))
-        if not match[1]:
-            return found
-        at = match.end()
 
 
 class _Parser:
@@ -99,7 +77,7 @@ class _Parser:
             raise Malformed(f"brackets nested more than {PROPERTY_NESTING} deep", self.now.offset)
         items = [self.unary(depth)]
         operator = self.now
-        while self.now.text in ("&", "||", "U", "R", "->"):
+        while self.now.text in _BINARY or self.now.text in _JUNCTIONS:
             token = self.take()
             if token.text != operator.text:
                 raise Malformed(
@@ -112,32 +90,23 @@ class _Parser:
                 raise Malformed(f"'{token.text}' in a row: AJPF brackets to the left; say which is meant", token.offset)
         if len(items) == 1:
             return items[0]
-        if operator.text == "&":
-            return And(tuple(items))
-        if operator.text == "||":
-            return Or(tuple(items))
+        if operator.text in _JUNCTIONS:
+            return _JUNCTIONS[operator.text](tuple(items))
         return _BINARY[operator.text](items[0], items[1])
 
     def unary(self, depth: int) -> Formula:
         token = self.now
-        make: Mapping[str, Callable[[Formula], Formula]] = {
-            "[]": Always,
-            "A": Always,
-            "<>": Eventually,
-            "E": Eventually,
-            "~": Not,
-        }
-        if token.text not in make:
+        if token.text not in _UNARY:
             return self.atom(depth)
         self.take()
         inner = self.now
-        allowed = {"~": (), "<>": ("~",), "E": ("~",), "[]": ("<>", "E", "~"), "A": ("<>", "E", "~")}[token.text]
-        if inner.text in make and inner.text not in allowed:
+        make, loose = _UNARY[token.text]
+        if inner.text in _UNARY and _UNARY[inner.text][1] >= loose:
             raise Malformed(
                 f"'{token.text}{inner.text}' loses an operator in AJPF: write {token.text}({inner.text} …)",
                 inner.offset,
             )
-        return make[token.text](self.unary(depth))
+        return make(self.unary(depth))
 
     def atom(self, depth: int) -> Formula:
         token = self.take()
@@ -147,23 +116,21 @@ class _Parser:
                 self.take(")")
                 return inner
             case "T":
-                return TRUE
+                return psl.TRUE
             case "F":
-                return FALSE
-            case "P":
+                return psl.FALSE
+            case "P" | "B" | "G" | "I" | "ItD" | "D":
                 self.take("(")
+                agent = ""
+                if token.text != "P":
+                    name = self.take()
+                    agent = name.text
+                    if agent in psl.KEYWORDS or not psl.AGENT_NAME.match(agent):
+                        raise Malformed(f"{agent!r} cannot be an agent's name in AJPF", name.offset)
+                    self.take(",")
                 term = self.struct(depth)
                 self.take(")")
-                return Atom(Modality.PERCEPT, "", term)
-            case "B" | "G" | "I" | "ItD" | "D":
-                self.take("(")
-                agent = self.take()
-                if agent.text in KEYWORDS or not AGENT_NAME.match(agent.text):
-                    raise Malformed(f"{agent.text!r} cannot be an agent's name in AJPF", agent.offset)
-                self.take(",")
-                term = self.struct(depth)
-                self.take(")")
-                return Atom(Modality(token.text), agent.text, term)
+                return Atom(Modality(token.text), agent, term)
             case _:  # nothing begins so: reported below
                 shown = repr(token.text) if token.text else "the end"
                 raise Malformed(f"expected a proposition such as B(agent, fact), found {shown}", token.offset)
@@ -171,7 +138,7 @@ class _Parser:
     def struct(self, depth: int) -> Struct:
         at = self.now.offset
         term = self.term(depth)
-        if isinstance(term, Var) or not AGENT_NAME.match(term.functor):
+        if isinstance(term, Var) or not psl.AGENT_NAME.match(term.functor):
             raise Malformed("expected a fact such as going(3)", at)
         return term
 
@@ -197,9 +164,7 @@ class _Parser:
             return Struct(operator, (Struct(token.text), Struct(number.text)))
         args: list[Term] = []
         if self.now.text == "(":
-            self.take()
-            args.append(self.term(depth + 1))
-            while self.now.text == ",":
+            while self.now.text == "," or not args:
                 self.take()
                 args.append(self.term(depth + 1))
             self.take(")")
@@ -208,11 +173,13 @@ class _Parser:
 
 def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
     """The formula with its index variables replaced. Raises Malformed where something is left that AJPF cannot read."""
-    if isinstance(formula, Atom):
-        made = _instantiate(formula.term, values)
+
+    def instance(atom: Atom) -> Atom:
+        made = _instantiate(atom.term, values)
         assert isinstance(made, Struct)
-        return replace(formula, term=made)
-    return changed(formula, lambda part: instantiate(part, values))
+        return replace(atom, term=made)
+
+    return psl.with_atoms(formula, instance)
 
 
 def _instantiate(term: Term, values: Mapping[str, int]) -> Term:
@@ -242,12 +209,5 @@ def _index(value: int) -> Struct:
 
 def index_names(formula: Formula) -> frozenset[str]:
     """Names without arguments in the formula's terms: constants, or index variables."""
-    return frozenset(name for atom in atoms(formula) for arg in atom.term.args for name in _constants(arg))
-
-
-def _constants(term: Term) -> Iterator[str]:
-    if isinstance(term, Struct):
-        if not term.args:
-            yield term.functor
-        for arg in term.args:
-            yield from _constants(arg)
+    found = (part for atom in psl.atoms(formula) for arg in atom.term.args for part in subterms(arg))
+    return frozenset(part.functor for part in found if isinstance(part, Struct) and not part.args)

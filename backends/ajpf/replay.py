@@ -24,7 +24,8 @@ from .files import system_files
 from .interpreter import PRINT
 from .java import MARK, RUNS, SCRIPT, Script, runs_class
 from .options import Setup
-from .syntax import DeedKind, plain
+from .syntax import DeedKind
+from .terms import plain
 from .tuning import REPLAY_MILLISECONDS, REPLAY_START, SAMPLED_STEPS
 
 _VARIABLE = re.compile(r"(?<![A-Za-z0-9_.\"])[A-Z_~][A-Za-z0-9_]*(?:[\^'~][0-9']*)*")

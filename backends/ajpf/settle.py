@@ -13,8 +13,9 @@ from . import psl
 from .checker import Property
 from .instances import Claim, Instantiation
 from .options import Extra, Setup
-from .syntax import RECEIVED, Program, Struct
+from .syntax import RECEIVED, Program
 from .tautology import is_valid
+from .terms import Struct
 from .words import together
 
 

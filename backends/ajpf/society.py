@@ -11,12 +11,12 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import NamedTuple, TypeVar
 
-from .beliefs import apart
 from .environment import Environment
 from .intentions import of_event
 from .interpreter import PRINT, Agent, Semantics, World
 from .mind import NONE, Table
-from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, Term, name_of, plain
+from .syntax import RECEIVED, DeedKind, Event, Program, Sign
+from .terms import Struct, Term, apart, name_of, plain
 
 T = TypeVar("T")
 

@@ -19,7 +19,8 @@ from avow.base.graphs import strong_components
 from . import psl
 from .beliefs import renamed_rule
 from .psl import Atom, Formula, Modality
-from .syntax import Bindings, Condition, DeedKind, Program, Rule, Struct, Term, Var, apply, named_apart, unify
+from .syntax import Condition, DeedKind, Program, Rule
+from .terms import Bindings, Struct, Term, Var, apply, is_ground, named_apart, rename, unify, variables
 from .tuning import STANDING_ATOMS, STANDING_INSTANCES, TAUTOLOGY_CASES
 
 _EXISTENTIAL = (Modality.DID, Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO, Modality.PERCEPT)
@@ -229,23 +230,18 @@ def _instances(body: Sequence[Condition], bindings: Bindings, facts: Sequence[St
         return
     first, rest = body[0], body[1:]
     assert isinstance(first.term, Struct)
-    if first.positive and _free(apply(first.term, bindings)):
+    if first.positive and not is_ground(apply(first.term, bindings)):
         for fact in facts:
             found = unify(first.term, named_apart(fact), bindings)
-            if found is not None and not _free(fact):
+            if found is not None and is_ground(fact):
                 yield from _instances(rest, found, facts)
-    shared = {name for c in rest if c.term is not None for name in _free(apply(c.term, bindings))}
-    if not shared & set(_free(apply(first.term, bindings))):
+    shared = {name for c in rest if c.term is not None for name in variables(apply(c.term, bindings))}
+    if shared.isdisjoint(variables(apply(first.term, bindings))):
         yield from _instances(rest, bindings, facts)
-
-
-def _free(term: Term) -> list[str]:
-    if isinstance(term, Var):
-        return [term.name]
-    return [name for arg in term.args for name in _free(arg)]
 
 
 def _shown(term: Term) -> Struct:
     """As a property asks for it: ``_`` for what is free."""
-    assert isinstance(term, Struct)
-    return Struct(term.functor, tuple(Var("_") if isinstance(arg, Var) else _shown(arg) for arg in term.args))
+    made = rename(term, {name: Var("_") for name in variables(term)})
+    assert isinstance(made, Struct)
+    return made

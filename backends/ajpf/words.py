@@ -21,7 +21,7 @@ from .explore import Graph, System
 from .mapping import Row
 from .psl import Always, Atom, Eventually, Formula, Implies, Release, Until, compiled
 from .psl_parser import Malformed, index_names, instantiate
-from .syntax import Struct, Term, show
+from .terms import Struct, Term, show, subterms
 from .tuning import INDICES_TRIED
 
 Step = tuple[tuple[str, str], ...]
@@ -203,21 +203,14 @@ def _instances(
 def _numbers(graph: Graph, visited: Sequence[Any]) -> list[int]:
     """The whole numbers of which the agent speaks on its way."""
     system = graph.system
-    found: set[int] = set()
-    stack: list[Term] = []
+    facts: set[Term] = set()
     for state in visited:
         for agent, mind in zip(system.agents, system.minds(state), strict=True):
-            stack += agent.believed(mind)
+            facts |= agent.believed(mind)
         did = system.did(state)
-        stack += [] if did is None else [did[1]]
-    seen: set[Term] = set()
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Struct) and term not in seen:
-            seen.add(term)
-            stack += term.args
-            if not term.args and term.functor.isascii() and term.functor.isdigit() and len(term.functor) < 10:
-                found.add(int(term.functor))
+        facts |= set() if did is None else {did[1]}
+    names = {term.functor for fact in facts for term in subterms(fact) if isinstance(term, Struct) and not term.args}
+    found = {int(name) for name in names if name.isascii() and name.isdigit() and len(name) < 10}
     return sorted(found) if len(found) <= INDICES_TRIED else []
 
 

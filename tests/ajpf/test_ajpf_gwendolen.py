@@ -18,7 +18,8 @@ from avow.backends.ajpf.mind import NONE
 from avow.backends.ajpf.parser import parse_fact, parse_system
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
 from avow.backends.ajpf.society import system
-from avow.backends.ajpf.syntax import show, show_deed, show_event
+from avow.backends.ajpf.syntax import show_deed, show_event
+from avow.backends.ajpf.terms import show
 from avow.base.diagnostics import Rejected
 
 

@@ -21,8 +21,8 @@ from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl import compiled
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.society import system
-from avow.backends.ajpf.syntax import Struct
 from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid, standing
+from avow.backends.ajpf.terms import Struct
 from avow.backends.ajpf.tuning import TAUTOLOGY_CASES
 from avow.base.verdict import Verdict
 from avow.sanity.mutants import mutants

@@ -31,7 +31,7 @@ from avow.backends.ajpf.psl import (
     compiled,
     parts,
 )
-from avow.backends.ajpf.syntax import Struct
+from avow.backends.ajpf.terms import Struct
 from avow.formulas.lasso import Fair
 
 P, Q = (Atom(Modality.BELIEVES, "ag", Struct(name)) for name in "pq")

@@ -24,7 +24,7 @@ from avow.backends.ajpf.psl import (
     show,
 )
 from avow.backends.ajpf.psl_parser import Malformed, instantiate, parse_psl
-from avow.backends.ajpf.syntax import Struct, Var
+from avow.backends.ajpf.terms import Struct, Var
 
 P, Q, R = (Atom(Modality.BELIEVES, "ag", Struct(name)) for name in "pqr")
 

@@ -23,7 +23,7 @@ from avow.backends.ajpf.options import Setup
 from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.backends.ajpf.society import system
-from avow.backends.ajpf.syntax import Struct
+from avow.backends.ajpf.terms import Struct
 from avow.base import tools
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
