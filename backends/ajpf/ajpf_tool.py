@@ -37,7 +37,6 @@ _PARSER = re.compile(
 )
 _HARMLESS = re.compile(r"^line \d+:\d+ missing RR_NEWLINE at .*$", re.MULTILINE)
 """MCAPL's parser says so of every program with reasoning rules, and reads them as they are meant."""
-_STEP = re.compile(r"\[MS:\s*(\d+),\s*BS:\s*([^,\]]+),\s*UN:\s*([^\]]+)\]")
 _FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
 
 
@@ -60,8 +59,6 @@ class Said(StrEnum):
 class Answer:
     said: Said
     reason: str = ""
-    path: tuple[int, ...] = ()
-    """Numbers of AJPF's model states on the violating run; a repetition closes the lasso."""
     log: str = ""
     framework: str = ""
     """What MCAPL calls its own version."""
@@ -168,13 +165,7 @@ def prepare(installation: Installation, folder: Path, files: Mapping[str, str], 
     command = [
         installation.javac,
         *(f"-J{option}" for option in BRIEF),
-        "--release",
-        "11",
-        "-nowarn",
-        "-encoding",
-        "UTF-8",
-        "-d",
-        ".",
+        *("--release", "11", "-nowarn", "-encoding", "UTF-8", "-d", "."),
     ]
     done = outside.run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
     return None if done.code == 0 else f"the environment does not compile: {(done.stdout + done.stderr).strip()[:300]}"
@@ -207,7 +198,6 @@ def judge(done: Completed) -> Answer:
     framework, parser = _FRAMEWORK.search(text), _PARSER.search(text)
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
     once = len(_RESULTS.findall(text)) == 1  # an agent prints into the same text
-    path: tuple[int, ...] = ()
     if done.timed_out:
         said, reason = Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}"
     elif parser:
@@ -218,8 +208,7 @@ def judge(done: Completed) -> Answer:
         said, reason = Said.HOLDS, ""
     elif violated and not holds:
         said, reason = Said.VIOLATED, ""
-        path = tuple(int(step[0]) for step in _STEP.findall(done.stderr))
     else:
         said, reason = Said.ERROR, f"no answer that can be relied upon (exit code {done.code})"
     log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
-    return Answer(said, reason, path, log, framework[1].strip() if framework else "")
+    return Answer(said, reason, log, framework[1].strip() if framework else "")

@@ -153,14 +153,14 @@ def _read(located: Located) -> Environment:
             percept = None if word == NOTHING else parse_fact(word)
             if percept is None and word != NOTHING:
                 message = f"{word!r} is no percept such as 'danger' or 'result(0, 3)'"
-                faults.append(Diagnostic("AJPF111", message, located.at("percepts", name, at)))
+                faults.append(Diagnostic("AJPF110", message, located.at("percepts", name, at)))
             alternatives.append(percept)
         groups[name] = tuple(alternatives)
     size = 1
     for group in groups.values():
         size *= len(group)
     if size > DRAWS:
-        faults.append(Diagnostic("AJPF111", f"{size} possible draws; at most {DRAWS}", located.at("percepts")))
+        faults.append(Diagnostic("AJPF110", f"{size} possible draws; at most {DRAWS}", located.at("percepts")))
 
     def narrow(given: Mapping[str, list[str]], *path: str) -> dict[str, tuple[int, ...]]:
         result = {}
@@ -168,7 +168,7 @@ def _read(located: Located) -> Environment:
             places = []
             for at, word in enumerate(words):
                 if name not in groups:
-                    faults.append(Diagnostic("AJPF111", f"there is no group '{name}'", located.at(*path, name)))
+                    faults.append(Diagnostic("AJPF110", f"there is no group '{name}'", located.at(*path, name)))
                     break
                 percept = None if word == NOTHING else parse_fact(word)
                 if word == KEEP and path[0] == "after":
@@ -177,7 +177,7 @@ def _read(located: Located) -> Environment:
                     places.append(groups[name].index(percept))
                 else:
                     message = f"{word!r} is no alternative of '{name}'"
-                    faults.append(Diagnostic("AJPF111", message, located.at(*path, name, at)))
+                    faults.append(Diagnostic("AJPF110", message, located.at(*path, name, at)))
             result[name] = tuple(places)
         return result
 
@@ -189,7 +189,7 @@ def _read(located: Located) -> Environment:
         percept = parse_fact(entry["percept"])
         if percept is None or percept not in known:
             message = f"{entry['percept']!r} is in no group, so that no draw has it"
-            faults.append(Diagnostic("AJPF111", message, located.at("fair", at, "percept")))
+            faults.append(Diagnostic("AJPF110", message, located.at("fair", at, "percept")))
         else:
             fair.append(Fairness(percept, entry["because"]))
     if faults:

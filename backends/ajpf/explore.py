@@ -11,31 +11,14 @@ from typing import Any, Protocol
 
 from .beliefs import TooDeep
 from .builtin import Crash
-from .environment import Environment
-from .interpreter import Agent, Semantics, World
+from .interpreter import Agent
 from .mind import Table
-from .terms import Struct
+from .society import Society
 from .tuning import INTENTIONS, STATES
 
-
-class System(Protocol):
-    """One agent (`interpreter.Agent`) or several (`society.Society`): a transition system over states of its own. The
-    core of a state tells whether the environment has just drawn (`drawn`), what is on offer (`choice`) and whether the
-    run is over."""
-
-    world: World
-    environment: Environment
-    semantics: Semantics
-    probed: bool
-
-    @property
-    def agents(self) -> tuple[Agent, ...]: ...
-    def start(self) -> tuple[Any, ...]: ...
-    def successors(self, state: Any, /) -> tuple[Any, ...]: ...
-    def core(self, state: Any, /) -> Any: ...
-    def minds(self, state: Any, /) -> tuple[int, ...]: ...
-    def did(self, state: Any, /) -> tuple[int, Struct] | None: ...
-    def sees(self, state: Any, /) -> tuple[Struct, ...]: ...
+System = Agent | Society
+"""A transition system over states of its own. The core of a state tells whether the environment has just drawn
+(`drawn`), what is on offer (`choice`) and whether the run is over."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,20 @@ class State(NamedTuple):
     drawn: bool
     """The environment has just drawn."""
 
+    # As in a system of several agents (`society.Common`)
+
+    @property
+    def turn(self) -> int:
+        return 0
+
+    @property
+    def awake(self) -> tuple[bool, ...]:
+        return (not self.asleep,)
+
+    @property
+    def changed(self) -> bool:
+        return False
+
 
 BITS = 32
 """Of a state's number, for its queue."""

@@ -44,9 +44,9 @@ class Told:
 def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
     """At most so many steps of one run; where the environment has a choice, the seed decides. Raises Crash, TooDeep."""
     rng = Random(seed)
-    state = system.start()[0]
+    state: Any = system.start()[0]
     for _ in range(steps):
-        after = rng.choice(system.successors(state))
+        after: Any = rng.choice(system.successors(state))
         if system.core(after).over:
             yield Told("", "there is nothing to do: the run is over")
             return
@@ -55,10 +55,10 @@ def narrated(system: System, seed: int, steps: int) -> Iterator[Told]:
 
 
 def _told(system: System, state: Any, following: Any) -> Told:
-    place = following.turn if len(system.agents) > 1 else 0
+    seen = system.core(following)
+    place = seen.turn
     agent, old, new = system.agents[place], system.minds(state)[place], system.minds(following)[place]
     had, has, before, after = agent.believed(old), agent.believed(new), agent.state(old), agent.state(new)
-    seen = system.core(following)
     action = None
     did = system.did(following)
     if did is not None and before.planned and _deed(agent, before).startswith("does "):

@@ -99,9 +99,9 @@ class _OptionsReader:
         environment, environment_path = self.file("environment", read_environment)
         if programs is not None:
             self.agents(programs)
-        if self.options.get("engine") == "ajpf":
-            self.engine()
-        instances = self.instances()
+        if self.options.get("engine") == "ajpf" and self.options.get("semantics", "mcapl") != "mcapl":
+            self.fault("AJPF119", "semantics: AJPF has its own, 'mcapl'", "semantics")
+        instances = self.ranges(self.options.get("instances", {}), "instances")
         rows = self.rows(programs)
         extras = self.extras(programs, instances)
         if programs is None or environment is None or environment_path is None:
@@ -142,13 +142,6 @@ class _OptionsReader:
         wanted = self.options.get("agent", names[0])
         if wanted not in names:
             self.fault("AJPF121", f"agent: {_called(names)}, not {wanted!r}", "agent")
-
-    def engine(self) -> None:
-        if self.options.get("semantics", "mcapl") != "mcapl":
-            self.fault("AJPF126", "semantics: AJPF has its own, 'mcapl'", "semantics")
-
-    def instances(self) -> dict[str, tuple[int, ...]]:
-        return self.ranges(self.options.get("instances", {}), "instances")
 
     def ranges(self, given: Mapping[str, object], *path: str) -> dict[str, tuple[int, ...]]:
         result = {}

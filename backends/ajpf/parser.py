@@ -68,7 +68,7 @@ def parse_system(text: str, file: str) -> tuple[Program, ...]:
     for at, agent in enumerate(agents):
         if agent.name in [other.name for other in agents[:at]]:
             message = f"there are two agents called '{agent.name}'"
-            builder.problems.append(Diagnostic("AJPF106", message, agent.name_span))
+            builder.problems.append(Diagnostic("AJPF104", message, agent.name_span))
     if builder.problems:
         raise Rejected(*builder.problems)
     return agents
@@ -252,7 +252,7 @@ class _Builder(Transformer):  # type: ignore[misc]
     def trigger(self, event: Event, meta: Any) -> Event:
         if isinstance(event.term, Var):
             message = f"a plan for any {'goal' if event.is_goal else 'belief'} at all: the checker does not run that"
-            self.problems.append(Diagnostic("AJPF105", message, self.span(meta)))
+            self.problems.append(Diagnostic("AJPF103", message, self.span(meta)))
         return event
 
     def received(self, parts: list[Any]) -> Event:

@@ -72,12 +72,11 @@ def _moment(system: System, state: Any, following: Any) -> Moment | None:
     before, after = system.core(state), system.core(following)
     if before.over or after.over:
         return None
-    place = after.turn if len(system.agents) > 1 else 0
+    place = after.turn
     agent = system.agents[place]
     mind = agent.core(system.minds(state)[place])
     if not mind.planned:
-        asleep = before.asleep if len(system.agents) == 1 else not any(before.awake)
-        return _told(system, state, "idle" if asleep else "start") if after.drawn else None
+        return _told(system, state, "start" if any(before.awake) else "idle") if after.drawn else None
     deed = agent.next_deed(mind)
     did = system.did(following)
     if deed is None or deed.kind not in (DeedKind.ACTION, DeedKind.SEND) or did is None:

@@ -160,8 +160,8 @@ def test_what_was_sent_is_remembered():
 def test_what_is_not_run_is_refused_with_the_reason():
     head = "GWENDOLEN\n:name: a\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n"
     for text, code, reason in (
-        (f"{head}+p : {{ True }};\n{head}+p : {{ True }};", "AJPF106", "two agents called 'a'"),
-        (f"{head}+!G [perform] : {{ True }};", "AJPF105", "any goal at all"),
+        (f"{head}+p : {{ True }};\n{head}+p : {{ True }};", "AJPF104", "two agents called 'a'"),
+        (f"{head}+!G [perform] : {{ True }};", "AJPF103", "any goal at all"),
     ):
         with pytest.raises(Rejected) as caught:
             parse_system(text, "a.gwen")

@@ -77,7 +77,7 @@ def test_agents_with_names_that_psl_has_are_refused(lift):
     program = job.options["program"]
     text = (job.root / program).read_text()
     second = ":name: {}\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n"
-    for name, code in (("U", "AJPF104"), ("Other", "AJPF104"), ("cabin", "AJPF106")):
+    for name, code in (("U", "AJPF104"), ("Other", "AJPF104"), ("cabin", "AJPF104")):
         wrong = lift({}, {program: text + second.format(name) + "+p : { True } <- act;\n"})
         assert [d.code for d in BACKEND.check(wrong) if d.is_error] == [code]
 
