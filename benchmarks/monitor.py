@@ -5,8 +5,9 @@
 `threshold`: one output, one bound, a fresh reading at each event. `agent`: the case study's agent over laps of the
 nominal run, which breaks its contract from the second lap on. `rover`: all four nodes over one mission with a fresh
 reading each time. `answers`: a threshold on each answer, which is paired with its input in each of the ways; for these,
-plain Python keeps the inputs by their number. The bags hold the threshold's readings. Processor time, so that company
-on the machine matters less; memory is the peak of the process.
+plain Python keeps the inputs by their number. The bags hold the threshold's readings, or answers with stamps. `arrays`:
+the threshold over 40 times as many readings that are arrays already, against numpy and a loop. Processor time, so that
+company on the machine matters less; memory is the peak of the process.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -113,6 +116,31 @@ def bag(path: Path, count: int, form: str) -> Path:
     return path
 
 
+def stamped(path: Path, count: int) -> Path:
+    """Answers, and what they answered, with the same stamps: a ROS 2 bag."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store: Any = get_typestore(Stores.ROS2_HUMBLE)
+    kind, rng = "sensor_msgs/msg/Temperature", random.Random(1)
+    time_, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        to = [writer.add_connection(topic, kind, typestore=store) for topic in ("/r", "/v")]
+        for at in range(count // 2):
+            message = store.types[kind](header(time_(at, 0), "sensor"), round(rng.uniform(0, 119), 3), 0.0)
+            for k, connection in enumerate(to):
+                writer.write(connection, 10**9 + at * 10**7 + k * 2 * 10**6, store.serialize_cdr(message, kind))
+    return path
+
+
+def loop(readings: list[float]) -> int:
+    broken = 0
+    for reading in readings:
+        if reading > 120:
+            broken += 1
+    return broken
+
+
 def written(path: Path, lines: Iterator[str]) -> Path:
     with path.open("w", encoding="utf-8") as file:
         file.writelines(line + "\n" for line in lines)
@@ -178,6 +206,17 @@ def main() -> None:
         for form, name in (("ros1", "v.bag"), ("SQLITE3", "v2"), ("MCAP", "v3")):
             record = bag(folder / name, count, form)
             timed(f"threshold, a bag ({form})", count, partial(judged, threshold, [], record))
+        mapping = "mapping: {in.r: temperature, out.v: temperature}"
+        contract = ANSWERS.replace("std_msgs/Float64", "sensor_msgs/Temperature")
+        answered = single(folder / "stamped", contract, f"{{answers: {{by: stamp}}, {mapping}}}")
+        record = stamped(folder / "v4", count)
+        timed("answers by stamp, a bag (SQLITE3)", count, partial(judged, answered, [], record))
+    many = 40 * count
+    data = np.random.default_rng(1).uniform(0, 119, many)
+    arrays = {"v": {"time": np.arange(many) / 100, "data": data}}
+    timed("arrays: numpy", many, lambda: int(np.count_nonzero(data > 120)))
+    timed("arrays: a loop over a list", many // 10, partial(loop, data[: many // 10].tolist()))
+    timed("arrays: threshold", many, lambda: sum(1 for _ in session(threshold).arrays(arrays)))
 
 
 if __name__ == "__main__":

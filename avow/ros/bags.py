@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from avow.base.files import read_text
 from avow.base.records import dataclass
 from avow.ros.calls import Calls, as_message, parts_of, with_parts
-from avow.ros.definitions import Message, canonical
+from avow.ros.definitions import Definitions, Message, canonical
+from avow.ros.layout import Layout
 from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
 
 Event = Mapping[str, Any]
@@ -135,47 +137,92 @@ def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
         return Carried(types, known, told, counts, bool(getattr(reader, "is2", False)))
 
 
+@dataclass(slots=True)
+class Channel:
+    """One publisher's messages on one topic of a bag."""
+
+    topic: str
+    by: str
+    """The publisher's name, if the bag has it."""
+    read: Callable[[bytes], Mapping[str, Any]]
+    """A raw message's fields."""
+    layout: Callable[[bytes], Layout | None] = lambda raw: None
+    """A raw message's layout, if it is known."""
+
+    def event(self, time: int, raw: bytes) -> Event:
+        return enveloped(self.read(raw), self.topic, b"%d.%09d" % divmod(time, 10**9), self.by)
+
+
 def messages(
     path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
 ) -> Iterator[tuple[Event, int]]:
-    """The messages as events, each with its size in bytes, in the order in which they were recorded; of topics that are
-    not wanted, only that there was one. Of a topic whose parts are wanted (a call's request and response), the part.
-    Raises NoBag."""
+    """As `recorded`: the messages as events, each with its size in bytes."""
+    for channel, time, raw in recorded(path, origin, wanted):
+        yield channel.event(time, raw), len(raw)
+
+
+def recorded(
+    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
+) -> Iterator[tuple[Channel, int, bytes]]:
+    """The messages, with the times in nanoseconds at which they were recorded, in this order; of topics that are not
+    wanted, only that there was one. Of a topic whose parts are wanted (a call's request and response), the part. Raises
+    NoBag."""
     calls = Calls()
     with _opened(path, origin) as reader:
-        parted = {
-            c.topic
-            for c in reader.connections
-            if not wanted(c.topic) and any(map(wanted, parts_of(c.topic, canonical(c.msgtype))))
-        }
-        plain = plainer(reader.typestore.fielddefs)
+        store = reader.typestore
+        plain, known, ros2 = plainer(store.fielddefs), Definitions(from_store(store.fielddefs, "")), reader.is2
+        deserialize = store.deserialize_cdr if ros2 else store.deserialize_ros1
 
-        def about(connection: Any) -> tuple[str, str, bool, str]:
-            """What is the same for all messages of a connection."""
-            heard = connection.topic in parted or wanted(connection.topic)
+        def channel(connection: Any) -> tuple[Channel, bool, bool]:
+            """What is the same for all messages of a connection: whether it is wanted, and whether a part of it is."""
+            topic, kind = connection.topic, as_message(connection.msgtype, "")[0]
             by = getattr(connection.ext, "callerid", None) or ""
-            return connection.topic, as_message(connection.msgtype, "")[0], heard, by
+            parts = not wanted(topic) and any(map(wanted, parts_of(topic, canonical(connection.msgtype))))
+            if not parts and not wanted(topic):
+                return Channel(topic, by, lambda raw: {}), False, False
 
-        known: dict[int, tuple[str, str, bool, str]] = {}
-        for connection, time, raw in reader.messages():
-            if connection.id not in known:
-                known[connection.id] = about(connection)
-            topic, kind, heard, by = known[connection.id]
-            event = plain(reader.deserialize(raw, kind)) if heard else {}
-            if topic in parted:
-                topic, event = calls.part(topic, event)
-            yield enveloped(event, topic, b"%d.%09d" % divmod(time, 10**9), by), len(raw)
+            def layout(raw: bytes) -> Layout | None:
+                return Layout.of(kind, known, raw, ros2)
+
+            def read(raw: bytes) -> Mapping[str, Any]:
+                with _readable(path):
+                    found: Mapping[str, Any] = plain(deserialize(raw, kind))
+                return found
+
+            return Channel(topic, by, read, layout), True, parts
+
+        channels: dict[int, tuple[Channel, bool, bool]] = {}
+        (whole,) = reader.readers
+        for connection, time, raw in whole.messages():
+            if (found := channels.get(connection.id)) is None:
+                found = channels[connection.id] = channel(connection)
+            one, heard, parts = found
+            if parts:
+                topic, fields = calls.part(one.topic, one.read(raw))
+                one = Channel(topic, one.by, partial(_given, fields))
+            yield one, time, raw if heard else b""
+
+
+def _given(fields: Mapping[str, Any], raw: bytes) -> Mapping[str, Any]:
+    return fields
 
 
 @contextmanager
 def _opened(path: Path, origin: Origin) -> Iterator[Any]:
-    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.highlevel import AnyReader
+
+    with _readable(path), _reader(AnyReader, path, origin) as reader:
+        yield reader
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    from rosbags.highlevel import AnyReaderError
     from rosbags.serde import SerdeError
     from rosbags.typesys import TypesysError
 
     try:
-        with _reader(AnyReader, path, origin) as reader:
-            yield reader
+        yield
     except (AnyReaderError, SerdeError) as error:
         hint = None
         if "type definition" in str(error):

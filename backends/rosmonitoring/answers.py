@@ -7,8 +7,6 @@ the last one. One that cannot be read takes its place.
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -16,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from avow.formulas.values import Value
 from avow.language.contract import ClauseKind
-from avow.ros.bags import publisher
 
-from .pairing import EARLY, Asked, Choices, Pairing, Said, ticks, time_of
+from .pairing import EARLY, Asked, Choices, Pairing, ticks, time_of
 from .reading import Reader
-from .tuning import BREACHES_IN_DOUBT, COMBINATIONS, KEYS_KEPT, REMEMBERED
+from .tuning import BREACHES_IN_DOUBT, KEYS_KEPT
 from .watched import Answer, Fault, Part, Violation, Watched, open_verdict
 from .word import topics_of
 
@@ -221,9 +218,8 @@ def ask(
     inputs = tuple(n for n in asks(monitor, watched) if n in watched.paired or n in pairing.seen)
     key = pairing.key(event, pairing.answers.output) if answer is None else answer.key
     heard = monitor.heard_of(watched.outputs) if answer is None else answer.heard
-    known, places = tuple(values[n] for n in own), tuple({place for place, _ in heard.values()})
-    at, time = ticks(now), float(now)
-    pairing.ask(Asked(watched, event, monitor.events, own, known, inputs, at, time, key, heard, places))
+    known, places = {n: values[n] for n in own}, tuple({place for place, _ in heard.values()})
+    pairing.ask(Asked(watched, event, monitor.events, known, inputs, ticks(now), float(now), key, heard, places))
 
 
 def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[Violation]) -> None:
@@ -231,11 +227,6 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     pairing = monitor.kept
     assert pairing is not None
     watched, tally = asked.watched, asked.watched.tally
-    if not isinstance(choices, str) and (met := _alike(monitor, pairing, asked, choices)) is not None:
-        tally.aged(asked.seconds, asked.since, watched.paired)
-        tally.judged += 1
-        tally.triggered = tally.triggered or met
-        return
     cases = choices if isinstance(choices, str) else pairing.cases(asked, choices)
     if cases == EARLY:
         tally.too_early(watched.paired)
@@ -246,7 +237,7 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
     tally.aged(asked.seconds, asked.since, watched.paired)
     verdicts = {monitor.verdict(watched, values) for values in cases}
     if len(verdicts) > 1:
-        tally.unsure("it depends on which of its inputs the answer answered")
+        tally.unsure(DEPENDS)
         return
     tally.judged += 1
     tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
@@ -259,11 +250,11 @@ def judge_answer(monitor: Monitor, asked: Asked, choices: Choices, found: list[V
         said = watched.said
         if verdict is Fault.EXCUSED:
             said += "; but an assumption does not hold"
-        event, heard = asked.event, asked.heard
-        if heard is None:
-            heard = dict.fromkeys(watched.outputs, (asked.places[0], publisher(event))) if asked.places else {}
-        wrong = monitor.violation(verdict, watched.clause.name, event, said, watched, cases[0])
-        found.append(replace(wrong, index=asked.index, heard=heard))
+        wrong = monitor.violation(verdict, watched.clause.name, asked.event, said, watched, cases[0])
+        found.append(replace(wrong, index=asked.index, heard=asked.heard))
+
+
+DEPENDS = "it depends on which of its inputs the answer answered"
 
 
 def doubtful(monitor: Monitor, watched: Watched) -> bool:
@@ -322,47 +313,3 @@ def _sent(monitor: Monitor) -> set[int]:
         counts = {(topic, count) for name, count in by_name for topic in topics_of(monitor.setup, (name,))}
     passages = monitor.timing.passages
     return {count + (passages[topic].lost if topic in passages else 0) for topic, count in counts}
-
-
-def _alike(monitor: Monitor, pairing: Pairing, asked: Asked, choices: list[list[Said]]) -> bool | None:
-    """Whether the antecedent was met, of an answer that holds whatever it answered; None where it has to be judged by
-    all its values. Answers whose values are alike, by their tokens, are judged once."""
-    known, key = asked.watched.alike, asked.tokens
-    if key is None:
-        return None
-    for one in choices:
-        if len(one) > 1 or one[0].token is None:
-            break
-        key += (one[0].token,)
-    else:
-        met = known.get(key)
-        return _held(monitor, pairing, asked, [one for (one,) in choices], key) if met is None else met
-    if pairing.answers.by != "latency" or math.prod(map(len, choices)) > COMBINATIONS:
-        return None
-    if any(said.token is None for one in choices for said in one):
-        return None
-    all_met = True
-    for some in itertools.product(*({said.token: said for said in one}.values() for one in choices)):
-        key = (*(asked.tokens or ()), *(said.token or 0 for said in some))
-        met = known.get(key)
-        met = _held(monitor, pairing, asked, list(some), key) if met is None else met
-        if met is None:
-            return None
-        all_met = all_met and met
-    return all_met
-
-
-def _held(monitor: Monitor, pairing: Pairing, asked: Asked, inputs: list[Said], key: tuple[int, ...]) -> bool | None:
-    """The same of one combination of inputs, which is remembered where it held."""
-    watched = asked.watched
-    values = pairing.known(asked)
-    for name, said in zip(asked.inputs, inputs, strict=True):
-        value = pairing.value_of(name, said)
-        if value is None:
-            return None
-        values[name] = value
-    if monitor.verdict(watched, values) != "held":
-        return None
-    if len(watched.alike) >= REMEMBERED:
-        watched.alike.clear()
-    return watched.alike.setdefault(key, watched.triggered(values))

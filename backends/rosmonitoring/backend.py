@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from avow.backend_kit.given import DURATION, READING, schema
 from avow.backend_kit.protocol import Backend, Job, JudgedRun, Limits, OutsideCheck, Report, Translated
 from avow.base.codec import document
 from avow.base.diagnostics import Diagnostic, Severity
@@ -18,7 +19,6 @@ from avow.base.verdict import Link, Object, Verdict
 from avow.ros.sources import message_files
 
 from .codes import CODES
-from .schema import SCHEMA
 
 if TYPE_CHECKING:
     from avow.formulas.values import Value
@@ -29,13 +29,19 @@ if TYPE_CHECKING:
 _TRIAL = """from rosbags.typesys import Stores, get_typestore
 get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(b"\\0\\1\\0\\0\\2\\0\\0\\0x\\0", "std_msgs/msg/String")"""
 
+_OPTIONS = json.loads(read_text(Path(__file__).with_name("options.json"), "utf-8"))
+"""The options of this backend alone; what is described and no more is a duration."""
+_OPTIONS["fresh"]["additionalProperties"] = DURATION
+_DURATIONS = {name: {**DURATION, **option} for name, option in _OPTIONS.items() if option.keys() == {"description"}}
+SCHEMA = schema({**_OPTIONS, **_DURATIONS, **READING})
+
 
 class RosMonitoringBackend(Backend):
     """See `docs/backends/rosmonitoring.md`."""
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "10"
+    version = "11"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -112,11 +118,7 @@ class RosMonitoringBackend(Backend):
         found = usable(job.system, job.node, job.method.options)
         made = translate(found, [job.clause(o) for o in job.obligations])
         stem = identifier("", job.node.name)
-        report = {
-            "node": job.node.name,
-            "not_in_rml": made.refused,
-            "not_observed": dict(found.hidden),
-        }
+        report = {"node": job.node.name, "not_in_rml": made.refused, "not_observed": dict(found.hidden)}
         return {
             f"{stem}.yaml": configuration(found, job.options),
             f"{stem}.rml": made.text,

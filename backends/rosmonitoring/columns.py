@@ -9,7 +9,6 @@ violation, and a run is summed up as if the engine had judged all of it.
 
 from __future__ import annotations
 
-import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,18 +20,18 @@ import numpy as np
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable
-from avow.formulas.values import Value
 from avow.ros.bags import ENVELOPE, LIVE, Event
 
-from .answers import asks, judges_answers_alone, speaks, sure
-from .codes_of_values import NONE, UNKNOWN, UNREADABLE, Batch, Column, Flags, Floats, Ints
+from .answers import judges_answers_alone, sure
+from .batch import NONE, UNKNOWN, UNREADABLE, Batch, Column, Flags, Floats, Ints, combinations, of_events
 from .engine import Monitor
 from .options import same_topic
-from .pace import sequence
-from .pairing import Asked, Pairing, ticks_at, time_of
+from .pace import SEQUENCE, sequence
+from .paired import Paired
+from .pairing import ticks_at, time_of
 from .rules import Previous, heard_through
 from .traces import chunks, parsed
-from .tuning import BATCH, REMEMBERED, TOPICS_KEPT
+from .tuning import REMEMBERED, TOPICS_KEPT
 from .watched import Violation, Watched
 
 Found = Iterator[tuple[int, list[Violation]]]
@@ -52,19 +51,6 @@ class _Plan:
 
 
 @dataclass(slots=True)
-class _Noted:
-    """One topic's messages in a batch, for a monitor that pairs answers with their inputs."""
-
-    keys: list[object]
-    inputs: list[tuple[str, list[Value | Event | None], list[int]]]
-    """Each input, its values and its codes."""
-    asked: list[tuple[Watched, tuple[str, ...], tuple[str, ...], list[Any], list[Any]]]
-    """Each clause, what its verdict depends on, the inputs that it is paired with, and the values and the codes."""
-    counted: list[Watched]
-    """The clauses about outputs alone whose answers count."""
-
-
-@dataclass(slots=True)
 class _Judged:
     """One clause at the rows of one topic."""
 
@@ -74,7 +60,7 @@ class _Judged:
     """How old each input is; -1 where it has not come."""
 
 
-class _Watch:
+class Watch:
     """One monitor and the columns of its variables."""
 
     def __init__(self, monitor: Monitor) -> None:
@@ -87,28 +73,38 @@ class _Watch:
             # the step before is the source's value: both have one column, and the source's clauses alone set no regions
             self._columns[name] = Column(rule, monitor.reader_of(name), () if name in sources else formulas)
             if name in sources:
-                self._columns[name].bounds = None
+                self._columns[name].regions = None
                 self._columns[name].clear()
         self._plans: dict[str, _Plan | None] = {}
-        self._truths: dict[int, dict[tuple[int, ...], tuple[bool, bool]]] = {}
+        self._truths: dict[int, dict[tuple[int, ...], tuple[bool, bool, bool]]] = {}
         self._now: dict[str, int] = {}
         """The code of each variable before the batch."""
         self._known: dict[str, tuple[Ints, Ints]] = {}
         """The rows of each variable in the batch, and its codes there."""
         self._judged: dict[tuple[str, int], _Judged] = {}
+        self.answers: Paired | None = None
+        """Those of the batch, if they are paired with their inputs."""
+        self.gap = False
+        """Whether a message of the batch does not have the number after that of the one before."""
+        if monitor.pairing is not None:
+            monitor.pairing.readers = {name: monitor.reader_of(name) for name in self._columns}
         self._clear()
 
     def _clear(self) -> None:
         for column in self._columns.values():
             column.clear()
         self._truths.clear()
-        for watched in self.monitor.about(self.monitor.clauses):
-            watched.alike.clear()
-        if self.monitor.pairing is not None:
-            self.monitor.pairing.begin({name: self.monitor.reader_of(name) for name in self._columns})
 
     def column(self, name: str) -> Column | None:
         return self._columns.get(heard_through(self._rules[name]))
+
+    def topic(self, name: str) -> str:
+        """The topic that carries a variable, without its leading slash."""
+        return same_topic(self.monitor.setup.carried[name].topic)
+
+    def known(self, name: str) -> tuple[Ints, Ints]:
+        """The rows of a variable's messages in the batch, and its codes there."""
+        return self._known.get(name, (NONE, NONE))
 
     def plan(self, topic: str) -> _Plan | None:
         if topic not in self._plans:
@@ -132,7 +128,7 @@ class _Watch:
 
     def irregular(self, batch: Batch) -> Flags:
         """The rows that the engine has to judge."""
-        monitor, wrong = self.monitor, np.zeros(len(batch.events), np.bool_)
+        monitor, wrong = self.monitor, np.zeros(len(batch.times), np.bool_)
         self._begin()
         plans: list[tuple[str, Ints, _Plan]] = []
         for topic, rows in batch.rows.items():
@@ -144,22 +140,27 @@ class _Watch:
                 self._known |= {name: (rows, np.full(len(rows), UNREADABLE)) for name in monitor.carried(topic)}
                 continue
             plans.append((topic, rows, plan))
-            events = [batch.events[row] for row in rows.tolist()]
-            wrong[rows] |= self._disordered(topic, events, batch.times[rows])
+            wrong[rows] |= self._disordered(topic, batch)
             for name in plan.names:
-                codes, fresh = self._columns[name].codes(events, self._now[name])
+                codes, fresh = self._columns[name].codes(batch, topic, self._now[name])
                 self._known[name] = rows, codes
                 wrong[rows] |= codes < 0 if fresh is None else fresh | (codes < 0)
         for topic, rows, plan in plans:
             for watched in plan.due:
-                holds, met = self._holds(watched, rows)
+                holds, met, _ = self.holds(watched, rows, {})
                 wrong[rows] |= ~holds
                 ages = {name: self._ages(name, rows, batch.times) for name in watched.inputs}
                 self._judged[topic, id(watched)] = _Judged(met, ages)
         return wrong
 
+    def pair(self, batch: Batch, wrong: Flags) -> None:
+        """Find the answers that certainly held; `wrong` gets the rows of the others."""
+        pairing = self.monitor.pairing
+        self.answers = None if pairing is None else Paired(self, pairing, batch, wrong)
+
     def _begin(self) -> None:
         monitor = self.monitor
+        self.gap = False
         if any(len(column.values) > REMEMBERED for column in self._columns.values()):
             self._clear()
         self._known.clear()
@@ -170,17 +171,25 @@ class _Watch:
                 value = None if name in monitor.supposed else monitor.values.get(name)
                 self._now[name] = UNKNOWN if value is None else column.code_of(value)
 
-    def _disordered(self, topic: str, events: Sequence[Event], times: Floats) -> Flags:
+    def _disordered(self, topic: str, batch: Batch) -> Flags:
         """Messages with the time of the one before, and with numbers that are not the next; the very first."""
         passage = self.monitor.timing.passages.get(topic)
         before = math.nan if passage is None or passage.latest is None else float(passage.latest)
+        times = batch.times[batch.rows[topic]]
         wrong: Flags = times == np.concatenate(([before], times[:-1]))
         wrong[0] |= passage is None
         last = passage.last[0] if passage is not None and passage.last else None
-        numbers = [sequence(event) if "header" in event else None for event in events]
-        if last is not None or any(number is not None for number in numbers):
-            for k, number in enumerate(numbers):
-                wrong[k] |= number is not None if last is None else number != last + 1
+        array = batch.array(topic, SEQUENCE)
+        if array is not None:
+            numbers = np.concatenate(([-2 if last is None else last], array))
+            odd: Flags = numbers[1:] != numbers[:-1] + 1
+            wrong |= odd
+            self.gap = self.gap or bool(odd[last is None :].any())
+        elif last is not None or batch.numbered(topic):
+            for k, number in enumerate(map(sequence, batch.of(batch.rows[topic]))):
+                if number is not None if last is None else number != last + 1:
+                    wrong[k] = True
+                    self.gap = self.gap or last is not None
                 last = last if number is None else number
         return wrong
 
@@ -193,44 +202,45 @@ class _Watch:
         side = "left" if isinstance(rule, Previous) else "right"
         return np.concatenate(([self._now[name]], codes))[np.searchsorted(own, rows, side)]  # type: ignore[call-overload]
 
-    def _holds(self, watched: Watched, rows: Ints) -> tuple[Flags, Flags]:
-        """At which rows a clause certainly holds, and where its antecedent is met."""
+    def holds(self, watched: Watched, rows: Ints, others: Mapping[str, Ints]) -> tuple[Flags, Flags, Flags]:
+        """At which rows a clause certainly holds, where its antecedent is met, and where it certainly does not hold.
+        `others`: codes that are not of the latest values."""
         names = [name for name in watched.names if name in self._now]
-        columns = [self.codes(name, rows) for name in names]
-        holds = np.logical_and.reduce([codes >= 0 for codes in columns])
-        met = np.zeros(len(rows), np.bool_)
-        known = np.flatnonzero(holds)
-        if not len(known):
-            return holds, met
-        columns = [codes[known] for codes in columns]
-        first, which = _combinations(columns, [len(self._column_of(name).values) for name in names])
+        columns = [others[name] if name in others else self.codes(name, rows) for name in names]
+        known: Flags = np.logical_and.reduce([codes >= 0 for codes in columns])
+        every = bool(known.all())
+        if not known.any():
+            return known, known, known
+        if not every:
+            columns = [codes[known] for codes in columns]
+        first, which = combinations(columns, [len(self._column_of(name).values) for name in names])
         truths = self._truths.setdefault(id(watched), {})
         verdicts = []
         for key in zip(*(codes[first].tolist() for codes in columns), strict=True):
             if key not in truths:
                 truths[key] = self._judge(watched, dict(zip(names, key, strict=True)))
             verdicts.append(truths[key])
-        table = np.array(verdicts, np.bool_)[which]
-        holds[known], met[known] = table[:, 0], table[:, 1]
-        return holds, met
+        holds, met, fails = (np.array(column, np.bool_)[which] for column in zip(*verdicts, strict=True))
+        return (holds, met, fails) if every else (_spread(known, holds), _spread(known, met), _spread(known, fails))
 
     def _column_of(self, name: str) -> Column:
         column = self.column(name)
         assert column is not None
         return column
 
-    def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, bool]:
-        """Whether a clause holds of values, and whether its antecedent is met (where nobody can tell, it is)."""
+    def _judge(self, watched: Watched, codes: Mapping[str, int]) -> tuple[bool, bool, bool]:
+        """Whether a clause holds of values, whether its antecedent is met (if evaluation does not tell, it is), and
+        whether it does not hold."""
         values: dict[str, Any] = {n: self.monitor.values[n] for n in watched.names if n not in codes}
         values |= {name: self._column_of(name).values[code] for name, code in codes.items()}
         try:
             holds = bool(watched.holds(values))
         except NotEvaluable:
-            return False, False
+            return False, False, False
         try:
-            return holds, watched.trigger is None or bool(watched.trigger(values))
+            return holds, watched.trigger is None or bool(watched.trigger(values)), not holds
         except NotEvaluable:
-            return holds, True
+            return holds, True, not holds
 
     def _ages(self, name: str, rows: Ints, times: Floats) -> Floats:
         own = self._known.get(name, (NONE, NONE))[0]
@@ -263,95 +273,27 @@ class _Watch:
                 tally.triggered = tally.triggered or bool(judged.met[low:high].any())
                 for name, ages in judged.ages.items():
                     tally.aging(name, float(ages[low:high].max()))
+                if monitor.pairing is not None and judges_answers_alone(monitor, watched):
+                    monitor.pairing.count(watched, ticks_at(batch.event(last[-1])), high - low)
         for row in sorted(last):
-            monitor.caught_up(batch.events[row], batch.lines[row])
+            monitor.caught_up(batch.event(row), batch.lines[row])
         if last:
             monitor.settle_previous()
+        if self.answers is not None:
+            self.answers.note(start, end)
 
-    # -- answers that are paired with their inputs -------------------------------------------------------------------
-
-    def noted(self, batch: Batch, wrong: Flags) -> Iterator[tuple[int, _Watch, _Noted, int]]:
-        """What has to be noted of each row of a paired monitor; `wrong` gets those of which the engine has to note."""
-        monitor, pairing = self.monitor, self.monitor.pairing
-        for topic, rows in batch.rows.items() if pairing is not None else ():
-            plan = self.plan(topic) if monitor.listens(topic) else None
-            if plan is None:
-                continue
-            assert pairing is not None
-            inputs = [name for name in plan.names if name in monitor.paired]
-            events = [batch.events[row] for row in rows.tolist()]
-            path = pairing.answers.input if inputs else pairing.answers.output if plan.asked else ()
-            keys = [Pairing.key(event, path) for event in events]
-            if path:
-                wrong[rows] |= np.array([key is None for key in keys])
-            if inputs and plan.asked and pairing.answers.input != pairing.answers.output:
-                wrong[rows] = True
-            noted = _Noted(keys, [], [], [w for w in plan.due if judges_answers_alone(monitor, w)])
-            for name in inputs:
-                noted.inputs.append((name, self._values(name, rows, batch), self.codes(name, rows).tolist()))
-            for watched in plan.asked:
-                own, paired = speaks(monitor, watched), asks(monitor, watched)
-                if any(name not in watched.paired and name not in pairing.seen for name in paired):
-                    wrong[rows] = True
-                for name in own:
-                    if name in self._now:
-                        wrong[rows] |= self.codes(name, rows) < 0
-                values = list(zip(*(self._values(name, rows, batch) for name in own), strict=True))
-                spoken = [name for name in own if name in watched.names and name in self._now]
-                tokens = list(zip(*(self.codes(name, rows).tolist() for name in spoken), strict=True))
-                nothing: list[Any] = [()] * len(rows)
-                noted.asked.append((watched, own, paired, values or nothing, tokens or nothing))
-            for k, row in enumerate(rows.tolist()):
-                yield row, self, noted, k
-
-    def _values(self, name: str, rows: Ints, batch: Batch) -> list[Value | Event | None]:
-        """A variable's values: where only the region of a number is known, the message that has it."""
-        column = self.column(name)
-        if column is None:
-            return [self.monitor.values.get(name)] * len(rows)
-        if column.bounds is None:
-            return [None if code < 0 else column.values[code] for code in self.codes(name, rows).tolist()]
-        own = self._known.get(name, (NONE, NONE))[0]
-        before = self.monitor.values.get(name)
-        places, sources = np.searchsorted(own, rows, "right").tolist(), own.tolist()
-        return [batch.events[sources[place - 1]] if place else before for place in places]
-
-    def note(self, batch: Batch, row: int, index: int, noted: _Noted, k: int) -> list[Violation]:
-        """Note a message as an input, as answers; what is found in answers whose inputs are now known."""
-        pairing, event, line = self.monitor.pairing, batch.events[row], batch.lines[row]
-        assert pairing is not None
-        time, seconds, key = ticks_at(event), float(batch.times[row]), noted.keys[k]
+    def settle(self, batch: Batch, row: int) -> list[Violation]:
+        """Judge the answers that need not wait any longer at a row."""
         found: list[Violation] = []
-        if pairing.waiting:
-            self.monitor.settle(time, found)
-        for name, values, codes in noted.inputs:
-            pairing.saw(name, time, seconds, key, values[k], line, codes[k])
-        for watched, own, inputs, known, tokens in noted.asked:
-            places = (line,) if watched.outputs else ()
-            asked = Asked(watched, event, index, own, known[k], inputs, time, seconds, key, None, places, tokens[k])
-            pairing.ask(asked)
-        for watched in noted.counted:
-            pairing.count(watched, time)
+        if self.monitor.pairing is not None and self.monitor.pairing.waiting:
+            self.monitor.settle(ticks_at(batch.event(row)), found)
         return sure(self.monitor, found)
 
 
-def _combinations(columns: Sequence[Ints], widths: Sequence[int]) -> tuple[Ints, Ints]:
-    """The first row of each combination of codes, and each row's combination."""
-    packed, size = columns[0], widths[0]
-    for codes, width in zip(columns[1:], widths[1:], strict=True):
-        if size * width > 2**62:
-            unique, packed = np.unique(packed, return_inverse=True)
-            size = len(unique)
-        packed, size = packed * width + codes, size * width
-    if size > 8 * len(packed) + 1024:
-        _, first, which = np.unique(packed, return_index=True, return_inverse=True)
-        return first, which
-    places = np.full(size, -1)
-    places[packed[::-1]] = np.arange(len(packed) - 1, -1, -1)
-    present = np.flatnonzero(places >= 0)
-    first = places[present]
-    places[present] = np.arange(len(present))
-    return first, places[packed]
+def _spread(where: Flags, flags: Flags) -> Flags:
+    found = np.zeros(len(where), np.bool_)
+    found[where] = flags
+    return found
 
 
 class Columns:
@@ -365,7 +307,7 @@ class Columns:
         heard: Callable[[str, int], None] = lambda topic, count: None,
     ) -> None:
         self._told, self._heard = told, heard
-        self._watches = [_Watch(monitor) for monitor in monitors]
+        self._watches = [Watch(monitor) for monitor in monitors]
         self._newest = -math.inf
         self._latest: object = None
         """The time of the latest event, as it is written."""
@@ -395,58 +337,63 @@ class Columns:
                 raise wrong
             yield self._line, []
 
-    def events(self, events: Iterable[tuple[Event, int]]) -> Found:
-        """Judge the messages of a bag, each with its size in bytes. Raises Rejected."""
-        pending = iter(events)
-        while several := [event for event, _ in itertools.islice(pending, BATCH)]:
-            yield from self._judged(several, range(self._line + 1, self._line + len(several) + 1))
-            self._line += len(several)
-            yield self._line, []
+    def batches(self, batches: Iterable[Batch]) -> Found:
+        """Judge the messages of a bag, or arrays. Raises Rejected."""
+        for batch in batches:
+            yield from self._batch(batch)
+            yield batch.lines[-1], []
 
     def _judged(self, events: Sequence[Event], lines: Sequence[int]) -> Found:
-        if self._one_by_one or len(events) < FEW:
-            for event, line in zip(events, lines, strict=True):
-                self._newest = max(self._newest, float(time_of(event)))
-                self._latest = event["time"]
-                if found := self._engine(event, line):
-                    yield line, found
+        if not self._one_by_one and len(events) >= FEW:
+            yield from self._batch(of_events(events, lines))
             return
-        batch, wrong = self._batch(events, lines)
+        for event, line in zip(events, lines, strict=True):
+            self._newest = max(self._newest, float(time_of(event)))
+            self._latest = event["time"]
+            if found := self._engine(event, line):
+                yield line, list(self._told(found))
+
+    def _batch(self, batch: Batch) -> Found:
+        newest, wrong = self._times(batch)
         for watch in self._watches:
             wrong |= watch.irregular(batch)
-        notes = sorted((note for watch in self._watches for note in watch.noted(batch, wrong)), key=_row)
+        for watch in self._watches:
+            watch.pair(batch, wrong)
+        paired = [watch.answers for watch in self._watches if watch.answers is not None]
+        while any(answers.close() for answers in paired):
+            pass
+        for answers in paired:
+            answers.settle()
         stops = np.flatnonzero(wrong).tolist()
-        start = 0
-        while start < len(events):
+        start, count = 0, len(batch.times)
+        while start < count:
             stop = bisect_left(stops, start)
-            end = stops[stop] if stop < len(stops) else len(events)
-            end = min(end, max(start, int(np.searchsorted(batch.newest, self._horizon(batch, start)))))
-            yield from self._pass(batch, start, end, notes)
-            if end < len(events) and (found := self._engine(events[end], lines[end])):
-                yield lines[end], found
-            start = end + 1
+            end = stops[stop] if stop < len(stops) else count
+            end = min(end, max(start, int(np.searchsorted(newest, self._horizon(batch, start)))))
+            due = min((answers.due(start) for answers in paired), default=end)
+            if due < end:
+                self._count(batch, start, due)
+                found = [v for watch in self._watches for v in watch.settle(batch, due)]
+                start = due
+            else:
+                self._count(batch, start, end)
+                found = self._engine(batch.event(end), batch.lines[end]) if end < count else []
+                start, due = end + 1, end
+            if found:
+                yield batch.lines[due], list(self._told(found))
 
-    def _batch(self, events: Sequence[Event], lines: Sequence[int]) -> tuple[Batch, Flags]:
-        """The events by topic, and those of which the engine has to judge the time: it goes back, or it is the same as
-        before but written otherwise; and the very first."""
-        raws = [event["time"] for event in events]
-        times = np.array(list(map(float, raws)))
+    def _times(self, batch: Batch) -> tuple[Floats, Flags]:
+        """The latest time so far, at each event, and the events of which the engine has to judge the time: it goes
+        back, or it is the same as before but written otherwise; and the very first."""
+        times, raws = batch.times, batch.raws
         newest = np.maximum.accumulate(np.concatenate(([self._newest], times)))
         wrong: Flags = times < newest[:-1]
+        batch.backwards = bool(wrong.any())
         wrong[0] |= self._latest is None
         for k in np.flatnonzero(times == newest[:-1]).tolist():
-            wrong[k] = raws[k] != (raws[k - 1] if k else self._latest)
+            wrong[k] = wrong[k] or raws[k] != (raws[k - 1] if k else self._latest)
         self._newest, self._latest = float(newest[-1]), raws[-1]
-        said = [event["topic"] for event in events]
-        written: dict[str, list[int]] = {topic: [] for topic in dict.fromkeys(said)}
-        for row, topic in enumerate(said):
-            written[topic].append(row)
-        topics: dict[str, list[int]] = {}
-        for topic, found in written.items():
-            topics.setdefault(same_topic(topic), []).extend(found)
-        rows = {topic: np.array(sorted(found), np.int64) for topic, found in topics.items()}
-        as_written = {topic: np.array(found, np.int64) for topic, found in written.items()}
-        return Batch(events, lines, times, newest[1:], as_written, rows), wrong
+        return newest[1:], wrong
 
     def _horizon(self, batch: Batch, start: int) -> float:
         """No deadline passes before this time, counted from the messages that come first."""
@@ -463,21 +410,7 @@ class Columns:
     def _engine(self, event: Event, line: int) -> list[Violation]:
         topic = event.get("topic")
         self._heard(topic if isinstance(topic, str) else "", 1)
-        found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
-        return list(self._told(found)) if found else []
-
-    def _pass(self, batch: Batch, start: int, end: int, notes: Sequence[tuple[int, _Watch, _Noted, int]]) -> Found:
-        """Take over the events of some rows, and judge the answers whose inputs they bring."""
-        some = notes[bisect_left(notes, start, key=_row) : bisect_left(notes, end, key=_row)]
-        for row, group in itertools.groupby(some, key=_row):
-            found: list[Violation] = []
-            for _, watch, noted, k in group:
-                found += watch.note(batch, row, watch.monitor.events + row - start + 1, noted, k)
-            if found:
-                self._count(batch, start, row + 1)
-                start = row + 1
-                yield batch.lines[row], list(self._told(found))
-        self._count(batch, start, end)
+        return [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
 
     def _count(self, batch: Batch, start: int, end: int) -> None:
         if start == end:
@@ -492,7 +425,3 @@ class Columns:
 
 FEW = 16
 """Events that are judged one by one at once: arrays of fewer cost more than they save."""
-
-
-def _row(note: tuple[int, _Watch, _Noted, int]) -> int:
-    return note[0]

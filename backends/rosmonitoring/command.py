@@ -27,7 +27,6 @@ from avow.system.load import load_system
 from avow.system.plan import System
 
 from .configuration import of_system
-from .coverage import coverage
 from .engine import Monitor
 from .judged import Recorder, Telling
 from .lanes import Marks, signals, timeline
@@ -35,7 +34,7 @@ from .observing import method_of
 from .options import origin
 from .session import Session, session, violation_json
 from .tuning import VIOLATIONS_SHOWN
-from .watched import Violation
+from .watched import Violation, coverage
 
 
 @click.command()
@@ -76,22 +75,10 @@ from .watched import Violation
 )
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
 def command(
-    system: str,
-    trace: str | None,
-    nodes: tuple[str, ...],
-    as_json: bool,
-    show_all: bool,
-    live: str | None,
-    seconds: float | None,
-    host: str,
-    enforce: bool,
-    record: Path | None,
-    verdicts: str | None,
-    timeline: Path | None,
-    mcap: Path | None,
-    configuration: Path | None,
-    port: int | None,
-) -> int:
+    system: str, trace: str | None, nodes: tuple[str, ...], as_json: bool, show_all: bool, live: str | None,
+    seconds: float | None, host: str, enforce: bool, record: Path | None, verdicts: str | None, timeline: Path | None,
+    mcap: Path | None, configuration: Path | None, port: int | None,
+) -> int:  # fmt: skip
     """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
 
     TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input; --live judges a graph

@@ -17,9 +17,9 @@ from avow.base.workspace import system_folder
 from avow.ros.bags import fields_of
 from avow.system.load import load_system
 
-from .numbers import exact
 from .traces import read_trace
 from .tuning import DIFFERENCES
+from .wires import exact
 
 
 @click.command()
@@ -38,15 +38,9 @@ from .tuning import DIFFERENCES
 )
 @click.option("--json", "as_json", is_flag=True, help="For machines: what was heard, published, raised, and differs.")
 def command(
-    system: str,
-    node: str,
-    trace: Path | None,
-    replay: bool,
-    messages: int,
-    output: Path | None,
-    seed: int,
+    system: str, node: str, trace: Path | None, replay: bool, messages: int, output: Path | None, seed: int,
     as_json: bool,
-) -> int:
+) -> int:  # fmt: skip
     """Run the callback class that the plan of SYSTEM (a folder, or a name under contracts/) declares as NODE, in
     virtual time and without ROS.
 

@@ -20,21 +20,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.ros.bags import LIVE, publisher
 
-from .answers import (
-    accused,
-    ask,
-    came,
-    doubtful,
-    finish,
-    judge_answer,
-    judge_part,
-    own,
-    saw,
-    scatter,
-    sure,
-    withdraw,
-)
-from .coverage import Tally
+from .answers import accused, ask, came, doubtful, finish, judge_answer, judge_part, own, saw, scatter, sure, withdraw
 from .latest import Doubts, SoFar, judge_latest, not_met, verdict_of
 from .memory import hear, overdue, soonest, watching
 from .options import Setup, same_topic
@@ -43,7 +29,7 @@ from .pairing import Asked, Choices, Pairing, Ticks, backwards, ticks, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Previous, heard_through, of_latest
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Answer, Fault, Heard, Part, Violation, Watched, shown, time_text
+from .watched import Answer, Fault, Heard, Part, Tally, Violation, Watched, shown, time_text
 from .wires import MappingError
 from .word import Message, Word, follow, word_of
 
@@ -196,10 +182,9 @@ class Monitor:
         if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
             now, before = time_of(event), self._latest
             self.backwards, self._latest = backwards(now, before, self.events), now
-        pairing = self.pairing
-        if pairing is not None and pairing.waiting:
-            self.settle(ticks(time_of(event)), found)
         self.conclude(self.read(event, place, readers, found), event, found)
+        if self.pairing is not None and self.pairing.waiting:
+            self.settle(ticks(time_of(event)), found)
         return found
 
     def read(

@@ -18,11 +18,10 @@ from avow.formulas.values import Value
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.terms import And, Compare, Term
 
-from .coverage import Tally
 from .engine import Monitor
 from .pairing import Asked, Choices, time_of
 from .tuning import TICKS
-from .watched import Answer, Fault, Part, Violation, Watched
+from .watched import Answer, Fault, Part, Tally, Violation, Watched
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,18 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from avow.backend_kit.timeline import (
-    Band,
-    Columns,
-    Lane,
-    Mark,
-    Stretch,
-    Timeline,
-    Word,
-    joined_marks,
-    joined_stretches,
-    runs,
-)
+from avow.backend_kit import timeline as pictures
 from avow.base.tuning.shown import TIMELINE_PORTS
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
@@ -49,19 +38,19 @@ _KINDS = {
 class Marks:
     """Where something was wrong: (node, clause or variable) → marks by kind, bounded however many there are."""
 
-    found: dict[tuple[str, str], dict[str, Columns[Mark]]] = field(default_factory=dict)
+    found: dict[tuple[str, str], dict[str, pictures.Columns[pictures.Mark]]] = field(default_factory=dict)
 
     def note(self, violation: Violation) -> None:
         kind, at = _KINDS[violation.fault], max(violation.index, 1)
         columns = self.found.setdefault((violation.node, violation.clause), {})
-        mark = Mark(kind, at, at, 1, violation.time)
-        columns.setdefault(kind, Columns(joined_marks)).put(at, mark)
+        mark = pictures.Mark(kind, at, at, 1, violation.time)
+        columns.setdefault(kind, pictures.Columns(pictures.joined_marks)).put(at, mark)
 
     def events(self) -> frozenset[int]:
         """Where they begin."""
         return frozenset(mark.first for kinds in self.found.values() for c in kinds.values() for mark in c.items())
 
-    def of(self, node: str, name: str) -> tuple[Mark, ...]:
+    def of(self, node: str, name: str) -> tuple[pictures.Mark, ...]:
         return tuple(mark for columns in self.found.get((node, name), {}).values() for mark in columns.items())
 
 
@@ -69,7 +58,7 @@ class Marks:
 class Signals:
     """What a trace said of some variables, (node, variable) → its stretches."""
 
-    found: Mapping[tuple[str, str], tuple[Stretch, ...]]
+    found: Mapping[tuple[str, str], tuple[pictures.Stretch, ...]]
     start: str
     end: str
     every: int
@@ -85,7 +74,7 @@ def signals(
     for setup in setups:
         for name, rule in setup.carried.items():
             readers.setdefault(same_topic(rule.topic), []).append((setup, name, rule.variable.sort, reader(rule)))
-    found: dict[tuple[str, str], Columns[Stretch]] = {}
+    found: dict[tuple[str, str], pictures.Columns[pictures.Stretch]] = {}
     start = end = ""
     marked = marks.events()
     for recorded in read_trace(path, where, listens, lambda index: _chosen(index, every) or index in marked):
@@ -101,15 +90,15 @@ def signals(
                 said = _said(read(recorded.event, None), sort, index)
             except MappingError:
                 continue  # it has a mark
-            columns = found.setdefault((setup.node.name, name), Columns(joined_stretches))
+            columns = found.setdefault((setup.node.name, name), pictures.Columns(pictures.joined_stretches))
             columns.put(index, said)
-    return Signals({key: runs(each.items()) for key, each in found.items()}, start, end, every)
+    return Signals({key: pictures.runs(each.items()) for key, each in found.items()}, start, end, every)
 
 
 def timeline(
     name: str, events: int, heard: Signals, marks: Marks, clauses: Sequence[tuple[Setup, Clause]],
     named: Callable[[str, str], str],
-) -> Timeline:  # fmt: skip
+) -> pictures.Timeline:  # fmt: skip
     """A lane for each of the clauses, for each assumption that was broken, and for each variable that they speak of."""
     wanted = {(setup.node.name, clause.name) for setup, clause in clauses}
     spoken = {
@@ -129,17 +118,17 @@ def timeline(
     ]
     ports = [key for key in spoken_of if marks.of(*key)]
     ports += [key for key in spoken_of if key not in ports][: max(0, TIMELINE_PORTS - len(ports))]
-    lanes = [Lane(named(*key), (), marks.of(*key)) for key in told]
-    lanes += [Lane(named(*key), heard.found.get(key, ()), marks.of(*key)) for key in spoken_of if key in ports]
-    return Timeline(name, max(events, 1), heard.start, heard.end, tuple(lanes), heard.every)
+    lanes = [pictures.Lane(named(*key), (), marks.of(*key)) for key in told]
+    lanes += [pictures.Lane(named(*key), heard.found.get(key, ()), marks.of(*key)) for key in spoken_of if key in ports]
+    return pictures.Timeline(name, max(events, 1), heard.start, heard.end, tuple(lanes), heard.every)
 
 
-def _said(value: Value, sort: Sort, at: int) -> Stretch:
+def _said(value: Value, sort: Sort, at: int) -> pictures.Stretch:
     if isinstance(sort, RealSort | IntegerSort | NaturalSort):
         number = as_float(value)  # type: ignore[arg-type]
-        return Band(at, at, number, number)
+        return pictures.Band(at, at, number, number)
     text = show(value)
-    return Word(at, at, text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…")
+    return pictures.Word(at, at, text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…")
 
 
 def _chosen(index: int, every: int) -> bool:

@@ -203,9 +203,9 @@ class Doubts:
                 return False
             watched.tally.unsure(REMEMBERS)
             return True
-        own = tuple(n for n in spoken if n not in inputs and n in values)
-        now, heard, known = time_of(event), monitor.heard_of(watched.names), tuple(values[n] for n in own)
-        asked = Asked(watched, event, monitor.events, own, known, inputs, ticks(now), float(now), None, heard, ())
+        known = {n: values[n] for n in spoken if n not in inputs and n in values}
+        now, heard = time_of(event), monitor.heard_of(watched.names)
+        asked = Asked(watched, event, monitor.events, known, inputs, ticks(now), float(now), None, heard, ())
         asked.needless = frozenset(inputs).difference(watched.names)
         self.pairing.ask(asked)
         return True

@@ -1,8 +1,7 @@
 """What a clause that speaks of other steps remembers while it is monitored: the cells of `avow.formulas.temporal`.
 
-A step is a judgement of the clause. Where one went by unseen (a message was lost, could not be read, or an answer never
-was whole), all that is remembered is unknown from then on, until the steps that follow say it anew: what depends on it
-is not decided, and never held. Of a clause with limits in seconds, also when silence breaks it between its steps.
+A step is a judgement of the clause. After one that went by unseen (a message was lost or unreadable, an answer was not
+whole), what is remembered is unknown until later steps determine it. Limits in seconds are judged between steps too.
 """
 
 from __future__ import annotations
@@ -30,12 +29,11 @@ from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.subterms import histories, subterms, timed
 from avow.language.terms import Apply, History, Implies, Literal, Past, Quantified, Role, Term, Variable
 
-from .coverage import Tally
 from .options import Setup
 from .pace import Leeway
 from .pairing import time_of
 from .rules import Previous
-from .watched import Watched, trigger_of
+from .watched import Tally, Watched, trigger_of
 from .word import untold
 
 

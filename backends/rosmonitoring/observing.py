@@ -19,8 +19,7 @@ from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message,
 from avow.system.graph import dataflow
 from avow.system.plan import Endpoint, Located, Plan, System, Table
 
-from .fitting import SOURCES, Undecided, decide, words
-from .reading import shown
+from .reading import SOURCES, Undecided, decide, shown, words
 from .rules import NOTHING_KNOWN, Argument, Choice, FieldPath, Fields, Gap, Hold, Lookup, Rule, Take
 from .wires import MappingError, converter, fits, parts_of
 

@@ -26,31 +26,13 @@ from avow.system.graph import dataflow
 from avow.system.plan import Edge, Located, System
 
 from . import observing
-from .fitting import Undecided
-from .numbers import whole
-from .observing import (
-    Observed,
-    Wrong,
-    check_keys,
-    literal,
-    mapping_of,
-    method_of,
-    named_table,
-    observe,
-    published,
-    recordings,
-    said,
-    show_entry,
-    sources,
-    written_out,
-)
 from .pace import NO_TIME, RATE, By, Leeway, Rate, duration
 from .pairing import Answers
-from .reading import from_text, shown
+from .reading import Undecided, from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, FieldPath, Fields, Previous, Rule, otherwise, told_only
 from .traces import carried
 from .tuning import DECIDED_SHARE
-from .wires import MappingError, parts_of, table_of
+from .wires import MappingError, parts_of, table_of, whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,26 +113,14 @@ def setup(
     for name, told in told_only(work.rules, work.mapping()):
         work.fault(f"it is read from the message that gives {told}", name, hint="name what the node publishes")
     filtered = work.filtered()
-    data = said(options)
+    data = observing.said(options)
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
-        node,
-        work.rules,
-        work.hidden,
-        str(data.get("when", "outputs")),
-        known,
-        work.answers(data.get("answers")),
-        float(data.get("decided", DECIDED_SHARE)),
-        named,
-        work.fresh(data.get("fresh")),
-        work.rates(data.get("rate")),
-        work.duration("max_age", data["max_age"]) if "max_age" in data else None,
-        data.get("losses"),
-        filtered,
-        work.leeway(data),
-        By(str(data.get("time", By.RECEIPT))),
-        work.shared,
-    )
+        node, work.rules, work.hidden, str(data.get("when", "outputs")), known, work.answers(data.get("answers")),
+        float(data.get("decided", DECIDED_SHARE)), named, work.fresh(data.get("fresh")), work.rates(data.get("rate")),
+        work.duration("max_age", data["max_age"]) if "max_age" in data else None, data.get("losses"), filtered,
+        work.leeway(data), By(str(data.get("time", By.RECEIPT))), work.shared,
+    )  # fmt: skip
     return made, tuple(work.faults)
 
 
@@ -182,7 +152,7 @@ def known_types(system: System, traces: Iterable[Path]) -> tuple[Definitions, tu
 
 def _traces_of(system: System, options: Located | None) -> tuple[Path, ...]:
     """The traces that a method names and that are there."""
-    paths = (inside(system.plan.root, name) for name in recordings(options))
+    paths = (inside(system.plan.root, name) for name in observing.recordings(options))
     return tuple(path for path in paths if path is not None and path.exists())
 
 
@@ -214,7 +184,7 @@ class _Work:
     faults: list[Diagnostic] = field(default_factory=list)
 
     def mapping(self) -> Mapping[str, Any]:
-        return mapping_of(self.options)
+        return observing.mapping_of(self.options)
 
     def unknown_names(self) -> None:
         known = {p.variable.qualified for p in (*self.node.inputs, *self.node.outputs)}
@@ -270,7 +240,7 @@ class _Work:
 
     def filtered(self) -> frozenset[str]:
         """The topics of the outputs that are filtered: messages have to carry these."""
-        names = said(self.options).get("filter", ())
+        names = observing.said(self.options).get("filter", ())
         outputs = {n: r for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)}
         for at, name in enumerate(names):
             if name not in outputs:
@@ -300,7 +270,7 @@ class _Work:
         name = port.variable.qualified
         try:
             found = self.rule(port)
-        except Wrong as error:
+        except observing.Wrong as error:
             self.fault(str(error), name, *error.path, hint=error.hint)
             self.hidden[name] = str(error)
             return
@@ -312,15 +282,17 @@ class _Work:
 
     def as_published(self, name: str, rule: Rule) -> None:
         """A link says that both ends have one value: they are read in one way."""
-        for source in sources(self.system, self.node, name.partition(".")[2]) if name in self.mapping() else ():
+        for source in (
+            observing.sources(self.system, self.node, name.partition(".")[2]) if name in self.mapping() else ()
+        ):
             node = self.system.contract.node(source.node)
-            other = _Work(self.system, node, method_of(self.system, node.name), self.known)
+            other = _Work(self.system, node, observing.method_of(self.system, node.name), self.known)
             if source.node == self.node.name or (entry := other.mapping().get(f"out.{source.port}")) is None:
                 continue
             other.port(node.output(source.port))
             rule_there = other.rules.get(f"out.{source.port}")
             if rule_there is not None and otherwise(rule, rule_there):
-                text = f"{source}, to which it is linked, is read otherwise, as {show_entry(entry)}"
+                text = f"{source}, to which it is linked, is read otherwise, as {observing.show_entry(entry)}"
                 hint = "leave it out: an input is read as what it is linked to; or give the two ports different names"
                 self.fault(text, name, hint=hint)
 
@@ -342,7 +314,7 @@ class _Work:
         name = port.variable.qualified
         entry = self.mapping().get(name)
         if isinstance(entry, Mapping) and not entry.keys() & {"scenario", "previous", "constructor"}:
-            check_keys(entry, port.sort)
+            observing.check_keys(entry, port.sort)
         topic, kind = self.topic(self.node, port)
         edge = self.edge(port)
         if isinstance(entry, Mapping) and entry.get("scenario"):
@@ -359,7 +331,7 @@ class _Work:
             if topic is None:
                 topic, kind = self.topic(source, source.output(edge.source.port))
             if entry is None:
-                entry = published(self.system, self.node, port.name)
+                entry = observing.published(self.system, self.node, port.name)
         if isinstance(entry, Mapping):
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
@@ -370,12 +342,13 @@ class _Work:
         return self.observed(port, topic, kind, entry)
 
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:
-        entry = written_out(entry)
+        entry = observing.written_out(entry)
         try:
-            return observe(Observed(self.system.plan, port, topic, self.message(kind, entry), self.known), entry)
+            about = observing.Observed(self.system.plan, port, topic, self.message(kind, entry), self.known)
+            return observing.observe(about, entry)
         except Undecided as undecided:
             if self.asked(port):
-                raise Wrong(str(undecided), hint=undecided.hint or _FIELD_HINT) from None
+                raise observing.Wrong(str(undecided), hint=undecided.hint or _FIELD_HINT) from None
             return str(undecided)
 
     def topic(self, node: Node, port: Port) -> tuple[str | None, str | None]:
@@ -399,21 +372,21 @@ class _Work:
     def scenario(self, port: Port) -> Rule:
         found = self.interpretation(port)
         if found is None or not isinstance(port.sort, FunctionSort):
-            raise Wrong("the plan's scenario does not interpret it", "scenario")
-        table, columns = named_table(self.system.plan, found[0], "scenario"), found[1]
+            raise observing.Wrong("the plan's scenario does not interpret it", "scenario")
+        table, columns = observing.named_table(self.system.plan, found[0], "scenario"), found[1]
         entry = self.mapping().get(port.variable.qualified)
         elsewhere: Value = False
         if port.sort.result != BOOL:
             if not isinstance(entry, Mapping) or "elsewhere" not in entry:
-                raise Wrong("a total function needs its value `elsewhere`", "scenario")
-            elsewhere = literal(entry["elsewhere"], port.sort.result, "elsewhere")
+                raise observing.Wrong("a total function needs its value `elsewhere`", "scenario")
+            elsewhere = observing.literal(entry["elsewhere"], port.sort.result, "elsewhere")
         at = [table.columns.index(c) for c in columns]
         wires = self.wires(port, entry) or [None] * len(at)
         parts = list(zip(at, parts_of(port.sort), wires, strict=True))
         try:
             points = [tuple(from_text(row[k], sort, wire) for k, sort, wire in parts) for row in table.rows]
         except MappingError as error:
-            raise Wrong(f"table {table.name}: {error}", "scenario") from None
+            raise observing.Wrong(f"table {table.name}: {error}", "scenario") from None
         return Constant(port.variable, FunctionValue(table_of(points, port.sort), elsewhere))
 
     def wires(self, port: Port, entry: Any) -> tuple[Wire | None, ...]:
@@ -431,11 +404,13 @@ class _Work:
         name = source.removeprefix("out.")
         known = {p.name: p for p in self.node.outputs}
         if name not in known:
-            raise Wrong(f"there is no output {source!r}", "previous", hint=suggest(name, known))
+            raise observing.Wrong(f"there is no output {source!r}", "previous", hint=suggest(name, known))
         if known[name].sort != port.sort:
-            raise Wrong(f"{source} is of another type", "previous")
+            raise observing.Wrong(f"{source} is of another type", "previous")
         edge = self.edge(port)
-        initial = literal(entry["initial"], port.sort, "initial") if entry.get("initial") is not None else None
+        initial = (
+            observing.literal(entry["initial"], port.sort, "initial") if entry.get("initial") is not None else None
+        )
         if initial is None and edge is not None and edge.delayed:
             initial = self.first(port, edge)
         return Previous(port.variable, f"out.{name}", initial)

@@ -154,7 +154,7 @@ SEQUENCE = ("header", "seq")
 def sequence(event: Event) -> int | None:
     """A message's number among its publisher's."""
     header = event.get("header")
-    number = header.get("seq") if isinstance(header, Mapping) else None
+    number = header.get("seq") if header.__class__ is dict else None
     return number if number.__class__ is int else None
 
 

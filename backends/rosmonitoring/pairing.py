@@ -23,11 +23,10 @@ from typing import TYPE_CHECKING, Any
 from avow.formulas.values import Value, show
 from avow.ros.bags import ENVELOPE
 
-from .numbers import NotANumber, exact
 from .reading import Reader, at
 from .rules import FieldPath
 from .tuning import COMBINATIONS, KEYS_KEPT, LATEST_TIME, TICKS
-from .wires import MappingError, seconds
+from .wires import MappingError, NotANumber, exact, seconds
 
 if TYPE_CHECKING:
     from .watched import Heard, Watched
@@ -73,20 +72,17 @@ class Asked:
     watched: Watched
     event: Mapping[str, Any]
     index: int
-    own: tuple[str, ...]
-    """What its verdict depends on, but for the inputs; and what that then was: a value, or the event that has it."""
-    values: tuple[Value | Mapping[str, Any], ...]
+    known: Mapping[str, Value]
+    """What its verdict depends on, but for the inputs."""
     inputs: tuple[str, ...]
     time: Ticks
     seconds: float
     """The same, in binary."""
     key: object
-    heard: Heard | None
-    """The messages that make the answer; None: all are this event's."""
+    heard: Heard
+    """The messages that make the answer."""
     places: tuple[int, ...]
     """Their places in the trace."""
-    tokens: tuple[int, ...] | None = None
-    """What stands for those of `values` that the clause speaks of (a code of `columns`)."""
     since: dict[str, float] = field(default_factory=dict)
     """When the oldest message came that each input's value may be of."""
     messages: dict[str, tuple[int, ...]] = field(default_factory=dict)
@@ -96,19 +92,19 @@ class Asked:
     cannot be read."""
     unsaid: set[str] = field(default_factory=set)
     """Those of them that may have said nothing yet."""
+    number: int = 0
+    """Among all that were asked."""
 
 
 @dataclass(slots=True, eq=False)
 class Said:
-    """One message of an input. `value` None: it could not be read; an event: it was not read yet. `token` stands for
-    it, where one is known."""
+    """One message of an input. `value` None: it could not be read; an event: it was not read yet."""
 
     time: Ticks
     seconds: float
     key: object
     value: Value | Mapping[str, Any] | None
     place: int
-    token: int | None
     used: bool = False
     """An answer was held against it, as the only one of its key."""
 
@@ -152,7 +148,10 @@ class Pairing:
 
     answers: Answers
     seen: dict[str, _Seen] = field(default_factory=dict)
-    waiting: deque[Asked] = field(default_factory=deque)
+    waiting: dict[int, Asked] = field(default_factory=dict)
+    """By their numbers."""
+    asked: int = 0
+    """How many answers have been asked about."""
     counts: dict[int, _Count] = field(default_factory=dict)
     """By the clause."""
     answered: OrderedDict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=OrderedDict)
@@ -165,63 +164,64 @@ class Pairing:
     """Why it is no evidence: one came."""
     lost: bool = False
     """By order: a message was lost, as its topic's numbers say."""
-    _latency: Ticks = field(init=False)
-    _jitter: Ticks = field(init=False)
+    latency: Ticks = field(init=False)
+    jitter: Ticks = field(init=False)
+    _awaited: dict[object, list[Asked]] = field(default_factory=dict)
+    """The answers that wait for a key."""
+    _touched: list[object] = field(default_factory=list)
+    """The keys of what came since answers were last judged."""
 
     def __post_init__(self) -> None:
-        self._latency, self._jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
+        self.latency, self.jitter = ticks(self.answers.latency), ticks(self.answers.jitter)
 
-    def begin(self, readers: Mapping[str, Reader]) -> None:
-        """Events will be kept, and tokens mean what they mean from now on."""
-        self.readers = readers
-        for asked in self.waiting:
-            asked.tokens = None
-        for said in (said for seen in self.seen.values() for said in seen.messages):
-            said.token = None
-
-    def saw(
-        self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None,
-        place: int,
-        token: int | None = None,
-    ) -> None:  # fmt: skip
-        """A message of an input, which stands at a place of the trace."""
+    def passed_over(self, name: str, count: int) -> _Seen:
+        """So many messages of an input came that no answer can be held against any more."""
         known = self.seen.get(name)
         if known is None:
             known = self.seen[name] = _Seen()
-        known.count += 1
+        known.count += count
+        return known
+
+    def saw(
+        self, name: str, time: Ticks, seconds: float, key: object, value: Value | Mapping[str, Any] | None, place: int
+    ) -> Said:
+        """A message of an input, which stands at a place of the trace."""
+        known = self.passed_over(name, 1)
         if self.answers.by != "latency":
-            said = Said(time, seconds, known.count if self.answers.by == "order" else key, value, place, token)
+            said = Said(time, seconds, known.count if self.answers.by == "order" else key, value, place)
+            self._touched.append(said.key)
             if any(one.used and self._differ(name, one, said) for one in known.by_key.get(said.key, ())):
                 self.late = self.late or f"a message of {name} bears the key of one that was answered before"
             known.keep(said)
-            return
+            return said
         if self.settled is not None and time <= self.settled:
             self.late = self.late or (
                 f"a message of {name} has the time {show(Fraction(time) / TICKS)}, and comes after answers up to then "
                 "were judged: by latency, a trace has to be in the order of time"
             )
-        messages, said = known.messages, Said(time, seconds, None, value, place, token)
+        messages, said = known.messages, Said(time, seconds, None, value, place)
         if messages and messages[-1].time > time:
             insort(messages, said, key=_time)
         else:
             messages.append(said)
         # what is older than any window that is still open, but for the last of it, can no longer be asked for
-        first = self.waiting[0].time if self.waiting else messages[-1].time
-        since = first - self._latency - 2 * self._jitter
+        first = next(iter(self.waiting.values()), messages[-1]).time
+        since = first - self.latency - 2 * self.jitter
         while len(messages) > 1 and messages[1].time <= since:
             messages.popleft()
+        return said
 
     def _differ(self, name: str, one: Said, other: Said) -> bool:
         """Whether two messages have other values (one that cannot be read: any)."""
         values = self.value_of(name, one), self.value_of(name, other)
         return None in values or values[0] != values[1]
 
-    def count(self, watched: Watched, time: Ticks) -> _Count:
-        """An answer has come, which need not wait: it counts among the others all the same."""
+    def count(self, watched: Watched, time: Ticks, several: int = 1) -> _Count:
+        """Answers have come, which need not wait: they count among the others all the same."""
         found = self.counts.get(id(watched))
         if found is None:
             found = self.counts[id(watched)] = _Count()
-        found.count += 1
+        found.count += several
         found.time = time
         return found
 
@@ -231,11 +231,15 @@ class Pairing:
         counted.inputs = asked.inputs
         if self.answers.by == "order" and asked.key is None:  # of one whose parts came apart, it says which it is
             asked.key = counted.count
-        self.waiting.append(asked)
+        self.asked += 1
+        asked.number = self.asked
+        self.waiting[asked.number] = asked
+        self._awaited.setdefault(asked.key, []).append(asked)
+        self._touched.append(asked.key)
 
     def waits(self, event: int) -> bool:
         """Whether an answer of this event or an earlier one is not judged yet."""
-        return any(asked.index <= event for asked in self.waiting)
+        return any(asked.index <= event for asked in self.waiting.values())
 
     def uneven(self) -> str:
         """Why the answers need not be paired rightly; empty where they are. By order, what came after the last answer
@@ -256,11 +260,14 @@ class Pairing:
     def ready(self, now: Ticks | None) -> Iterator[tuple[Asked, Choices]]:
         """The answers whose inputs are known by a time (None: the run is over), each with the messages of each input
         that it may have answered, or why there are none."""
-        waiting, latency = self.waiting, self.answers.by == "latency"
-        while waiting and (now is None or self._passed(waiting[0], now)):
-            asked = waiting.popleft()
+        latency = self.answers.by == "latency"
+        for asked in self._whole(now):
+            del self.waiting[asked.number]
+            self._awaited[asked.key].remove(asked)
+            if not self._awaited[asked.key]:
+                del self._awaited[asked.key]
             if latency:
-                self.settled = max(self.settled or 0, asked.time + self._jitter)
+                self.settled = max(self.settled or 0, asked.time + self.jitter)
             found: Choices = []
             for name in asked.inputs:
                 one = self._current(name, asked) if latency else self._same_key(name, asked)
@@ -269,10 +276,31 @@ class Pairing:
                     break
                 found.append(one)  # type: ignore[union-attr]
             for place in asked.places:
-                self.answered[place] = asked.messages
-            while len(self.answered) > KEYS_KEPT:
-                self.answered.popitem(last=False)
+                self.answer(place, asked.messages)
             yield asked, found
+
+    def answer(self, place: int, messages: Mapping[str, tuple[int, ...]]) -> None:
+        """An answer's message was held against these messages of inputs."""
+        self.answered[place] = {**self.answered.get(place, {}), **messages}
+        if len(self.answered) > KEYS_KEPT:
+            self.answered.popitem(last=False)
+
+    def _whole(self, now: Ticks | None) -> Iterator[Asked]:
+        """The answers of which nothing more is awaited, in the order in which they came."""
+        waiting, touched = self.waiting, {*self._touched}
+        self._touched.clear()
+        if now is None:
+            return iter([*waiting.values()])
+        if self.answers.by == "latency":
+            return iter([*itertools.takewhile(lambda asked: now > asked.time + self.jitter, waiting.values())])
+        late = itertools.takewhile(lambda asked: asked.number <= self.asked - KEYS_KEPT, waiting.values())
+        whole = [asked for key in touched for asked in self._awaited.get(key, ()) if self._known(asked)]
+        return iter(sorted({asked.number: asked for asked in (*late, *whole)}.values(), key=_number))
+
+    def _known(self, asked: Asked) -> bool:
+        """Whether all that an answer is held against has come."""
+        inputs = () if asked.key is None else asked.inputs
+        return all(name in self.seen and asked.key in self.seen[name].by_key for name in inputs)
 
     def cases(self, asked: Asked, choices: list[list[Said]]) -> list[dict[str, Value]] | str:
         """The combinations of values that an answer may have answered, or why there are none."""
@@ -290,32 +318,17 @@ class Pairing:
             distinct.append(values)
         if (count := math.prod(map(len, distinct))) > COMBINATIONS:
             return f"{count} combinations of inputs may have been answered"
-        known, some = self.known(asked), itertools.product(*distinct)
-        pairs = (zip(asked.inputs, values, strict=True) for values in some)
-        return [{**known, **{name: value for name, value in one if value is not None}} for one in pairs]
-
-    def known(self, asked: Asked) -> dict[str, Value]:
-        """What an answer's verdict depends on, but for the inputs."""
-        pairs = zip(asked.own, asked.values, strict=True)
-        return {n: self.readers[n](value, None) if isinstance(value, Mapping) else value for n, value in pairs}
+        pairs = (zip(asked.inputs, values, strict=True) for values in itertools.product(*distinct))
+        return [{**asked.known, **{name: value for name, value in one if value is not None}} for one in pairs]
 
     def value_of(self, name: str, said: Said) -> Value | None:
         if isinstance(said.value, Mapping):
             said.value = self.readers[name](said.value, None)
         return said.value
 
-    def _passed(self, asked: Asked, now: Ticks) -> bool:
-        if self.answers.by == "latency":
-            return now > asked.time + self._jitter
-        for name in asked.inputs:
-            known = self.seen.get(name)
-            if known is None or asked.key not in known.by_key:
-                return len(self.waiting) > KEYS_KEPT
-        return True
-
     def _current(self, name: str, asked: Asked) -> list[Said] | str:
-        start = asked.time - self._latency - self._jitter
-        end = asked.time + self._jitter
+        start = asked.time - self.latency - self.jitter
+        end = asked.time + self.jitter
         current: list[Said] = []
         before = False
         for said in self.seen[name].messages if name in self.seen else ():
@@ -364,19 +377,19 @@ class Pairing:
             raw = event
         try:
             raw = at(event, path) if raw is event else raw
-            if isinstance(raw, Mapping):
+            if raw.__class__ is dict:
                 return _stamp(raw), "s"
         except MappingError:
             return None
         return raw.decode() if isinstance(raw, bytes) else str(raw) if isinstance(raw, list) else raw
 
 
-def _stamp(raw: Mapping[str, Any]) -> Ticks:
-    """As `ticks` of `seconds`, and faster for whole numbers."""
+def _stamp(raw: Mapping[str, Any]) -> int | Fraction:
+    """A time in nanoseconds."""
     second, rest = raw.get("sec", raw.get("secs")), raw.get("nanosec", raw.get("nsecs"))
     if second.__class__ is int and rest.__class__ is int and len(raw) == 2:
-        return int(second) * TICKS + int(rest) * (TICKS // 10**9)
-    return ticks(seconds(raw))
+        return int(second) * 10**9 + int(rest)
+    return seconds(raw) * 10**9
 
 
 def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:
@@ -391,7 +404,7 @@ def backwards(now: Fraction, latest: Fraction | None, number: int) -> str:
 
 EARLY = "before the first input"
 
-_time = attrgetter("time")
+_time, _number = attrgetter("time"), attrgetter("number")
 
 
 def time_of(event: Mapping[str, Any]) -> Fraction:

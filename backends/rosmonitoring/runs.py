@@ -24,7 +24,6 @@ from avow.language.terms import Role
 from avow.ros.bags import digest_trace
 from avow.system.graph import dataflow
 
-from .coverage import Tally
 from .engine import Monitor
 from .lanes import signals, timeline
 from .memory import unmonitored
@@ -37,7 +36,7 @@ from .session import Session
 from .told import readable
 from .traces import Recorded, read_trace
 from .verdicts import Run, Shown, outcome
-from .watched import Fault, Violation
+from .watched import Fault, Tally, Violation
 
 
 def discharge(job: Job, traces: Mapping[str, str], limits: Limits) -> Report:
@@ -245,13 +244,6 @@ def _judged(monitor: Monitor, name: str, seen: Iterable[Violation], unsaid: str)
         why = first.explanation if first.fault is Fault.GUARANTEE else f"{first.clause}: {first.explanation}"
         shown = Counterexample(about, why)
     lost = tally.order + tally.partial + tally.forgotten + tally.nameless
-    return Judged(
-        tally.decided - tally.broken,
-        tally.broken - tally.excused,
-        tally.excused,
-        tally.undecided + lost,
-        tally.triggered,
-        shown,
-        first.index if first is not None else 0,
-        unsaid or tally.reason,
-    )
+    event, reason = first.index if first is not None else 0, unsaid or tally.reason
+    held, broken, undecided = tally.decided - tally.broken, tally.broken - tally.excused, tally.undecided + lost
+    return Judged(held, broken, tally.excused, undecided, tally.triggered, shown, event, reason)

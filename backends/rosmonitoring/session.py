@@ -5,26 +5,81 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.suggestions import suggest
+from avow.formulas.formula import free_variables
 from avow.language.contract import ClauseKind
-from avow.ros.bags import is_bag
+from avow.language.terms import Role
+from avow.ros.bags import is_bag, recorded
 from avow.ros.definitions import Definitions
 from avow.system.plan import System
 
+from .batch import of_arrays, of_messages
 from .blame import Blame
 from .columns import Columns
-from .coverage import Tally, remedies
-from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
 from .observing import NAME, method_of
 from .options import Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
 from .told import readable
-from .traces import messages
-from .watched import Fault, Violation
+from .traces import opened
+from .watched import Fault, Tally, Violation, remedies
+
+if TYPE_CHECKING:
+    from .engine import Monitor
+
+
+RAW = "_mon"
+"""Behind the name of a topic that is filtered: what its node says."""
+
+WITHHELD = (Fault.GUARANTEE, Fault.EXCUSED, Fault.MAPPING)
+"""What keeps a message from being passed on; an assumption that is broken, or a silence, is not its fault."""
+
+
+def raw(topic: str) -> str:
+    return f"{topic}{RAW}"
+
+
+def filtered(setups: Iterable[Setup]) -> frozenset[str]:
+    """The topics that are filtered. Raises Rejected where the plan names none, and where a guarantee of what is
+    filtered is not judged by a message of that topic alone, as it comes."""
+    wrong: list[Diagnostic] = []
+    found: set[str] = set()
+    for one in setups:
+        if not one.filtered:
+            continue
+        found |= one.filtered
+        name = one.node.name
+        if one.answers is not None and one.answers.by != "arrival":
+            hint = "answers: {by: arrival, because: …}"
+            wrong.append(Diagnostic("MON307", f"{name}: which input an answer answered shows only later", hint=hint))
+        for clause in one.node.guarantees:
+            outputs = {v.qualified for v in free_variables(clause.formula) if v.role is Role.OUTPUT}
+            topics = {same_topic(rule.topic) for name, rule in one.carried.items() if name in outputs}
+            if topics & one.filtered and len(topics) > 1:
+                text = f"{name}.{clause.name} speaks of several topics, {' and '.join(sorted(topics))}"
+                hint = "the first of them would be passed on before it can be judged"
+                wrong.append(Diagnostic("MON307", text, hint=hint))
+    if not found:
+        wrong.append(Diagnostic("MON307", "the plan filters nothing", hint="rosmonitoring: {filter: [out.command]}"))
+    if wrong:
+        raise Rejected(*wrong)
+    return frozenset(found)
+
+
+def told_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:
+    """A record behind a filter holds what its node said, and what was passed on. Where that is less, the guarantees
+    were met by the filter, and it is no evidence of the node."""
+    for monitor in monitors:
+        for topic in sorted(monitor.setup.filtered):
+            said, passed = counts.get(raw(topic), 0), counts.get(topic, 0)
+            if said > passed:
+                reason = f"{said - passed} of {said} messages of {topic} were withheld by a filter"
+                monitor.backwards = monitor.backwards or reason
 
 
 @dataclass(slots=True)
@@ -97,10 +152,18 @@ class Session:
     def judged(self, path: Path) -> Iterator[tuple[int, list[Violation]]]:
         """As `run`: lines, and what was found there; often nothing, so that whoever waits can look at the clock."""
         columns = Columns(self.monitors, self.told, self.heard)
-        if not is_bag(path):
-            return self._whole(columns.run(path))
-        events = columns.events(messages(path, origin(self.system), self.listens))
-        return self._whole((0, found) for _, found in events)
+        return self._whole(self._of_bag(path, columns) if is_bag(path) else columns.run(path))
+
+    def _of_bag(self, path: Path, columns: Columns) -> Iterator[tuple[int, list[Violation]]]:
+        with opened():
+            batches = of_messages(recorded(path, origin(self.system), self.listens))
+            yield from ((0, found) for _, found in columns.batches(batches))
+
+    def arrays(self, topics: Mapping[str, Mapping[str, npt.NDArray[Any]]]) -> Iterator[tuple[int, Violation]]:
+        """As `run`, of arrays: topic → field (`time` in seconds, `data`, `pose.x`) → a number for each message. The
+        number of the event takes the line's place."""
+        batches = Columns(self.monitors, self.told, self.heard).batches(of_arrays(topics))
+        return ((line, violation) for line, found in self._whole(batches) for violation in found)
 
     def read(self, read: Callable[[int], bytes]) -> Iterator[tuple[int, Violation]]:
         """As `run`, of lines of standard input as they come, as `Columns.lines`. Raises Rejected, OSError."""
@@ -178,21 +241,7 @@ class Session:
                 {
                     "name": clause.name,
                     "kind": str(clause.kind),
-                    "judged": tally.judged,
-                    "broken": tally.broken,
-                    "excused": tally.excused,
-                    "overdue": tally.overdue,
-                    "undecided": tally.undecided,
-                    "published": tally.published,
-                    "decided": tally.decided,
-                    "undecided_order": tally.order,
-                    "before_first": tally.early,
-                    "unreadable": tally.unreadable,
-                    "incomplete": tally.partial,
-                    "nameless": tally.nameless,
-                    "by_initial_value": tally.supposed,
-                    "after_unseen": tally.forgotten,
-                    "open_at_end": tally.open,
+                    **{name: getattr(tally, counted) for name, counted in _COUNTED.items()},
                     "oldest": {of: round(age, 6) for of, age in tally.ages.items()},
                     "paired": not tally.unpaired,
                     "antecedent_met": tally.triggered,
@@ -221,16 +270,21 @@ class Session:
         }
 
 
+_COUNTED = {
+    **{name: name for name in ("judged", "broken", "excused", "overdue", "undecided", "published", "decided")},
+    "undecided_order": "order", "before_first": "early", "unreadable": "unreadable", "incomplete": "partial",
+    "nameless": "nameless", "by_initial_value": "supposed", "after_unseen": "forgotten", "open_at_end": "open",
+}  # fmt: skip
+"""What a summary calls a count, and what a tally does."""
+
+
 def _asked(kind: ClauseKind, tally: Tally) -> int:
     """An assumption is no evidence: before its first value it need not be decided."""
     return tally.asked - (tally.early if kind is ClauseKind.ASSUMPTION else 0)
 
 
 def session(
-    system: System,
-    nodes: Sequence[str] = (),
-    trace: Path | None = None,
-    make: Callable[[Setup], Monitor] = Monitor,
+    system: System, nodes: Sequence[str] = (), trace: Path | None = None, make: Callable[[Setup], Monitor] = Monitor
 ) -> Session:
     """Monitors for the named nodes, by default all, with the plan's mappings; where `trace` is a bag, also by what it
     says of its messages. Raises Rejected."""

@@ -13,8 +13,8 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.ros import bags
 from avow.ros.bags import NOWHERE, Carried, Event, Origin, is_bag
 
-from .numbers import NotANumber, exact
 from .tuning import CHUNK, EVENT_CHARACTERS, LATEST_TIME
+from .wires import NotANumber, exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +104,10 @@ def read_trace(
     """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag), those whose numbers are chosen. `wanted`: the
     topics whose messages of a bag are of interest, and are counted. Raises Rejected."""
     if is_bag(path):
-        for index, (event, _) in enumerate(messages(path, origin, wanted), start=1):
-            if chosen(index):
-                yield Recorded(index, 0, event)
+        with opened():
+            for index, (channel, time, raw) in enumerate(bags.recorded(path, origin, wanted), start=1):
+                if chosen(index):
+                    yield Recorded(index, 0, channel.event(time, raw))
         return
     try:
         with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
@@ -188,20 +189,13 @@ def chunks(more: Callable[[int], bytes], name: str) -> Iterator[bytes]:
 
 def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
     """As `avow.ros.bags.carried`. Raises Rejected."""
-    with _told():
+    with opened():
         return bags.carried(path, origin)
 
 
-def messages(
-    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
-) -> Iterator[tuple[Event, int]]:
-    """As `avow.ros.bags.messages`. Raises Rejected."""
-    with _told():
-        yield from bags.messages(path, origin, wanted)
-
-
 @contextmanager
-def _told() -> Iterator[None]:
+def opened() -> Iterator[None]:
+    """Raises Rejected for what is no bag."""
     try:
         yield
     except bags.NoBag as wrong:

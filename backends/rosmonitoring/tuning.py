@@ -61,11 +61,14 @@ OPEN_QUESTIONS = 1_000
 REMEMBERED = 65_536
 """Values of a variable, and verdicts of a clause, that are remembered at a time: some megabytes."""
 
-CHUNK = 1 << 17
+CHUNK = 1 << 20
 """Bytes of a trace that are read at a time."""
 
-BATCH = 4_096
+BATCH = 16_384
 """Messages of a bag that are judged at a time: enough for arrays to pay, and some megabytes."""
+
+BATCH_BYTES = 1 << 24
+"""Bytes of these messages, above which fewer are judged at a time: images are large."""
 
 RATE_MESSAGES = 10
 """Messages over which a rate is taken: one that comes a little late says nothing of the rate, and of ten it shows in a

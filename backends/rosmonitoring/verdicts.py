@@ -8,12 +8,11 @@ from functools import cached_property
 
 from avow.base.verdict import Counterexample, Outcome, Verdict
 
-from .coverage import coverage, old, remedies
 from .engine import Monitor
 from .lanes import Marks, Signals
 from .options import same_topic
 from .tuning import VIOLATIONS_KEPT
-from .watched import Fault, Violation
+from .watched import Fault, Violation, coverage, old, remedies
 
 
 class Run:
@@ -215,20 +214,10 @@ def _monitored(s: Shown) -> Answer:
 
 
 RULES: tuple[Callable[[Shown], Answer | None], ...] = (
-    _broken,  # a breach is one whatever else is wrong with the recordings
-    _unread,
-    _backwards,
-    _unreadable,
-    _undecided,
-    _silent,
-    _lost,
-    _aged,
-    _never,
-    _unmonitored,
-    _unpaired,
-    _excused,
-    _monitored,
-)
+    _broken, _unread, _backwards, _unreadable, _undecided, _silent, _lost, _aged, _never, _unmonitored, _unpaired,
+    _excused, _monitored,
+)  # fmt: skip
+"""A breach is one whatever else is wrong with the recordings."""
 
 
 def outcome(obligation: str, shown: Shown) -> Outcome:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import NotANumber, exact
+from avow.backends.rosmonitoring.wires import NotANumber, exact
 from oracle.rml_reader import Declared, Parsed, number, read
 
 Binding = dict[str, Any]

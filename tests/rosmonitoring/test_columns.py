@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers import some
 
-from avow.backends.rosmonitoring.codes_of_values import regions
+from avow.backends.rosmonitoring.batch import Regions
 from avow.backends.rosmonitoring.columns import Columns
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import Setup, setup
@@ -50,7 +53,7 @@ def both(found: Setup, path: Path) -> tuple[int, int]:
     assert got == expected
     assert all(v.heard.items() <= w.heard.items() for (_, v), (_, w) in zip(got, expected, strict=True))
     if plain.pairing is not None and fast.pairing is not None:
-        assert fast.pairing.answered == plain.pairing.answered
+        assert {**fast.pairing.answered} == {**plain.pairing.answered}
     assert fast.tallies == plain.tallies
     assert (fast.events, fast.relevant, fast.heard) == (plain.events, plain.relevant, plain.heard)
     assert (fast.backwards, fast.values) == (plain.backwards, plain.values)
@@ -226,23 +229,30 @@ def test_readings_at_the_numbers_that_matter(
 
 
 def test_a_region_holds_only_readings_of_one_verdict(make_system: Callable[..., System]) -> None:
-    from bisect import bisect
-    from fractions import Fraction
-
-    found = setup_of(make_system(NODE.format(kind="Float64"), {"in.r": "data", "out.s": "data"}))
+    """Doubles are placed exactly, and digits are unsure where their nearest double has another place."""
+    text = NODE.format(kind="Float64").replace("{1, 2.5, -3}", "{1, 2.5, -3, 0.1}")
+    found = setup_of(make_system(text, {"in.r": "data", "out.s": "data"}))
     formulas = [clause.formula for clause in found.node.clauses]
-    bounds = regions(found.rules["out.s"], formulas)
-    assert bounds is not None
+    regions = Regions.of(found.rules["out.s"], formulas)
+    assert regions is not None
     verdicts: dict[int, set[tuple[bool, ...]]] = {}
     rng = random.Random(3)
+    readings = []
     for _ in range(3000):
-        near = rng.choice((120, 1, 2.5, -3, rng.uniform(-1e3, 1e3)))
-        reading = Fraction(near) + Fraction(rng.choice((0, 1, -1, 3)), 10 ** rng.randrange(1, 20))
+        near = rng.choice((120, 1, 2.5, -3, 0.1, rng.uniform(-1e3, 1e3)))
+        readings.append(Fraction(near) + Fraction(rng.choice((0, 1, -1, 3)), 10 ** rng.randrange(1, 20)))
+    readings += [
+        Fraction(1, 10),
+        *(Fraction(math.nextafter(n, end)) for n in (120.0, 1.0, 2.5, -3.0, 0.1) for end in (-9e9, n, 9e9)),
+    ]
+    nearest = np.array([float(reading) for reading in readings])
+    unsure = regions.unsure(nearest)
+    for reading, double, place, odd in zip(readings, nearest, regions.places(nearest), unsure, strict=True):
+        assert regions.place(Fraction(double)) == place
+        assert odd or regions.place(reading) == place
         values = {"in.r": Fraction(300), "out.s": reading}
-        place = bisect(bounds, float(reading))
-        if place % 2 == 0:
-            verdicts.setdefault(place, set()).add(tuple(bool(compile_term(f)(values)) for f in formulas))
-    assert len(verdicts) >= 5
+        verdicts.setdefault(regions.place(reading), set()).add(tuple(bool(compile_term(f)(values)) for f in formulas))
+    assert len(verdicts) == regions.count == 11
     assert all(len(each) == 1 for each in verdicts.values())
 
 
@@ -250,8 +260,8 @@ def test_a_variable_that_is_calculated_with_has_no_regions(make_system: Callable
     text = NODE.format(kind="Float64").replace("out.s <= 120", "out.s + in.r <= 120")
     found = setup_of(make_system(text, {"in.r": "data", "out.s": "data"}))
     formulas = [clause.formula for clause in found.node.clauses]
-    assert regions(found.rules["out.s"], formulas) is None
-    assert regions(found.rules["in.r"], formulas) is None
+    assert Regions.of(found.rules["out.s"], formulas) is None
+    assert Regions.of(found.rules["in.r"], formulas) is None
 
 
 def test_the_case_study_is_judged_alike(case_folder: Path, tmp_path: Path) -> None:

@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND
-from avow.backends.rosmonitoring.coverage import Tally
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.session import session
-from avow.backends.rosmonitoring.watched import Fault
+from avow.backends.rosmonitoring.watched import Fault, Tally
 from avow.base.verdict import Verdict
 from avow.system.plan import System
 

@@ -135,3 +135,6 @@ headers, and a record that names each would be a hundred times as long."""
 
 LOG_KEPT = 20_000
 """Bytes of a program's standard error that are kept, the last: a sanitizer's report is its end."""
+
+LAYOUT_FIELDS = 10_000
+"""Fields and items of a raw message that are read as arrays: a laser scan has some thousands, an image a million."""

@@ -16,11 +16,9 @@ from avow.ros.bags import LIVE, Event
 from avow.ros.calls import is_part
 from avow.ros.dds import domain_of
 
-from ..coverage import coverage
-from ..enforce import RAW, filtered
-from ..session import Session
+from ..session import RAW, Session, filtered
 from ..tuning import LIVE_APART, LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
-from ..watched import Violation
+from ..watched import Violation, coverage
 from .dds import Dds
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of

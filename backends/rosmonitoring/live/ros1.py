@@ -27,7 +27,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
 from avow.ros.master import FAILURES, interface
 
-from ..enforce import raw
+from ..session import raw
 from ..tuning import AGAIN_SECONDS, FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS, MASTER_ATTEMPTS, PUBLISHER_SECONDS
 from .graphs import Inbox, Status
 

@@ -24,30 +24,15 @@ from avow.language import terms as t
 from avow.language.operators import OPERATORS, Why
 
 from ..tuning import COMPARISONS
+from . import syntax as rml
 from .symbols import Points, Scalar, Symbol, Table, Tracked, Variant, code, constant, equal
-from .syntax import (
-    FALSE,
-    TRUE,
-    Calculation,
-    Condition,
-    Name,
-    NotRml,
-    Number,
-    Numeric,
-    compare,
-    every,
-    opposite,
-    size,
-    some,
-    without_exclusions,
-)
 
 _INFINITE = (s.RealSort, s.IntegerSort, s.NaturalSort)
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 
 Bound = Mapping[str, Symbol]
 
-_Case = tuple[Condition, list[Part], Bound]
+_Case = tuple[rml.Condition, list[Part], Bound]
 """One way in which a part can hold: what says so, what has to hold besides, and what it fixes."""
 
 
@@ -58,18 +43,18 @@ class Eliminator:
     symbols: Mapping[str, Symbol]
     _work: int = 0
 
-    def condition(self, formula: t.Term) -> Condition:
+    def condition(self, formula: t.Term) -> rml.Condition:
         """Raises NotRml with the reason why the formula is none."""
         try:
             found = self._formula(rename_apart(lifted(self._without_functions(formula))), {})
         except TooManyCases:
-            raise NotRml(
+            raise rml.NotRml(
                 f"its conditionals (`if`, `min`, `max`, `abs`) make more than {ATOMS_MADE} comparisons"
             ) from None
         except RecursionError:
-            raise NotRml("the formula is nested too deeply") from None
-        if size(found) > COMPARISONS:
-            raise NotRml(f"the condition without quantifiers has {size(found)} parts, more than {COMPARISONS}")
+            raise rml.NotRml("the formula is nested too deeply") from None
+        if rml.size(found) > COMPARISONS:
+            raise rml.NotRml(f"the condition without quantifiers has {rml.size(found)} parts, more than {COMPARISONS}")
         return found
 
     def _without_functions(self, formula: t.Term) -> t.Term:
@@ -101,67 +86,67 @@ class Eliminator:
         self.symbols = made
         return changed
 
-    def _formula(self, term: t.Term, bound: Bound) -> Condition:
+    def _formula(self, term: t.Term, bound: Bound) -> rml.Condition:
         self._tick()
         match term:
             case t.Literal(value=bool() as value):
-                return every([]) if value else some([])
+                return rml.every([]) if value else rml.some([])
             case t.Not(body=body):
-                return opposite(self._formula(body, bound))
+                return rml.opposite(self._formula(body, bound))
             case t.And(items=items):
-                return every([self._formula(item, bound) for item in items])
+                return rml.every([self._formula(item, bound) for item in items])
             case t.Or(items=items):
-                return some([self._formula(item, bound) for item in items])
+                return rml.some([self._formula(item, bound) for item in items])
             case t.Implies(left=left, right=right):
-                return some([opposite(self._formula(left, bound)), self._formula(right, bound)])
+                return rml.some([rml.opposite(self._formula(left, bound)), self._formula(right, bound)])
             case t.Iff(left=left, right=right):
                 return self._iff(left, right, bound)
             case t.Compare():
                 return self._compare(term, bound)
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
                 left_side = self._value(item, bound)
-                return some([equal(left_side, self._value(each, bound)) for each in items])
+                return rml.some([equal(left_side, self._value(each, bound)) for each in items])
             case t.Apply():
                 return self._apply(term, bound)
             case t.Variable(sort=s.BoolSort()):
-                return compare("==", self._number(term, bound), Number(Fraction(1)))
+                return rml.compare("==", self._number(term, bound), rml.Number(Fraction(1)))
             case t.Quantified(quantifier=t.Quantifier.EXISTS):
                 return self._exists(term.variables, term.body, True, bound)
             case t.Quantified(quantifier=t.Quantifier.FORALL):
-                return opposite(self._exists(term.variables, term.body, False, bound))
+                return rml.opposite(self._exists(term.variables, term.body, False, bound))
             case t.Quantified(quantifier=t.Quantifier.UNIQUE):
                 return self._unique(term, bound)
             case _:
-                raise NotRml(f"a {type(term).__name__.lower()} is not expressible in RML")
+                raise rml.NotRml(f"a {type(term).__name__.lower()} is not expressible in RML")
 
-    def _iff(self, left: t.Term, right: t.Term, bound: Bound) -> Condition:
+    def _iff(self, left: t.Term, right: t.Term, bound: Bound) -> rml.Condition:
         one, other = self._formula(left, bound), self._formula(right, bound)
-        return every([some([opposite(one), other]), some([one, opposite(other)])])
+        return rml.every([rml.some([rml.opposite(one), other]), rml.some([one, rml.opposite(other)])])
 
-    def _compare(self, term: t.Compare, bound: Bound) -> Condition:
+    def _compare(self, term: t.Compare, bound: Bound) -> rml.Condition:
         made = made_with(term)
         if made is not None:
             known = self._value(term.left, bound)
             assert isinstance(known, Variant)
             assert isinstance(term.left.sort, s.DataSort)
-            return compare(term.operator, known.tag, Number(Fraction(code(term.left.sort, made))))
+            return rml.compare(term.operator, known.tag, rml.Number(Fraction(code(term.left.sort, made))))
         if term.left.sort == s.BOOL:
             same = self._iff(term.left, term.right, bound)
-            return same if term.operator == "==" else opposite(same)
+            return same if term.operator == "==" else rml.opposite(same)
         if term.operator in ("==", "!="):
             same = equal(self._value(term.left, bound), self._value(term.right, bound))
-            return same if term.operator == "==" else opposite(same)
-        return compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
+            return same if term.operator == "==" else rml.opposite(same)
+        return rml.compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
 
-    def _apply(self, term: t.Apply, bound: Bound) -> Condition:
+    def _apply(self, term: t.Apply, bound: Bound) -> rml.Condition:
         arguments = [self._value(a, bound) for a in term.arguments]
         tracked = self._tracked(term)
         if tracked is not None:
             return tracked.flag(tuple(arguments))
         points = self._points(term)
-        return some(
+        return rml.some(
             [
-                every([holds, *(equal(a, p) for a, p in zip(arguments, parts, strict=True))])
+                rml.every([holds, *(equal(a, p) for a, p in zip(arguments, parts, strict=True))])
                 for holds, parts in points.tuples
             ]
         )
@@ -175,7 +160,7 @@ class Eliminator:
             found = self.symbols.get(term.function.qualified)
             if isinstance(found, Points):
                 return found
-        raise NotRml("an application of a function that is no relation")
+        raise rml.NotRml("an application of a function that is no relation")
 
     def _value(self, term: t.Term, bound: Bound) -> Symbol:
         self._tick()
@@ -183,18 +168,18 @@ class Eliminator:
             case t.Variable(role=t.Role.BOUND, name=name):
                 if name in bound:
                     return bound[name]
-                raise NotRml(f"nothing fixes {name}")
+                raise rml.NotRml(f"nothing fixes {name}")
             case t.Variable():
                 return self.symbols[term.qualified]
             case t.EnumValue(name=name, sort=sort):
-                return Scalar(Number(Fraction(code(sort, name))))
+                return Scalar(rml.Number(Fraction(code(sort, name))))
             case t.Construct(constructor=name, arguments=arguments, sort=sort):
                 given = tuple(self._value(a, bound) for a in arguments)
                 rows = tuple(
-                    given if c.name == name else tuple(Scalar(Number(Fraction(0))) for _ in c.parameters)
+                    given if c.name == name else tuple(Scalar(rml.Number(Fraction(0))) for _ in c.parameters)
                     for c in sort.constructors
                 )
-                return Variant(Number(Fraction(code(sort, name))), rows)
+                return Variant(rml.Number(Fraction(code(sort, name))), rows)
             case t.Argument(value=whole, constructor=name, position=position):
                 known = self._value(whole, bound)
                 assert isinstance(known, Variant)
@@ -203,14 +188,14 @@ class Eliminator:
             case _:  # a number, or refused by name
                 return Scalar(self._number(term, bound))
 
-    def _number(self, term: t.Term, bound: Bound) -> Numeric:
+    def _number(self, term: t.Term, bound: Bound) -> rml.Numeric:
         match term:
             case t.Literal(value=value) if not isinstance(value, str):
-                return Number(Fraction(value))
+                return rml.Number(Fraction(value))
             case t.Widen(term=inside):
                 return self._number(inside, bound)
             case t.Negative(term=inside):
-                return self._calculate("-", Number(Fraction(0)), self._number(inside, bound), term)
+                return self._calculate("-", rml.Number(Fraction(0)), self._number(inside, bound), term)
             case t.Arithmetic(operator=operator, left=left, right=right):
                 return self._calculate(operator, self._number(left, bound), self._number(right, bound), term)
             case t.Variable() | t.Argument():
@@ -219,27 +204,27 @@ class Eliminator:
                     return found.number
             case t.Operation(operator=name):
                 said = OPERATORS[name].rml
-                raise NotRml(f"`{name}`: {said.reason if isinstance(said, Why) else _NOT_LIFTED}")
+                raise rml.NotRml(f"`{name}`: {said.reason if isinstance(said, Why) else _NOT_LIFTED}")
             case t.Conditional():
-                raise NotRml(f"`if`: {_NOT_LIFTED}")
-        raise NotRml(f"{type(term).__name__.lower()} terms of this sort are not expressible in RML")
+                raise rml.NotRml(f"`if`: {_NOT_LIFTED}")
+        raise rml.NotRml(f"{type(term).__name__.lower()} terms of this sort are not expressible in RML")
 
-    def _calculate(self, operator: str, left: Numeric, right: Numeric, term: t.Term) -> Numeric:
-        if isinstance(left, Number) and isinstance(right, Number):
+    def _calculate(self, operator: str, left: rml.Numeric, right: rml.Numeric, term: t.Term) -> rml.Numeric:
+        if isinstance(left, rml.Number) and isinstance(right, rml.Number):
             match operator:
                 case "+":
-                    return Number(left.value + right.value)
+                    return rml.Number(left.value + right.value)
                 case "-":
-                    return Number(left.value - right.value)
+                    return rml.Number(left.value - right.value)
                 case "*":
-                    return Number(left.value * right.value)
+                    return rml.Number(left.value * right.value)
                 case "/" if right.value:
-                    return Number(left.value / right.value)
+                    return rml.Number(left.value / right.value)
         if isinstance(term.sort, s.RealSort) or operator == "/":
-            raise NotRml("it calculates with REAL numbers, which the RML monitor does in floating point")
-        return Calculation(operator, left, right)
+            raise rml.NotRml("it calculates with REAL numbers, which the RML monitor does in floating point")
+        return rml.Calculation(operator, left, right)
 
-    def _unique(self, term: t.Quantified, bound: Bound) -> Condition:
+    def _unique(self, term: t.Quantified, bound: Bound) -> rml.Condition:
         """One, and no other."""
         copy = rename_apart(t.And((term, term)))
         assert isinstance(copy, t.And)
@@ -248,35 +233,35 @@ class Eliminator:
         assert isinstance(other, t.Quantified)
         differ = t.Or(tuple(t.Compare("!=", a, b) for a, b in zip(one.variables, other.variables, strict=True)))
         two = t.And((one.body, other.body, differ))
-        return every(
+        return rml.every(
             [
                 self._exists(one.variables, one.body, True, bound),
-                opposite(self._exists((*one.variables, *other.variables), two, True, bound)),
+                rml.opposite(self._exists((*one.variables, *other.variables), two, True, bound)),
             ]
         )
 
-    def _exists(self, variables: Sequence[t.Variable], body: t.Term, positive: bool, bound: Bound) -> Condition:
+    def _exists(self, variables: Sequence[t.Variable], body: t.Term, positive: bool, bound: Bound) -> rml.Condition:
         parts, inner = conjunction(body, positive)
         if len(parts) == 1:
             options = alternatives(parts[0].term, parts[0].positive)
             if options is not None:
                 own = (*variables, *inner)
-                return some([self._exists(own, option, truth, bound) for option, truth in options])
-        return self._solve(parts, (*variables, *inner), bound, TRUE)
+                return rml.some([self._exists(own, option, truth, bound) for option, truth in options])
+        return self._solve(parts, (*variables, *inner), bound, rml.TRUE)
 
     def _solve(
-        self, parts: Sequence[Part], variables: Sequence[t.Variable], bound: Bound, given: Condition
-    ) -> Condition:
+        self, parts: Sequence[Part], variables: Sequence[t.Variable], bound: Bound, given: rml.Condition
+    ) -> rml.Condition:
         """That some values of the free variables meet all parts. `given`: what holds around; where that contradicts the
         parts, nothing has to fix a variable."""
         self._tick()
         free = {v.name: v for v in variables if v.name not in bound}
         ready = [p for p in parts if not p.names & free.keys()]
         pending = [p for p in parts if p.names & free.keys()]
-        known = every([self._part(p, bound) for p in ready])
-        facts = every([given, known])
-        if facts == FALSE:
-            return FALSE
+        known = rml.every([self._part(p, bound) for p in ready])
+        facts = rml.every([given, known])
+        if facts == rml.FALSE:
+            return rml.FALSE
         if not pending:
             return known
         for at, part in enumerate(pending):
@@ -284,10 +269,10 @@ class Eliminator:
             cases = self._binders(part, free, bound)
             if cases is not None:
                 found = [
-                    every([holds, self._solve([*more, *others], variables, now, every([facts, holds]))])
+                    rml.every([holds, self._solve([*more, *others], variables, now, rml.every([facts, holds]))])
                     for holds, more, now in cases
                 ]
-                return every([known, some(found)])
+                return rml.every([known, rml.some(found)])
         for at, part in enumerate(pending):
             others = [*pending[:at], *pending[at + 1 :]]
             options = alternatives(part.term, part.positive)
@@ -296,25 +281,25 @@ class Eliminator:
                 for option, truth in options:
                     new, inner = conjunction(option, truth)
                     branches.append(self._solve([*new, *others], (*variables, *inner), bound, facts))
-                return every([known, some(branches)])
+                return rml.every([known, rml.some(branches)])
         for name, variable in free.items():
             finite = finite_values(variable.sort)
             if any(name in p.names for p in pending) and finite is not None:
                 values = [constant(v, variable.sort) for v in finite]
                 found = [self._solve(pending, variables, {**bound, name: value}, facts) for value in values]
-                return every([known, some(found)])
+                return rml.every([known, rml.some(found)])
             if any(name in p.names for p in pending) and isinstance(variable.sort, _INFINITE):
-                anything = Name(f"{name}?{self._work}")
+                anything = rml.Name(f"{name}?{self._work}")
                 open_ = self._solve(pending, variables, {**bound, name: Scalar(anything)}, facts)
-                left = without_exclusions(open_, anything)
+                left = rml.without_exclusions(open_, anything)
                 if left is not None:
-                    return every([known, left])
+                    return rml.every([known, left])
         names = ", ".join(sorted(n for n in free if any(n in p.names for p in pending)))
-        raise NotRml(f"nothing fixes {names}")
+        raise rml.NotRml(f"nothing fixes {names}")
 
-    def _part(self, part: Part, bound: Bound) -> Condition:
+    def _part(self, part: Part, bound: Bound) -> rml.Condition:
         found = self._formula(part.term, bound)
-        return found if part.positive else opposite(found)
+        return found if part.positive else rml.opposite(found)
 
     def _binders(self, part: Part, free: Mapping[str, t.Variable], bound: Bound) -> list[_Case] | None:
         """The ways in which a part can hold, each with what it fixes; None if the part fixes nothing."""
@@ -346,7 +331,7 @@ class Eliminator:
         return found if len(found) == len(cases) else None
 
     def _case(
-        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: Condition = TRUE
+        self, left: t.Term, right: t.Term, free: Mapping[str, t.Variable], bound: Bound, holds: rml.Condition = rml.TRUE
     ) -> _Case | None:
         """That both sides are the same, where that fixes a variable."""
         found = solved(t.Compare("==", left, right), free.values())
@@ -358,4 +343,4 @@ class Eliminator:
     def _tick(self) -> None:
         self._work += 1
         if self._work > 200_000:
-            raise NotRml("the quantifiers unfold into too many cases")
+            raise rml.NotRml("the quantifiers unfold into too many cases")

@@ -20,13 +20,7 @@ from avow.backend_kit.one_step import refusal
 from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
 from avow.language.contract import Clause
-from avow.language.sorts import (
-    DataSort,
-    FunctionSort,
-    RealSort,
-    Sort,
-    StringSort,
-)
+from avow.language.sorts import DataSort, FunctionSort, RealSort, Sort, StringSort
 from avow.language.terms import Role
 from avow.ros.calls import is_part
 
@@ -35,32 +29,9 @@ from ..options import Setup, same_topic
 from ..rules import Choice, Constant, FieldPath, Fields, Previous, Rule
 from ..tuning import CASES
 from ..wires import parts_of
+from . import symbols as sym
+from . import syntax as rml
 from .quantifiers import Eliminator
-from .shapes import Case, binds_of, choice_cases, field_cases, pattern, together
-from .symbols import Points, Scalar, Symbol, Table, Tracked, Variant, carried, components, constant, no_pattern
-from .syntax import (
-    FALSE,
-    KEYWORDS,
-    TRUE,
-    Calculation,
-    Condition,
-    EventType,
-    Machine,
-    Name,
-    NotRml,
-    Number,
-    Numeric,
-    Specification,
-    Step,
-    compare,
-    every,
-    names_in,
-    negations,
-    opposite,
-    some,
-    substitute,
-    write,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +49,11 @@ def translate(setup: Setup, guarantees: Sequence[Clause]) -> Translation:
     for clause in guarantees:
         try:
             if reason := refusal("RML", setup.node, clause):
-                raise NotRml(reason)
+                raise rml.NotRml(reason)
             made = _Machine(file, clause)
             made.build()
-            write(Specification((), tuple(EventType("e", *rest) for rest in made.events), ()))
-        except NotRml as reason:
+            rml.write(rml.Specification((), tuple(rml.EventType("e", *rest) for rest in made.events), ()))
+        except rml.NotRml as reason:
             refused[clause.name] = f"not monitorable in RML: {reason}"
             continue
         file.add(made)
@@ -90,10 +61,12 @@ def translate(setup: Setup, guarantees: Sequence[Clause]) -> Translation:
         f"Monitor of the node {setup.node.name}. Traces end at an event that breaks a guarantee or cannot be read.",
         *(f"Not here: guarantee {name}: {reason}" for name, reason in refused.items()),
     ]
-    return Translation(write(Specification(tuple(header), file.events(), tuple(file.machines), file.notes)), refused)
+    return Translation(
+        rml.write(rml.Specification(tuple(header), file.events(), tuple(file.machines), file.notes)), refused
+    )
 
 
-_Event = tuple[tuple[str, ...], tuple[str, ...], Condition]
+_Event = tuple[tuple[str, ...], tuple[str, ...], rml.Condition]
 """An event type without its name: parameters, patterns, condition."""
 
 
@@ -102,10 +75,10 @@ class _File:
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
-        self.machines: list[Machine] = []
+        self.machines: list[rml.Machine] = []
         self.notes: dict[str, str] = {}
         self._events: dict[_Event, str] = {}
-        self._taken: set[str] = {*KEYWORDS, "main", "fresh", "last", "set"}
+        self._taken: set[str] = {*rml.KEYWORDS, "main", "fresh", "last", "set"}
         self.stems = {name: self.name(name.partition(".")[2]) for name in setup.rules}
         """Variable → what the names of its parts begin with."""
 
@@ -119,8 +92,8 @@ class _File:
         self._taken.add(found)
         return found
 
-    def events(self) -> tuple[EventType, ...]:
-        return tuple(EventType(name, *event) for event, name in self._events.items())
+    def events(self) -> tuple[rml.EventType, ...]:
+        return tuple(rml.EventType(name, *event) for event, name in self._events.items())
 
     def add(self, made: _Machine) -> None:
         span = made.clause.span
@@ -128,11 +101,11 @@ class _File:
         stem = self.name(made.clause.name)
         name = stem[0].upper() + stem[1:]
         steps = tuple(
-            Step(self._event(draft.event, *draft.called(stem)), draft.event[0], draft.binds, draft.then)
+            rml.Step(self._event(draft.event, *draft.called(stem)), draft.event[0], draft.binds, draft.then)
             for draft in made.drafts
         )
         relevant = self._event(made.relevant, "relevant")
-        self.machines.append(Machine(name, made.state, steps, made.initial, relevant))
+        self.machines.append(rml.Machine(name, made.state, steps, made.initial, relevant))
         self.notes[name] = f"guarantee {made.clause.name}{where}"
 
     def _event(self, event: _Event, wanted: str, suffix: str = "") -> str:
@@ -146,8 +119,8 @@ class _Mode:
     """One way to take an event: what it has to satisfy, the numbers that it then sets besides those of its fields, and
     whether it ends an answer."""
 
-    guard: Condition
-    sets: dict[str, Numeric]
+    guard: rml.Condition
+    sets: dict[str, rml.Numeric]
     judged: bool
 
 
@@ -159,13 +132,13 @@ class _Draft:
     fields: tuple[tuple[FieldPath, str], ...]
     binds: tuple[str, ...]
     used: tuple[str, ...]
-    guard: Condition
-    then: tuple[Numeric, ...]
+    guard: rml.Condition
+    then: tuple[rml.Numeric, ...]
     judged: bool
 
     @property
     def event(self) -> _Event:
-        return (*self.binds, *self.used), (pattern(self.topic, self.fields),), self.guard
+        return (*self.binds, *self.used), (sym.pattern(self.topic, self.fields),), self.guard
 
     def called(self, clause: str) -> tuple[str, str]:
         """What its event type is called: after the clause if that is judged at it, else after the topic."""
@@ -189,7 +162,7 @@ class _Machine:
     file: _File
     clause: Clause
     rules: dict[str, Rule] = field(default_factory=dict)
-    symbols: dict[str, Symbol] = field(default_factory=dict)
+    symbols: dict[str, sym.Symbol] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
     """Variable without an initial value → name of the number that is 1 once it has one."""
     fresh: dict[str, str] = field(default_factory=dict)
@@ -197,7 +170,7 @@ class _Machine:
 
     drafts: list[_Draft] = field(init=False)
     state: tuple[str, ...] = field(init=False)
-    initial: tuple[Numeric, ...] = field(init=False)
+    initial: tuple[rml.Numeric, ...] = field(init=False)
     relevant: _Event = field(init=False)
 
     @property
@@ -213,11 +186,13 @@ class _Machine:
         for name in names:
             topic = getattr(self.setup.rules.get(name), "topic", "")
             if is_part(topic):
-                raise NotRml(f"{name} is a part of a call ({topic}), and ROSMonitoring listens to topics")
+                raise rml.NotRml(f"{name} is a part of a call ({topic}), and ROSMonitoring listens to topics")
         self._choose(names)
         guard = Eliminator(self.symbols).condition(self.clause.formula)
-        complete = every([compare("==", Name(self.flags[n]), Number(Fraction(1))) for n in names if n in self.flags])
-        judged = some([*negations(complete), guard])
+        complete = rml.every(
+            [rml.compare("==", rml.Name(self.flags[n]), rml.Number(Fraction(1))) for n in names if n in self.flags]
+        )
+        judged = rml.some([*rml.negations(complete), guard])
         triggers = triggers_of(self.setup, tuple(names))
         together = self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
         if together and len(triggers) > 1:
@@ -228,7 +203,7 @@ class _Machine:
             if isinstance(rule, Fields | Choice):
                 by_topic.setdefault(same_topic(rule.topic), []).append(name)
         if not by_topic:
-            raise NotRml("no message changes anything that it speaks of")
+            raise rml.NotRml("no message changes anything that it speaks of")
         drafts: list[_Draft] = []
         for topic, updated in by_topic.items():
             drafts += self._drafts(topic, updated, self._modes(judged, updated, triggers), state)
@@ -237,20 +212,22 @@ class _Machine:
         initial = self._initial(state)
         self.state, self.initial = tuple(state[k] for k in kept), tuple(initial[k] for k in kept)
         self.drafts = _merged(replace(draft, then=tuple(draft.then[k] for k in kept)) for draft in drafts)
-        self.relevant = (), tuple(pattern(self._written(topic), ()) for topic in by_topic), TRUE
+        self.relevant = (), tuple(sym.pattern(self._written(topic), ()) for topic in by_topic), rml.TRUE
 
-    def _modes(self, judged: Condition, updated: Sequence[str], triggers: Sequence[str]) -> list[_Mode]:
+    def _modes(self, judged: rml.Condition, updated: Sequence[str], triggers: Sequence[str]) -> list[_Mode]:
         """As `engine.Monitor` has it: judged once each of its outputs has been published anew, and not before."""
         mine = [n for n in triggers if n in updated]
         if not mine:
-            return [_Mode(TRUE, {}, judged=False)]
+            return [_Mode(rml.TRUE, {}, judged=False)]
         others = [self.fresh[n] for n in triggers if n not in updated and n in self.fresh]
-        ready = every([compare("==", Name(f), Number(Fraction(1))) for f in others])
-        now = _Mode(every([ready, judged]), dict.fromkeys(self.fresh.values(), Number(Fraction(0))), judged=True)
+        ready = rml.every([rml.compare("==", rml.Name(f), rml.Number(Fraction(1))) for f in others])
+        now = _Mode(
+            rml.every([ready, judged]), dict.fromkeys(self.fresh.values(), rml.Number(Fraction(0))), judged=True
+        )
         if not others:
             return [now]
-        begun: dict[str, Numeric] = {self.fresh[n]: Number(Fraction(1)) for n in mine}
-        return [now, _Mode(opposite(ready), begun, judged=False)]
+        begun: dict[str, rml.Numeric] = {self.fresh[n]: rml.Number(Fraction(1)) for n in mine}
+        return [now, _Mode(rml.opposite(ready), begun, judged=False)]
 
     def _needed(self, state: Sequence[str], drafts: Sequence[_Draft]) -> set[str]:
         """The carried numbers on which some later answer depends."""
@@ -261,7 +238,7 @@ class _Machine:
                 for draft in drafts
                 for name, value in zip(state, draft.then, strict=True)
                 if name in needed
-                for n in names_in(value)
+                for n in rml.names_in(value)
             }
             more = used & set(state) - needed
             if not more:
@@ -274,18 +251,18 @@ class _Machine:
         for name in wanted:
             several = f"several nodes publish the topic of {name}, and an event does not say whose it is"
             if why := self.setup.hidden.get(name, several if name in self.setup.shared else ""):
-                raise NotRml(why)
+                raise rml.NotRml(why)
             rule = self.setup.rules[name]
             if isinstance(rule, Previous) and rule.source not in wanted:
                 if rule.source in self.setup.hidden:
-                    raise NotRml(self.setup.hidden[rule.source])
+                    raise rml.NotRml(self.setup.hidden[rule.source])
                 wanted.append(rule.source)
         for name in wanted:
             rule, stem = self.setup.rules[name], self.file.stems[name]
             if isinstance(rule.variable.sort, StringSort):
-                raise NotRml(f"{name} is a string, and RML's conditions compare only numbers")
+                raise rml.NotRml(f"{name} is a string, and RML's conditions compare only numbers")
             self.rules[name] = rule
-            self.symbols[name] = carried(rule, dict(self.setup.rules), f"last_{stem}")
+            self.symbols[name] = sym.carried(rule, dict(self.setup.rules), f"last_{stem}")
             if not isinstance(rule, Constant) and self._first(rule) is None:
                 self.flags[name] = f"set_{stem}"
 
@@ -307,19 +284,19 @@ class _Machine:
         found: list[str] = []
         for name, symbol in self.symbols.items():
             found += [self.flags[name]] if name in self.flags else []
-            found += components(symbol)
+            found += sym.components(symbol)
         return found
 
-    def _initial(self, state: Sequence[str]) -> list[Numeric]:
-        values: dict[str, Numeric] = {name: Number(Fraction(0)) for name in state}
+    def _initial(self, state: Sequence[str]) -> list[rml.Numeric]:
+        values: dict[str, rml.Numeric] = {name: rml.Number(Fraction(0)) for name in state}
         for name, rule in self.rules.items():
             first = None if isinstance(rule, Constant) else self._first(rule)
             if first is not None:
                 symbol, sort = self.symbols[name], rule.variable.sort
-                if isinstance(symbol, Tracked):
+                if isinstance(symbol, sym.Tracked):
                     values.update(_seen_at_start(symbol, first, sort))
                 else:
-                    values.update(zip(components(symbol), _numbers(constant(first, sort), sort), strict=True))
+                    values.update(zip(sym.components(symbol), _numbers(sym.constant(first, sort), sort), strict=True))
         return [values[name] for name in state]
 
     def _drafts(
@@ -327,62 +304,62 @@ class _Machine:
     ) -> Iterator[_Draft]:
         combinations = list(product(product(*(self._cases(name) for name in updated)), modes))
         if len(combinations) > CASES:
-            raise NotRml(f"a message of {topic} has {len(combinations)} shapes, more than {CASES}")
+            raise rml.NotRml(f"a message of {topic} has {len(combinations)} shapes, more than {CASES}")
         for cases, mode in combinations:
-            new: dict[str, Numeric] = {}
+            new: dict[str, rml.Numeric] = {}
             for name, case in zip(updated, cases, strict=True):
                 if name in self.flags:
-                    new[self.flags[name]] = Number(Fraction(1))
-                new.update(zip(components(self.symbols[name]), case.values, strict=True))
-            guard = every([*(case.guard for case in cases), substitute(mode.guard, new)])
-            if guard == FALSE:
+                    new[self.flags[name]] = rml.Number(Fraction(1))
+                new.update(zip(sym.components(self.symbols[name]), case.values, strict=True))
+            guard = rml.every([*(case.guard for case in cases), rml.substitute(mode.guard, new)])
+            if guard == rml.FALSE:
                 continue
             binds = tuple(b for case in cases for b in case.binds)
-            used = tuple(n for n in state if n in names_in(guard))
+            used = tuple(n for n in state if n in rml.names_in(guard))
             fields = tuple(f for case in cases for f in case.fields)
             after = {**new, **mode.sets}
             for name, rule in self.rules.items():
                 if isinstance(rule, Previous):
                     after.update(self._follow(name, rule, updated, new, mode))
-            then = tuple(after.get(n, Name(n)) for n in state)
-            judged = mode.judged and mode.guard != TRUE
+            then = tuple(after.get(n, rml.Name(n)) for n in state)
+            judged = mode.judged and mode.guard != rml.TRUE
             yield _Draft(self._written(topic), fields, binds, used, guard, then, judged)
 
     def _follow(
-        self, name: str, rule: Previous, updated: Sequence[str], new: dict[str, Numeric], mode: _Mode
-    ) -> dict[str, Numeric]:
+        self, name: str, rule: Previous, updated: Sequence[str], new: dict[str, rml.Numeric], mode: _Mode
+    ) -> dict[str, rml.Numeric]:
         """The previous value, for the next event: the source's value as it is after this one, once it has one. Of one
         of several outputs: the value that it had in the answer that has just been judged."""
         if not (mode.judged if rule.source in self.fresh else rule.source in updated):
             return {}
-        mine, theirs = components(self.symbols[name]), components(self.symbols[rule.source])
-        found: dict[str, Numeric] = {self.flags[name]: Number(Fraction(1))} if name in self.flags else {}
-        found.update((m, new.get(t, Name(t))) for m, t in zip(mine, theirs, strict=True))
+        mine, theirs = sym.components(self.symbols[name]), sym.components(self.symbols[rule.source])
+        found: dict[str, rml.Numeric] = {self.flags[name]: rml.Number(Fraction(1))} if name in self.flags else {}
+        found.update((m, new.get(t, rml.Name(t))) for m, t in zip(mine, theirs, strict=True))
         return found
 
-    def _cases(self, name: str) -> list[Case]:
+    def _cases(self, name: str) -> list[sym.Case]:
         rule, stem = self.rules[name], self.file.stems[name]
         match rule:
             case Fields(variable=variable, paths=paths, names=names):
-                if why := no_pattern(rule):
-                    raise NotRml(f"{name} is {why}")
+                if why := sym.no_pattern(rule):
+                    raise rml.NotRml(f"{name} is {why}")
                 per_field = [
-                    field_cases(path, s, bind, names)
-                    for path, s, bind in zip(paths, parts_of(variable.sort), binds_of(stem, paths), strict=True)
+                    sym.field_cases(path, s, bind, names)
+                    for path, s, bind in zip(paths, parts_of(variable.sort), sym.binds_of(stem, paths), strict=True)
                 ]
                 symbol = self.symbols[name]
-                if isinstance(symbol, Tracked):
+                if isinstance(symbol, sym.Tracked):
                     if RealSort() in parts_of(variable.sort):
-                        raise NotRml(f"{name} holds of all tuples seen, and these are of real numbers")
+                        raise rml.NotRml(f"{name} holds of all tuples seen, and these are of real numbers")
                     return [_tracked_case(symbol, parts) for parts in product(*per_field)]
-                relation = isinstance(symbol, Points)
-                first: tuple[Numeric, ...] = (Number(Fraction(1)),) if relation else ()
-                return [together(first, parts) for parts in product(*per_field)]
+                relation = isinstance(symbol, sym.Points)
+                first: tuple[rml.Numeric, ...] = (rml.Number(Fraction(1)),) if relation else ()
+                return [sym.together(first, parts) for parts in product(*per_field)]
             case Choice(variable=variable):
                 assert isinstance(variable.sort, DataSort)
-                return choice_cases(rule, variable.sort, stem)
+                return sym.choice_cases(rule, variable.sort, stem)
             case Constant() | Previous():
-                raise NotRml(f"{name} has no message")
+                raise rml.NotRml(f"{name} has no message")
             case _:
                 assert_never(rule)
 
@@ -397,58 +374,58 @@ def _merged(drafts: Iterable[_Draft]) -> list[_Draft]:
     return found
 
 
-def _tracked_case(symbol: Tracked, parts: Sequence[Case]) -> Case:
+def _tracked_case(symbol: sym.Tracked, parts: Sequence[sym.Case]) -> sym.Case:
     """A message sets the number of its tuple to 1: ``1 - (1 - n) * min(1, |value - asked|)``. RML's own monitor
     evaluates an argument only if it is a sum or a product at the top."""
-    whole = together((), parts)
-    one, nothing = Number(Fraction(1)), Number(Fraction(0))
-    values: list[Numeric] = []
+    whole = sym.together((), parts)
+    one, nothing = rml.Number(Fraction(1)), rml.Number(Fraction(0))
+    values: list[rml.Numeric] = []
     for at, flag in symbol.flags.items():
-        apart: Numeric = nothing
+        apart: rml.Numeric = nothing
         for value, asked in zip(whole.values, at, strict=True):
-            sides = _calculated("-", value, Number(asked)), _calculated("-", Number(asked), value)
+            sides = _calculated("-", value, rml.Number(asked)), _calculated("-", rml.Number(asked), value)
             apart = _calculated("+", _calculated("max", *sides), apart)
-        unseen = _calculated("*", _calculated("-", one, Name(flag)), _calculated("min", one, apart))
+        unseen = _calculated("*", _calculated("-", one, rml.Name(flag)), _calculated("min", one, apart))
         values.append(_calculated("-", one, unseen))
     return replace(whole, values=tuple(values))
 
 
-def _calculated(operator: str, left: Numeric, right: Numeric) -> Numeric:
+def _calculated(operator: str, left: rml.Numeric, right: rml.Numeric) -> rml.Numeric:
     """The calculation, done at once as far as it can be."""
     match operator, left, right:
-        case _, Number(value=a), Number(value=b):
-            return Number({"+": a + b, "-": a - b, "*": a * b, "max": max(a, b), "min": min(a, b)}[operator])
-        case "+" | "-", other, Number(value=0):
+        case _, rml.Number(value=a), rml.Number(value=b):
+            return rml.Number({"+": a + b, "-": a - b, "*": a * b, "max": max(a, b), "min": min(a, b)}[operator])
+        case "+" | "-", other, rml.Number(value=0):
             return other
-        case "*", _, Number(value=0):
+        case "*", _, rml.Number(value=0):
             return right
         case _:  # names are in it
-            return Calculation(operator, left, right)
+            return rml.Calculation(operator, left, right)
 
 
-def _seen_at_start(symbol: Tracked, first: Value, sort: Sort) -> dict[str, Numeric]:
-    known = constant(first, sort)
-    assert isinstance(known, Points)
+def _seen_at_start(symbol: sym.Tracked, first: Value, sort: Sort) -> dict[str, rml.Numeric]:
+    known = sym.constant(first, sort)
+    assert isinstance(known, sym.Points)
     seen = set()
     for _, parts in known.tuples:
-        seen.add(tuple(p.number.value for p in parts if isinstance(p, Scalar) and isinstance(p.number, Number)))
-    return {flag: Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
+        seen.add(tuple(p.number.value for p in parts if isinstance(p, sym.Scalar) and isinstance(p.number, rml.Number)))
+    return {flag: rml.Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
 
 
-def _numbers(symbol: Symbol, sort: Sort) -> list[Numeric]:
+def _numbers(symbol: sym.Symbol, sort: Sort) -> list[rml.Numeric]:
     """A known value as the numbers that its components carry."""
     match symbol:
-        case Scalar(number=number):
+        case sym.Scalar(number=number):
             return [number]
-        case Variant(tag=tag, arguments=arguments):
+        case sym.Variant(tag=tag, arguments=arguments):
             return [tag, *(n for row in arguments for a in row for n in _numbers(a, sort))]
-        case Points(tuples=()) if isinstance(sort, FunctionSort):
-            return [Number(Fraction(0))] * (1 + len(sort.parameters))
-        case Points(tuples=((_, parts),)):
-            return [Number(Fraction(1)), *(n for p in parts for n in _numbers(p, sort))]
-        case Table(points=((arguments, result),)):
+        case sym.Points(tuples=()) if isinstance(sort, FunctionSort):
+            return [rml.Number(Fraction(0))] * (1 + len(sort.parameters))
+        case sym.Points(tuples=((_, parts),)):
+            return [rml.Number(Fraction(1)), *(n for p in parts for n in _numbers(p, sort))]
+        case sym.Table(points=((arguments, result),)):
             return [n for part in (*arguments, result) for n in _numbers(part, sort)]
-        case Points() | Tracked() | Table():
-            raise NotRml("an initial value with more than one tuple")
+        case sym.Points() | sym.Tracked() | sym.Table():
+            raise rml.NotRml("an initial value with more than one tuple")
         case _:
             assert_never(symbol)

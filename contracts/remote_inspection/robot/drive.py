@@ -106,8 +106,7 @@ def main():
     parser.add_argument("--enforce", action="store_true", help="what would break a guarantee is not delivered")
     parser.add_argument("--unmonitored", action="store_true")
     given = parser.parse_args()
-    from avow.backends.rosmonitoring.enforce import filtered, raw
-    from avow.backends.rosmonitoring.session import session
+    from avow.backends.rosmonitoring.session import filtered, raw, session
     from avow.backends.rosmonitoring.traces import parse_event
     from avow.system.load import load_system
 
