@@ -284,9 +284,7 @@ class _Work:
         asked = tried[:: max(1, len(tried) // (tuning.RUNS_TOGETHER * tuning.APART))]
         for (events, what), run in zip(asked, self.ask([events for events, _ in asked]) if asked else (), strict=True):
             judged = self.judged(events, run)
-            broken = [
-                name for name in self.counts if judged.clauses[name].shown is not None and name not in self.failing
-            ]
+            broken = [n for n in self.counts if judged.clauses[n].shown is not None and n not in self.failing]
             why = f"the class raises {run.wrong}" if run.wrong else f"{', '.join(broken)}: broken" if broken else ""
             if why:
                 found.setdefault(why, Counterexample((), f"{what}: {why}", tuple(self.told(events, run))))

@@ -137,8 +137,7 @@ class _Test:
         formulas = {c.name: records.clause(c.formula) if histories(c.formula) else c.formula for c in clauses}
         taken = {f"in.{port}": name for port, name in names.items()}
         taken |= {f"out.{p.name}": f"out.{safe_name(p.name)}" for p in outputs}
-        module = frozenset({PurePosixPath(subject.name).stem})
-        reserved = _RESERVED | {*names.values()} | module
+        reserved = _RESERVED | {*names.values(), PurePosixPath(subject.name).stem}
         before = Translator(taken, reserved)
         kept: list[tuple[str, str, str]] = []
         named: dict[Term, str] = {}
@@ -328,12 +327,10 @@ class _Test:
         if isinstance(said, Untranslatable):
             return
         message = repr(f"{clause.name}: {one_line(clause.sentence)}" if clause.sentence else clause.name)
-        match formula:
-            case Implies(left=left, right=right):
-                yield f"    if {self.after.formula(left)}:"
-                indent, said = "        ", self.after.formula(right)
-            case _:  # the assertion is not conditional
-                indent = "    "
+        indent = "    "
+        if isinstance(formula, Implies):
+            yield f"    if {self.after.formula(formula.left)}:"
+            indent, said = "        ", self.after.formula(formula.right)
         yield from (indent + line for line in f"assert {_wrapped(said)}, {message}".split("\n"))
 
 
