@@ -9,9 +9,7 @@ runs the test again to find the simplest case.
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import itertools
-import json
 import os
 import pickle
 import sys
@@ -20,7 +18,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, reject, seed, settings, target
@@ -55,7 +52,8 @@ from .convention import (
     valuation,
 )
 from .exchange import QUESTION, Answer, Met, Pairs, Question, Tried
-from .export import ADVANCE, MACHINE
+from .export import MACHINE
+from .generated import loaded, observed
 from .judging import guarantee, judged
 from .tuning import APART, BATCH, REJECTED_CASES, SHRINKING_SECONDS
 from .unit import Unit
@@ -115,51 +113,31 @@ class Bench:
         """Why the cases ended early, if they did."""
         self._over = False
         """Whether the run is: a state machine does not go on after an assertion that failed."""
-        self._memory: dict[str, Value] = {}
+        self.memory: dict[str, Value] = {}
         self._drawn: Inputs = {}
-        self._found: dict[str, Value] | None = None
+        self.found: dict[str, Value] | None = None
         self._starts: list[Inputs] = []
         self._hits: dict[str, list[int]] = {}
         self._tables: dict[int, tuple[Any, Value]] = {}
-        self._module = self._loaded()
+        self._module = loaded(self)
         self._runs = hasattr(self._module, MACHINE)
 
     # -- the generated test ------------------------------------------------------------------------------
 
-    def _loaded(self) -> ModuleType:
-        """The generated test, whose import finds the stand-in."""
-        stem = self.asked.path.stem
-        stand_in = ModuleType(stem)
-        made = _stand_in(self) if self.asked.driven else lambda **_: self._outputs_here(self._ask_here())
-        called = json.loads(self.asked.function)["class"] if self.asked.driven else self.asked.function
-        setattr(stand_in, called, made)
-        spec = importlib.util.spec_from_file_location("generated", Path(self.asked.test).resolve())
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        before = sys.modules.get(stem)
-        sys.modules[stem] = stand_in
-        spec.loader.exec_module(module)
-        if before is None:
-            del sys.modules[stem]
-        else:
-            sys.modules[stem] = before
-        return module
-
-    def _outputs_here(self, found: Mapping[str, Value]) -> dict[str, Any]:
+    def outputs_here(self, found: Mapping[str, Value]) -> dict[str, Any]:
         """Outputs as the generated test has them."""
         table = getattr(self._module, "Table", None)
         return {name: as_plain(value, table) for name, value in found.items()}
 
-    def _ask_here(self) -> dict[str, Value]:
+    def ask_here(self) -> dict[str, Value]:
         """The unit's outputs for the drawn inputs, if the assumptions certainly hold of these."""
         if not self._assumed(self._drawn):
             reject()
-        self._found = self.unit.advance(self._drawn)
-        return self._found
+        self.found = self.unit.advance(self._drawn)
+        return self.found
 
     def _run_test(self, phases: tuple[Phase, ...]) -> None:
-        """The generated test's cases, each judged by `_case`."""
+        """The generated test's cases, each judged by `case`."""
         chosen = settings(
             max_examples=tuning.MORE_CASES * self.asked.cases,
             stateful_step_count=self.asked.length,
@@ -172,14 +150,14 @@ class Bench:
         )
         machine = getattr(self._module, MACHINE, None)
         if machine is not None:
-            seed(self.seed)(get_state_machine_test(_observed(machine, self), settings=chosen))()
+            seed(self.seed)(get_state_machine_test(observed(machine, self), settings=chosen))()
             return
         (test,) = (made for name, made in vars(self._module).items() if name.startswith("test_"))
 
         def one(*nothing: Any, **drawn: Any) -> None:
             self.begin()
-            self._case(drawn, lambda: test.hypothesis.inner_test(*nothing, **drawn))
-            if self._found is None:
+            self.case(drawn, lambda: test.hypothesis.inner_test(*nothing, **drawn))
+            if self.found is None:
                 reject()
 
         strategies = test.hypothesis._given_kwargs
@@ -193,11 +171,11 @@ class Bench:
         self._hits = {name: list(g.hits) for name, g in self.guarantees.items()}
         if self.asked.driven:
             try:
-                self._memory = self.unit.begin()
+                self.memory = self.unit.begin()
             except SubjectFailed as error:
                 self._crashed(str(error), [])
-            if any(begun.holds(valuation(self._memory, {})) is False for begun in self.begins):
-                self._crashed("__init__ leaves other values than the plan's `initial` ones", [(self._memory, {})])
+            if any(begun.holds(valuation(self.memory, {})) is False for begun in self.begins):
+                self._crashed("__init__ leaves other values than the plan's `initial` ones", [(self.memory, {})])
 
     def _end_run(self) -> None:
         if self.trace and self.shrinking is None:
@@ -206,7 +184,7 @@ class Bench:
                 before = self._hits.get(name, each.hits)
                 each.run_hits = [n + (now > was) for n, now, was in zip(each.run_hits, each.hits, before, strict=True)]
 
-    def _case(self, drawn: Mapping[str, Any], test: Callable[[], None]) -> None:
+    def case(self, drawn: Mapping[str, Any], test: Callable[[], None]) -> None:
         """One case, or one step of a run: the test is called, and what came of it is judged."""
         if self._over:
             return
@@ -214,11 +192,11 @@ class Bench:
             raise self._stop("time")
         if self.shrinking is None and self.valid >= self.asked.cases and self._all_met():
             raise self._stop()
-        self._found = None
+        self.found = None
         complaint = ""
         try:
             names = self.asked.names
-            self._drawn = self._memory | {
+            self._drawn = self.memory | {
                 port: self._value(drawn[names[port]], sort)
                 for port, sort in self.inputs.items()
                 if names[port] in drawn
@@ -230,12 +208,12 @@ class Bench:
             self._crashed(str(error), [*self.trace, (self._drawn, {})])
         except Exception as error:  # whatever the test's own lines raise, it is no agreement
             complaint = str(error) or type(error).__name__
-        if self._found is None:
+        if self.found is None:
             self.rejected += self.shrinking is None
             if self.rejected > REJECTED_CASES * max(self.valid, 50):
                 raise self._stop("assumptions")
             return
-        self._judge(self._drawn, self._found, complaint)
+        self._judge(self._drawn, self.found, complaint)
 
     def _stop(self, why: str = "") -> _Stop:
         self._why = why
@@ -258,7 +236,7 @@ class Bench:
         values = self.keeper.at(valuation(inputs, found))
         self.trace.append((inputs, found))
         self.keeper.advance(valuation(inputs, found))
-        self._memory = self.unit.memory(found)
+        self.memory = self.unit.memory(found)
         if self.shrinking is not None:
             if self.shrinking and self.guarantees[self.shrinking].judged.holds(values) is False:
                 self.traces[self.shrinking] = list(self.trace)
@@ -489,40 +467,3 @@ class Bench:
 
 def _batches(requests: Sequence[tuple[Any, Any]]) -> list[Sequence[tuple[Any, Any]]]:
     return [requests[at : at + BATCH] for at in range(0, len(requests), BATCH)]
-
-
-def _stand_in(bench: Bench) -> type:
-    """A class in place of the one under test, which lives in its own process."""
-
-    class StandIn:
-        def __init__(self, *_: Any) -> None:
-            bench.begin()
-
-        def step(self, **_: Any) -> dict[str, Any]:
-            return bench._outputs_here(bench._ask_here())
-
-        def __getattr__(self, attribute: str) -> Any:
-            ports = [port for port, held in bench.asked.held.items() if held == attribute]
-            known = bench._found or bench._memory
-            values = [known[port] for port in ports if port in known]
-            if not values:
-                raise AttributeError(attribute)
-            return bench._outputs_here({"": values[0]})[""]
-
-    return StandIn
-
-
-def _observed(machine: Any, bench: Bench) -> Any:
-    """The generated state machine, each of whose steps the bench judges."""
-
-    class Observed(machine):  # type: ignore[misc]
-        def __init__(self) -> None:
-            if not bench.asked.driven:
-                bench.begin()
-            super().__init__()
-
-    def advance(self: Any, **drawn: Any) -> None:
-        bench._case(drawn, lambda: getattr(super(Observed, self), ADVANCE)(**drawn))
-
-    setattr(Observed, ADVANCE, advance)
-    return Observed

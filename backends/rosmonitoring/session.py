@@ -71,7 +71,7 @@ def filtered(setups: Iterable[Setup]) -> frozenset[str]:
     return frozenset(found)
 
 
-def told_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:
+def _report_withheld(monitors: Iterable[Monitor], counts: Mapping[str, int]) -> None:
     """A record behind a filter holds what its node said, and what was passed on. Where that is less, the guarantees
     were met by the filter, and it is no evidence of the node."""
     for monitor in monitors:
@@ -190,7 +190,7 @@ class Session:
     def finish(self) -> Iterator[Violation]:
         """What is judged only once the run is over."""
         yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
-        told_withheld(self.monitors, self.behind_filters)
+        _report_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> dict[str, str]:
         """The clauses, of the nodes that are to be monitored, of whose publications too few were decided; what the plan
