@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from avow.backends.rosmonitoring.wires import NotANumber, exact
 from avow.backends.rosmonitoring.traces import parse_event, read_lines, read_trace
+from avow.backends.rosmonitoring.wires import NotANumber, exact
 from avow.base.diagnostics import Rejected
 from avow.ros.bags import digest_trace
 
