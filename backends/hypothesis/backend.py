@@ -28,7 +28,7 @@ from avow.solving.replay import opaque_sorts
 from . import callbacks, export
 from .convention import ANY, EXACT
 from .exchange import QUESTION, Answer, Question, Tried
-from .judging import failure_bound
+from .judging import failure_bound, shown_bound
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -201,10 +201,10 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     counted = answer.valid if answer.runs is None else answer.runs
     hits = [t.cases if answer.runs is None else t.in_runs for t in own.triggers]
     least = min(hits, default=counted)
-    bound = {**outcome.bound, "confidence": CONFIDENCE, "failure_probability_below": round(failure_bound(counted), 6)}
+    bound = {**outcome.bound, "confidence": CONFIDENCE, "failure_probability_below": failure_bound(counted)}
     if hits:
         bound["triggered"] = least
-        bound["failure_probability_when_triggered_below"] = round(failure_bound(least), 6)
+        bound["failure_probability_when_triggered_below"] = failure_bound(least)
     meaning = (
         "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
         "below the bound; it is no probability about the robot's own inputs"
@@ -212,7 +212,7 @@ def _tested(outcome: Outcome, answer: Answer, own: Tried, wanted: int, seed: int
     replayed = f", {answer.replayed} that refuted it or a neighbour before" if answer.replayed else ""
     if answer.replayed:
         bound["replayed"] = answer.replayed
-    chance = f"95 %: below {failure_bound(least):.2g} of such {'cases' if answer.runs is None else 'runs'} fail"
+    chance = f"95 %: below {shown_bound(least)} of such {'cases' if answer.runs is None else 'runs'} fail"
     cases = f"{answer.valid} drawn cases"
     if answer.runs is not None:
         bound["runs"] = counted

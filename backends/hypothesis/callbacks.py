@@ -34,7 +34,7 @@ from avow.system.plan import Driving
 from . import tuning
 from .convention import ANY, EXACT, SPECIAL
 from .export import cases, numbers
-from .judging import failure_bound
+from .judging import failure_bound, shown_bound
 
 UNSTEADY = "undeclared input: asked the same again from its start, another process publishes otherwise"
 
@@ -314,14 +314,13 @@ class _Work:
             return replace(outcome, summary=why)
         if not count.triggered:
             return replace(outcome, summary=f"in none of {self.runs} runs was its condition met", vacuous=True)
-        below = failure_bound(count.triggered)
         bound |= {"confidence": tuning.CONFIDENCE, "triggered": count.triggered}
-        bound["failure_probability_below"] = round(failure_bound(self.runs), 6)
-        bound["failure_probability_when_triggered_below"] = round(below, 6)
+        bound["failure_probability_below"] = failure_bound(self.runs)
+        bound["failure_probability_when_triggered_below"] = failure_bound(count.triggered)
         before = f", {self.replayed} that refuted it or a neighbour before" if self.replayed else ""
         summary = (
             f"{self.runs} drawn runs of {self.messages} messages{before}: held at {count.held} judgements, none breaks "
-            f"it (seed {self.limits.seed}; 95 %: below {below:.2g} of such runs fail)"
+            f"it (seed {self.limits.seed}; 95 %: below {shown_bound(count.triggered)} of such runs fail)"
         )
         return replace(outcome, verdict=Verdict.TESTED, summary=summary)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 
 from avow.backend_kit.programs.judging import Formula
 from avow.formulas.conditions import Condition, conditions
@@ -74,5 +75,10 @@ def _shown(formula: Term) -> str:
 
 def failure_bound(cases: int) -> float:
     """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
-    "rule of three": about 3/n)."""
-    return 1.0 if cases == 0 else 1 - math.pow(1 - CONFIDENCE, 1 / cases)
+    "rule of three": about 3/n), rounded up to six decimals."""
+    return 1.0 if cases == 0 else math.ceil((1 - math.pow(1 - CONFIDENCE, 1 / cases)) * 10**6) / 10**6
+
+
+def shown_bound(cases: int) -> str:
+    """The same with two digits, rounded up."""
+    return f"{Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(failure_bound(cases))):g}"
