@@ -45,6 +45,13 @@ def test_they_are_decided() -> None:
     assert realizable(PAIRS.format("q == p")) is Verdict.PROVED
 
 
+@pytest.mark.parametrize("value", ["if in.b then 1 else 2", "1", "if in.b then 1 else (if in.c then 2 else 3)"])
+def test_a_real_output_may_be_given_whole_numbers(value: str) -> None:
+    text = "node n {{ inputs( b : BOOL, c : BOOL ) outputs( y : REAL ) topics() guarantee( out.y == ({}) {} ) }}"
+    assert realizable(text.format(value, "")) is Verdict.PROVED
+    assert realizable(text.format(value, "and out.y > 1")) is Verdict.REFUTED
+
+
 def test_a_wrong_instance_of_a_guarantee_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(witness_search, "instantiate", lambda found, guarantee, **_: TRUE)
     assert realizable(POINTS.format(CANNOT)) is not Verdict.PROVED
