@@ -118,6 +118,13 @@ PLAN_CODES = register(
         "Write one YAML mapping; quote texts such as `off` and `1:30`.",
     ),
     declare(
+        "PLAN136",
+        "parameter without effect",
+        "No Python file beside the source mentions a parameter that the plan's file sets.",
+        "Correct its name, or remove it.",
+        warning=True,
+    ),
+    declare(
         "PLAN121",
         "types clash",
         "An output and the input that it would feed have different types.",

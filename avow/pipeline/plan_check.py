@@ -19,6 +19,7 @@ from avow.pipeline.work import ENGINES
 from avow.system import launched
 from avow.system.faults import rest_of
 from avow.system.graph import dataflow
+from avow.system.node_plan import never_read
 from avow.system.plan import Located, Method, System
 from avow.system.rosgraph import account
 from avow.system.schema import violations
@@ -53,6 +54,7 @@ def of_plan(
         *without_words(system),
         *not_validated(system),
         *left_out(system),
+        *never_read(system.plan),
     ]
     for plan in system.plan.nodes:
         for method in plan.methods:

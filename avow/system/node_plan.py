@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -12,12 +13,12 @@ from typing import Any
 
 import yaml
 
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import inside, read_regular
 from avow.base.suggestions import suggest
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort
-from avow.ros.parameters import WrongParameters, is_sectioned, nested, of_node
+from avow.ros.parameters import WrongParameters, flat, is_sectioned, nested, of_node
 from avow.system.plan import Driving, Method, Numbers, Plan, Source
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -204,6 +205,26 @@ def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any]
             return {}, (Diagnostic("PLAN130", f"`{source.parameters}`: {unclear}", place),)
     wrong = tuple(Diagnostic("PLAN130", f"`{source.parameters}`: {why}", place) for why in _unclear(strict, loaded, ""))
     return loaded, wrong
+
+
+def never_read(plan: Plan) -> Iterator[Diagnostic]:
+    """A warning for each parameter that no Python file beside the source mentions: it changes nothing. A class of ROS 2
+    declares its parameters, so that driving it finds them."""
+    for entry in plan.nodes:
+        source = entry.source
+        if source is None or not source.python or not source.parameters or source.kind is Driving.RCLPY:
+            continue
+        path = plan.root / source.python
+        values, _ = parameters(plan.root, source, plan.ros.names.placed(entry.node).name)
+        with contextlib.suppress(OSError):
+            text = b" ".join(read_regular(file) for file in path.parent.glob("*.py"))
+            for name, _ in flat(values):
+                lost = [part for part in name.split(".") if not re.search(rf"\b{re.escape(part)}\b".encode(), text)]
+                if lost:
+                    message = f"`{source.parameters}` sets {name}; no Python file beside {path.name} has `{lost[0]}`"
+                    hint = "correct its name, or remove it"
+                    span = source.place.at("source", "parameters")
+                    yield Diagnostic("PLAN136", message, span, Severity.WARNING, hint=hint)
 
 
 def _unclear(strict: Any, loaded: Any, where: str) -> Iterator[str]:

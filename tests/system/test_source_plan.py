@@ -8,7 +8,7 @@ import pytest
 
 from avow.base.diagnostics import Rejected
 from avow.system.load import load_system
-from avow.system.node_plan import parameters
+from avow.system.node_plan import never_read, parameters
 from avow.system.plan import Numbers, Source
 
 CONTRACT = """node watchdog { inputs( now : REAL, beat : BOOL, last : REAL, f : REAL --> REAL )
@@ -70,3 +70,31 @@ def test_parameters_that_are_no_plain_mapping(text: str, tmp_path: Path) -> None
     (tmp_path / "p.yaml").write_text(text)
     _, faults = parameters(tmp_path, Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {}), "/n")
     assert {d.code for d in faults} == {"PLAN130"}
+
+
+@pytest.mark.parametrize("kind", ["", ", kind: rospy"])
+@pytest.mark.parametrize(
+    ("text", "lost"),
+    [
+        ("timeout: 0.5\n", []),
+        ("timeout: 0.5\nlimt: 9\n", ["limt"]),
+        ("n: {timeout: 9}\n", ["n"]),
+        ("gains: {p: 1, q: 2}\n", ["q"]),
+        ("elsewhere: 3\n", []),
+    ],
+)
+def test_parameters_that_no_file_mentions(text: str, lost: list[str], kind: str, tmp_path: Path) -> None:
+    node = f"    source: {{python: src.py, class: Watchdog, parameters: p.yaml{kind}}}\n"
+    load(tmp_path, node)
+    (tmp_path / "src.py").write_text("class Watchdog:\n    USED = ('timeout', 'gains', 'p')\n")
+    (tmp_path / "helper.py").write_text("def of(params):\n    return params['elsewhere']\n")
+    (tmp_path / "p.yaml").write_text(text)
+    found = list(never_read(load_system(tmp_path).plan))
+    assert [d.message.rpartition("has ")[2] for d in found] == [f"`{name}`" for name in lost]
+    assert {d.code for d in found} <= {"PLAN136"}
+    assert not any(d.is_error for d in found)
+
+
+def test_a_class_of_ros_2_declares_its_parameters(tmp_path: Path) -> None:
+    load(tmp_path, "    source: {python: src.py, class: Watchdog, parameters: p.yaml, kind: rclpy}\n")
+    assert not list(never_read(load_system(tmp_path).plan))
