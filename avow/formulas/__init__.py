@@ -1,5 +1,5 @@
-"""Formulas as meanings: normal forms, digests, substitution, traversal, concrete values. Asks no solver.
+"""Formulas as meanings: normal forms, digests, substitution, traversal, concrete values. Calls no solver.
 
-Front doors: `avow.formulas.formula`, `avow.formulas.traversal`, `avow.formulas.values`; for clauses that speak of other
-steps `avow.formulas.temporal`.
+Start reading at: `avow.formulas.formula`, `avow.formulas.traversal`, `avow.formulas.values`; for clauses that refer to
+other steps, `avow.formulas.temporal`.
 """

@@ -1,9 +1,9 @@
 """Conditionals lifted to the atom: ``max(a, b) < c`` as ``(b > a -> b < c) and (not b > a -> a < c)``.
 
-For targets whose terms have no conditionals (RML's conditions, say). `xor`, `abs`, `min`, `max` and conditionals are
-gone afterwards, but for those in a quantified formula within a term; `mod` and `div` stay, for they are no choice
-between terms. The meaning is the same, the size may double with each conditional in one atom, and more than
-`ATOMS_MADE` atoms are refused.
+For targets whose terms have no conditionals (such as RML's conditions). `xor`, `abs`, `min`, `max` and conditionals are
+eliminated, except in a quantified formula within a term; `mod` and `div` remain, since they do not choose between
+terms. The meaning is the same. The size may double with each conditional in one atom; more than `ATOMS_MADE` atoms are
+refused.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from avow.language.sorts import BOOL
 
 
 class TooManyCases(Exception):  # noqa: N818 - it names what the formula has
-    """Its conditionals make more than `ATOMS_MADE` atoms."""
+    """The conditionals of the formula make more than `ATOMS_MADE` atoms."""
 
 
 def lifted(formula: t.Term) -> t.Term:
@@ -53,15 +53,15 @@ def _formula(term: t.Term, left: Iterator[int]) -> Steps[t.Term]:
 
 
 def _choice(term: t.Term) -> tuple[t.Term, t.Term, t.Term] | None:
-    """The first choice within a term: on which condition it is which of two terms; None where there is none."""
+    """The first choice within a term: its condition and the two terms to choose between; None if there is none."""
     match term:
         case t.Conditional():
             return term.condition, term.then, term.otherwise
         case t.Operation() if (made_of := definition(term)) is not None:
             return _choice(made_of) if isinstance(made_of, t.Conditional) else (made_of, t.TRUE, t.FALSE)
         case t.Quantified() | t.History():
-            return None  # what is chosen within depends on its variables, or on the step
-        case _:  # no choice itself: the first one within it
+            return None  # a choice within depends on its variables, or on the step
+        case _:  # not a choice itself: the first one within it
             parts = term.children
             for place, part in enumerate(parts):
                 inside = _choice(part)

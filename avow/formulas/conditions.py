@@ -1,9 +1,9 @@
-"""Under which conditions a formula demands something: read off its meaning, whatever connectives say it.
+"""The conditions under which a formula demands something, derived from its meaning and not from its connectives.
 
-``a -> b``, ``not a or b``, ``not (a and not b)`` and ``b or not a`` demand b under a; ``a <=> b`` and its like demand b
-under a, and ``not b`` under ``not a``. The formula is taken apart into disjunctions, each under the universal
-quantifiers around it. What of a disjunction speaks of inputs only is its condition, negated, with the denied parts of
-the rest where something else is left, which is the demand.
+``a -> b``, ``not a or b``, ``not (a and not b)`` and ``b or not a`` demand b under a; ``a <=> b`` and its equivalents
+demand b under a, and ``not b`` under ``not a``. The formula is split into disjunctions, each under the universal
+quantifiers around it. The condition of a disjunction is the negation of its items about inputs only, and of the denials
+among the other items if an item is left that is not a denial: the demand.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from avow.language.sorts import BOOL, BoolSort
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """`parts` hold together for some values of the `outer` variables: then something is demanded."""
+    """Something is demanded if all `parts` hold for some values of the `outer` variables."""
 
     outer: tuple[t.Variable, ...]
     parts: tuple[t.Term, ...]
 
     @property
     def formula(self) -> t.Term:
-        """That it comes about."""
+        """The formula that the condition occurs."""
         whole = with_value(conjunction(self.parts))
         free = free_variables(whole)
         used = tuple(v for v in self.outer if v in free)
@@ -40,7 +40,7 @@ class Condition:
 
 
 def conditions(formula: t.Term) -> tuple[Condition, ...]:
-    """Every condition under which the formula demands something, each once; none where it always demands all of it."""
+    """Every condition under which the formula demands something, each once; empty if it always demands everything."""
     if depth(formula) > CONDITION_DEPTH:
         return ()
     found: dict[Condition, None] = {}
@@ -88,8 +88,8 @@ def _denied(item: t.Term) -> t.Term:
 
 
 def _clauses(term: t.Term, positive: bool, halve: bool = True) -> Iterator[_Clause]:
-    """The disjunctions that together are the term, or its negation. Bound names are apart. Within an equivalence
-    another one is not halved (`halve`): each would double what is said."""
+    """The disjunctions whose conjunction is the term, or its negation. Bound names are distinct. An equivalence within
+    another is not split (`halve`): each split would double the size."""
     match term:
         case t.Not(body=body):
             yield from _clauses(body, not positive, halve)
@@ -131,8 +131,8 @@ def _halves(left: t.Term, right: t.Term, same: bool) -> Iterator[_Clause]:
 
 
 def _joined(parts: list[tuple[t.Term, bool]], halve: bool) -> Iterator[_Clause]:
-    """The disjunction of some terms. A conjunction among them is spread over the others only where it says something
-    of inputs and something of outputs: ``(a or b) -> c`` is under one condition."""
+    """The disjunction of some terms. A conjunction among them is distributed over the others only if it has parts about
+    inputs and parts about outputs: ``(a or b) -> c`` has one condition."""
     choices: list[list[_Clause]] = []
     for term, positive in parts:
         found = (
@@ -148,14 +148,14 @@ def _joined(parts: list[tuple[t.Term, bool]], halve: bool) -> Iterator[_Clause]:
         choices = [[_Clause((), (term if positive else negation(term),))] for term, positive in parts]
     for chosen in product(*choices):
         items = tuple(dict.fromkeys(item for clause in chosen for item in clause.items))
-        if not any(negation(item) in items for item in items):  # else it says nothing
+        if not any(negation(item) in items for item in items):  # otherwise it is a tautology
             yield _Clause(
                 tuple(v for clause in chosen for v in clause.outer), items, any(clause.halved for clause in chosen)
             )
 
 
 def _is_junction(term: t.Term, positive: bool) -> bool:
-    """Whether it is, as it stands here, a conjunction: of inputs only, it stays one condition."""
+    """Whether it is a conjunction under this sign; one about inputs only remains one condition."""
     match term:
         case t.Not(body=body):
             return _is_junction(body, not positive)

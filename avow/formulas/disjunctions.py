@@ -1,4 +1,5 @@
-"""A formula as a disjunction of conjunctions, one level at a time: a quantifier searches one conjunction at a time."""
+"""A formula as a disjunction of conjunctions, one level at a time: the search for a quantifier's values handles one
+conjunction at a time."""
 
 from __future__ import annotations
 
@@ -36,14 +37,14 @@ def branches(
 
 
 def conjunction(term: t.Term, positive: bool) -> tuple[list[Part], list[t.Variable]]:
-    """The conjunction that a formula is, and the variables of the existential quantifiers on the way to its parts."""
+    """The conjuncts of a formula, and the variables of the existential quantifiers around them."""
     variables: list[t.Variable] = []
     parts = [Part(part, truth, bound_names(part)) for part, truth in _apart(term, positive, variables)]
     return parts, variables
 
 
 def conjuncts(term: t.Term, positive: bool) -> list[t.Term]:
-    """The conjunction that a formula, or its negation, is; a quantified part stays one."""
+    """The conjuncts of a formula, or of its negation; a quantified part is not split."""
     parts = (part if truth else opposite(part) for part, truth in _apart(term, positive, None))
     return [part for part in parts if part != t.TRUE]
 
@@ -71,12 +72,12 @@ def _apart(term: t.Term, positive: bool, variables: list[t.Variable] | None) -> 
                 stack.append((left, positive is ((operator == "==") is value)))
             case t.Compare(operator="==" | "!=" as operator, left=t.Literal(value=bool() as value), right=right):
                 stack.append((right, positive is ((operator == "==") is value)))
-            case _:  # a part that is judged as a whole
+            case _:  # a part that is evaluated as a whole
                 yield term, positive
 
 
 def alternatives(term: t.Term, positive: bool) -> tuple[tuple[t.Term, bool], ...] | None:
-    """The sides of a formula that is a disjunction."""
+    """The disjuncts of a formula; None if it is not a disjunction."""
     match term:
         case t.Or(items=items) if positive:
             return tuple((item, True) for item in items)
@@ -94,7 +95,7 @@ def alternatives(term: t.Term, positive: bool) -> tuple[tuple[t.Term, bool], ...
             return alternatives(defined, positive)
         case t.Conditional(condition=condition, then=then, otherwise=otherwise):
             return ((_both(condition, then, positive), True), (_both(t.Not(condition), otherwise, positive), True))
-        case _:  # no disjunction: evaluated as a whole
+        case _:  # not a disjunction: evaluated as a whole
             return None
 
 

@@ -1,5 +1,6 @@
-"""A question within a scenario: quantifiers range over the few values that the scenario gives their sort, and inputs
-take the values that it gives them. What holds then is *checked*, not proved; what fails says nothing by itself."""
+"""Formulas within a scenario: quantifiers range over the few values that the scenario gives their sort, and inputs take
+the values that it gives them. A formula that holds then is *checked*, not proved; one that fails shows nothing by
+itself."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ class Ranges:
         return bool(self.sorts or self.inputs)
 
     def assumptions(self, inputs: Sequence[Variable]) -> dict[str, Term]:
-        """That these inputs have the values that the scenario gives them, by labels that no clause can have."""
+        """The assumptions that these inputs have the values that the scenario gives them, by labels that no clause can
+        have."""
         found = {}
         for variable in inputs:
             values = self.inputs.get(variable, self.sorts.get(variable.sort, ()))
@@ -43,7 +45,7 @@ class Ranges:
         return found
 
     def within(self, term: Term) -> Term:
-        """The formula with its quantifiers over the scenario's values."""
+        """The formula with its quantifiers expanded over the scenario's values."""
         if not isinstance(term, Quantified):
             return map_children(term, self.within)
         body = self.within(term.body)
@@ -67,7 +69,7 @@ class Ranges:
 
 
 _SIMPLE = BoolSort | EnumSort | IntegerSort | NaturalSort | RealSort | StringSort
-"""Sorts whose values are written out; any other keeps its range."""
+"""Sorts whose values are written out; quantifiers over other sorts are kept."""
 
 
 def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
@@ -80,8 +82,8 @@ def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
 def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Value]:
     """The inputs of a node that are relations given by the scenario's tables: each holds at the rows and nowhere else.
 
-    A function with another result is not fixed: a table says nothing of its value elsewhere. Cells that are no value of
-    their sort leave the input open, too (the plan's checks report them).
+    A function with another result is not fixed: a table does not give its value elsewhere. Entries that are not a value
+    of their sort leave the input open, too (the plan's checks report them).
     """
     found: dict[Variable, Value] = {}
     for port in node.inputs:
@@ -95,7 +97,7 @@ def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Valu
 
 
 def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -> list[tuple[Value, ...]] | None:
-    """The rows of the table that interprets a port; None where there is none of such columns."""
+    """The rows of the table that interprets a port; None if there is no table with such columns."""
     said = scenario.interpreted(node.name, port)
     if said is None or len(said[1]) != len(sorts):
         return None
@@ -108,7 +110,7 @@ def rows_of(node: Node, port: Port, sorts: Sequence[Sort], scenario: Scenario) -
 
 
 def _value(text: str, sort: Sort) -> Value:
-    """Raises ValueError."""
+    """The value that a text denotes. Raises ValueError."""
     match sort:
         case RealSort():
             return exact(text)

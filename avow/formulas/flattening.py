@@ -1,4 +1,4 @@
-"""``and`` and ``or`` flattened, of whatever kind: one rule for terms, properties of agents, and RML conditions."""
+"""Flattening of ``and`` and ``or`` of any kind: one rule for terms, properties of agents, and RML conditions."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ T = TypeVar("T", bound=Hashable)
 
 
 def joined(items: Iterable[T], kind: Any, unit: T, zero: T, *, once: bool = False) -> T:
-    """A junction of the items: of one that is itself of the `kind`, its own `items`, however deep; without the `unit`,
-    which changes nothing; the `zero` where it is among them, which decides it. `once`: each item once."""
+    """A junction of the items. An item that is itself of the `kind` is replaced by its `items`, at any depth; the
+    `unit` is left out; the result is `zero` if an item is. `once`: each item once."""
     found: list[T] = []
     stack = list(items)
     stack.reverse()

@@ -23,12 +23,12 @@ from avow.language.operators import OPPOSITE
 
 
 def conjunction(terms: Iterable[t.Term]) -> t.Term:
-    """``and`` of all of them, flattened; TRUE of none."""
+    """``and`` of all the terms, flattened; TRUE if there are none."""
     return joined(terms, t.And, t.TRUE, t.FALSE)
 
 
 def disjunction(terms: Iterable[t.Term]) -> t.Term:
-    """``or`` of all of them, flattened; FALSE of none."""
+    """``or`` of all the terms, flattened; FALSE if there are none."""
     return joined(terms, t.Or, t.FALSE, t.TRUE)
 
 
@@ -42,12 +42,12 @@ def negation(term: t.Term) -> t.Term:
 
 
 def opposite(term: t.Term) -> t.Term:
-    """An equivalent of ``not term``, without a `not` in front if there is one."""
+    """An equivalent of ``not term``, without a leading `not` if there is such a form."""
     return t.Compare(OPPOSITE[term.operator], term.left, term.right) if isinstance(term, t.Compare) else negation(term)
 
 
 def equation(one: t.Term, other: t.Term) -> t.Term:
-    """That two terms have one value: ``<=>`` of formulas."""
+    """The equation of two terms; ``<=>`` for formulas."""
     return t.Iff(one, other) if one.sort == s.BOOL else t.Compare("==", one, other)
 
 
@@ -71,7 +71,7 @@ def free_variables(term: t.Term) -> frozenset[t.Variable]:
 
 
 def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
-    """Put terms for free variables, all at once; bound variables are renamed where they would capture one."""
+    """Replace free variables by terms, all at once; bound variables are renamed if they would capture one."""
     if not mapping:
         return term
     taken = {variable.name for replacement in mapping.values() for variable in free_variables(replacement)}
@@ -102,7 +102,7 @@ def substitute(term: t.Term, mapping: Mapping[t.Variable, t.Term]) -> t.Term:
 
 
 def fresh(name: str, taken: Collection[str]) -> str:
-    """The name, with as many primes as it needs to be none of those taken."""
+    """The name, with as many primes as needed to differ from those taken."""
     while name in taken:
         name += "'"
     return name
@@ -117,7 +117,7 @@ def normalise(term: t.Term) -> t.Term:
 
 
 def digest(*terms: t.Term) -> str:
-    """SHA-256 of the meaning of some formulas; their order does not count."""
+    """SHA-256 of the meaning of some formulas; their order is irrelevant."""
     return _hash("formulas", *sorted(set(map(meaning, terms))), "sorts")
 
 
@@ -129,13 +129,13 @@ def meaning(term: t.Term) -> str:
 
 @by_identity(50_000)
 def node_digest(node: Node, clause: Clause) -> str:
-    """SHA-256 of one clause under its node's assumptions: what evidence for it is about."""
+    """SHA-256 of one clause under its node's assumptions: the identity that evidence refers to."""
     assumed = digest(*(a.formula for a in node.assumptions if a != clause))
     return _hash(str(clause.kind), digest(clause.formula), assumed)
 
 
 def sort_digest(sort: s.Sort) -> str:
-    """SHA-256 of a sort by its definition: the name of an enumeration or a data type does not count."""
+    """SHA-256 of a sort by its definition: the name of an enumeration or a data type is irrelevant."""
     match sort:
         case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
             return _hash(type(sort).__name__)
@@ -195,7 +195,7 @@ def _normal(term: t.Term, scope: Mapping[t.Variable, t.Variable], level: int) ->
             return _make(term, sorted({key: (part, key) for part, key in parts}.values(), key=_key))
         case t.Literal() | t.EnumValue():
             return _keyed(term)
-        case _:  # its normal form is that of its parts, in their order
+        case _:  # normal once its parts are, in their order
             return _make(term, parts)
 
 
@@ -288,7 +288,7 @@ def _keyed(term: t.Term) -> _Keyed:
 
 
 def _term_key(term: t.Term) -> str:
-    """The digest of a term that is normal already."""
+    """The digest of a term that is already normal."""
 
     def steps(current: t.Term) -> Steps[str]:
         keys: list[str] = []
@@ -301,7 +301,7 @@ def _term_key(term: t.Term) -> str:
 
 
 def _head(term: t.Term) -> tuple[str, ...]:
-    """What a term says beside its direct subterms."""
+    """The data of a term besides its direct subterms."""
     match term:
         case t.Literal(value=value, sort=sort):
             return (

@@ -1,5 +1,5 @@
-"""Endless runs of explicit graphs: strongly connected components, and the search for a run that an automaton accepts,
-given as a path with a loop (a lasso). Runs are endless: a way to a state without successors is none."""
+"""Infinite runs of explicit graphs: strongly connected components, and the search for a run that an automaton accepts,
+given as a path with a loop (a lasso). Runs are infinite: a path to a state without successors is not a run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ Successors = Callable[[int], Sequence[int]]
 
 @dataclass(frozen=True, slots=True)
 class Fair:
-    """A strong fairness assumption over labels: whoever meets all of `asking` for ever, meets `granting` for ever."""
+    """A strong fairness assumption over labels: a run that meets all of `asking` infinitely often meets `granting`
+    infinitely often."""
 
     asking: int
     granting: int
@@ -30,12 +31,12 @@ class Lasso:
 
     @property
     def prefix(self) -> tuple[int, ...]:
-        """What comes before the loop."""
+        """The states before the loop."""
         return self.path[: self.loop]
 
     @property
     def cycle(self) -> tuple[int, ...]:
-        """What is repeated for ever."""
+        """The states repeated for ever."""
         return self.path[self.loop :]
 
 
@@ -49,9 +50,9 @@ def accepted_run(
 ) -> Lasso | None:
     """A fair run of a graph that the automaton accepts, or None if there is none.
 
-    The leaves of the automaton are the low bits of the labels. The product is explored whole, decomposed, and each
-    component cut down by the fairness assumptions until it is fair or gone. `tick` is called for every state of the
-    product; what it raises ends the search.
+    The leaves of the automaton are the low bits of the labels. The whole product is explored and decomposed, and each
+    component is reduced by the fairness assumptions until it is fair or empty. `tick` is called for every state of the
+    product; an exception from it ends the search.
     """
     width = len(automaton.positive)
     matching: dict[int, tuple[int, ...]] = {}
@@ -104,7 +105,7 @@ def accepted_run(
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """Whether the runs that begin so can still be accepted, whatever comes after (bad prefixes: Kupferman and Vardi,
+    """Whether some continuation of a prefix can still be accepted (bad prefixes: Kupferman and Vardi,
     "Model checking of safety properties", FMSD 2001). `live`: nodes of the automaton from which some run is accepted.
     """
 
@@ -115,20 +116,20 @@ class Monitor:
         return self.live.intersection(self.automaton.initial)
 
     def at(self, nodes: frozenset[int], label: int) -> frozenset[int]:
-        """The nodes that fit the step that is read."""
+        """The nodes that match the step that is read."""
         positive, negative = self.automaton.positive, self.automaton.negative
         return frozenset(n for n in nodes if label & positive[n] == positive[n] and not label & negative[n])
 
     def after(self, nodes: frozenset[int]) -> frozenset[int]:
-        """The nodes that may come next; with none, every run that begins so is rejected."""
+        """The nodes that may come next; if empty, every run with this prefix is rejected."""
         return frozenset(t for n in nodes for t in self.automaton.successors[n] if t in self.live)
 
 
 def monitor(automaton: Automaton[A]) -> Monitor:
-    """What tells the bad prefixes of the property whose runs the automaton accepts."""
+    """The monitor that detects bad prefixes of the property whose runs the automaton accepts."""
     ahead = automaton.successors
     live: set[int] = set()
-    for part in strong_components(range(len(ahead)), ahead.__getitem__):  # a component after those that it leads to
+    for part in strong_components(range(len(ahead)), ahead.__getitem__):  # a component after those reachable from it
         members = set(part)
         endless = len(part) > 1 or part[0] in ahead[part[0]]
         accepted = endless and all(members & accepting for accepting in automaton.accepting)
@@ -144,7 +145,7 @@ def rejected_prefix(
     wanted: Monitor,
     tick: Callable[[], None] | None = None,
 ) -> tuple[int, ...] | None:
-    """A shortest way through a graph after which no continuation at all is accepted, or None if there is none."""
+    """A shortest path through a graph after which no continuation is accepted, or None if there is none."""
     before: dict[tuple[int, frozenset[int]], tuple[int, frozenset[int]] | None] = {}
     queue = deque[tuple[int, frozenset[int]]]()
 
@@ -181,7 +182,7 @@ def _fair_core(
     automaton: Automaton[A],
     width: int,
 ) -> set[int] | None:
-    """A strongly connected part in which every acceptance set is met and every fairness assumption can be."""
+    """A strongly connected part in which every acceptance set is met and every fairness assumption can be met."""
     work = [component]
     while work:
         part = work.pop()
@@ -213,7 +214,7 @@ def _lasso(
     automaton: Automaton[A],
     width: int,
 ) -> Lasso:
-    """A short way to the core, then a round through it that meets everything that must be met."""
+    """A short path to the core, then a cycle in it that meets everything that must be met."""
     stem = _path(roots, core.__contains__, successors)
     entry = stem[-1]
     round_trip = [entry]
@@ -239,7 +240,7 @@ def _lasso(
 
 
 def _path(sources: Sequence[int], meets: Callable[[int], bool], successors: Successors) -> list[int]:
-    """The shortest path from a source to something wanted; there is one."""
+    """The shortest path from a source to a node that `meets`; one must exist."""
     before: dict[int, int] = dict.fromkeys(sources, -1)
     queue = deque(before)
     while queue:

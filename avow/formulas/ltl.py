@@ -1,8 +1,8 @@
 """Linear temporal logic over any atoms: negation normal form, and generalised Büchi automata by the tableau of Gerth,
 Peled, Vardi and Wolper ("Simple on-the-fly automatic verification of linear temporal logic", PSTV 1995).
 
-A node of the automaton may be at a state where all its positive atoms hold and none of its negative ones; a run is
-accepted when it meets each acceptance set again and again. `avow.formulas.lasso` searches a graph for such a run.
+A node of the automaton matches a state in which all its positive atoms hold and none of its negative ones; a run is
+accepted if it meets each acceptance set infinitely often. `avow.formulas.lasso` searches a graph for such a run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ A = TypeVar("A", bound=Hashable)
 
 
 class TooLarge(Exception):  # noqa: N818 - it names what happened
-    """The automaton has more nodes than are worth building."""
+    """The automaton has more than `AUTOMATON_NODES` nodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Until(Generic[A]):
 
 @dataclass(frozen=True, slots=True)
 class Release(Generic[A]):
-    """`right` holds up to and including the step at which `left` does, or for ever."""
+    """`right` holds up to and including the step at which `left` holds, or for ever."""
 
     left: Normal[A]
     right: Normal[A]
@@ -61,7 +61,7 @@ Normal = Lit[A] | Both[A] | Either[A] | Next[A] | Until[A] | Release[A]
 
 
 def join(items: Iterable[Normal[A]], both: bool) -> Normal[A]:
-    """``and`` (or ``or``) of all of them, two by two from the right; without those that change nothing."""
+    """``and`` (or ``or``) of all the items, nested in pairs from the right, without neutral items."""
     kind, other = (Both, Either) if both else (Either, Both)
     kept = [item for item in items if item != kind(())]
     if other(()) in kept:
@@ -73,17 +73,17 @@ def join(items: Iterable[Normal[A]], both: bool) -> Normal[A]:
 
 
 def always(body: Normal[A], positive: bool = True) -> Normal[A]:
-    """``always``; its dual of a body that is negated already."""
+    """``always``; its dual if the body is already negated."""
     return Release(Either(()), body) if positive else Until(Both(()), body)
 
 
 def eventually(body: Normal[A], positive: bool = True) -> Normal[A]:
-    """``eventually``; its dual of a body that is negated already."""
+    """``eventually``; its dual if the body is already negated."""
     return always(body, not positive)
 
 
 def until(left: Normal[A], right: Normal[A], positive: bool = True) -> Normal[A]:
-    """``until``; its dual of sides that are negated already."""
+    """``until``; its dual if the sides are already negated."""
     return Until(left, right) if positive else Release(left, right)
 
 
@@ -113,8 +113,8 @@ def parts(formula: Normal[A]) -> Iterator[Normal[A]]:
 
 @dataclass(frozen=True, slots=True)
 class Automaton(Generic[A]):
-    """Node n: `positive[n]` and `negative[n]` are bit sets of leaves; `accepting` are sets of nodes' numbers, one for
-    each acceptance set; `leaves` are the atoms."""
+    """Node n: `positive[n]` and `negative[n]` are bit sets of leaves; `accepting` has the node numbers of each
+    acceptance set; `leaves` are the atoms."""
 
     leaves: tuple[A, ...]
     positive: tuple[int, ...]
@@ -126,7 +126,7 @@ class Automaton(Generic[A]):
 
 @dataclass(slots=True)
 class _Node:
-    """In the paper's words; formulas by their numbers."""
+    """A node, in the paper's terms; formulas are given by their numbers."""
 
     incoming: set[int]
     new: list[int]
@@ -138,7 +138,7 @@ _START = -1
 
 
 def build(goal: Normal[A]) -> Automaton[A]:
-    """The automaton that accepts just the runs on which the formula holds. Raises TooLarge."""
+    """The automaton that accepts exactly the runs on which the formula holds. Raises TooLarge."""
     numbers: dict[Normal[A], int] = {}
     for part in parts(goal):
         numbers.setdefault(part, len(numbers))
@@ -147,7 +147,7 @@ def build(goal: Normal[A]) -> Automaton[A]:
     opposite = [numbers.get(Lit(p.atom, not p.positive)) if isinstance(p, Lit) else None for p in formulas]
 
     def expand(node: _Node, item: int) -> tuple[_Node, ...]:
-        """The node with one formula more that holds; several where it holds in several ways."""
+        """The node with one more formula that holds; several nodes if it can hold in several ways."""
         below = inner[item]
         match formulas[item]:
             case Both(items=()):

@@ -1,4 +1,5 @@
-"""Negation normal form: `not` only before atoms, no `->`; `<=>` and `if` stay, which may double what they hold."""
+"""Negation normal form: `not` only before atoms, no `->`; `<=>` and `if` remain, since expanding them may double their
+parts."""
 
 from __future__ import annotations
 

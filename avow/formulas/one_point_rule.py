@@ -1,9 +1,9 @@
-"""The one-point rule: where a quantified variable can have one value only, that value stands for it.
+"""The one-point rule: a quantified variable that can have only one value is replaced by that value.
 
-``exists(i | c == inspect(i) and P(i))`` says that c is an `inspect`, and that P holds of what is in it: the rule goes
-through constructors, tuples, sums and differences. A whole number between two numbers that are written down has few
-values, and each stands for it in turn. The meaning stays the same, whatever the sorts: a variable's value has to be of
-its sort, which is said where that of the term is a wider one.
+``exists(i | c == inspect(i) and P(i))`` means that c is an `inspect` and that P holds for its argument: the rule goes
+through constructors, tuples, sums and differences. A whole number between two literals has few values, and is replaced
+by each in turn. The meaning is the same for all sorts: a variable's value must be of its sort, which is stated if the
+sort of the term is wider.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from avow.language.subterms import subterms
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """What an equation says of some variables: the `values` that they have, in terms of none of them, and the `rest`,
-    which has to hold besides."""
+    """The solution of an equation for some variables: their `values`, which mention none of them, and the `rest` that
+    must hold as well."""
 
     values: Mapping[t.Variable, t.Term]
     rest: tuple[t.Term, ...]
 
 
 def solved(equation: t.Term, unknown: Collection[t.Variable]) -> Solved | None:
-    """An equation solved for those of the `unknown` variables that it determines; None where it determines none."""
+    """An equation solved for those of the `unknown` variables that it determines; None if it determines none."""
     if not isinstance(equation, t.Iff) and not (isinstance(equation, t.Compare) and equation.operator == "=="):
         return None
     for pattern, known in (equation.children, reversed(equation.children)):
@@ -47,19 +47,19 @@ def solved(equation: t.Term, unknown: Collection[t.Variable]) -> Solved | None:
 
 
 def made_with(term: t.Term) -> str | None:
-    """The constructor of which a condition says, as `solved` does, that a value was made with it (of ``!=``: was not);
-    None of every other term."""
+    """The constructor with which a value was made (for ``!=``: was not made), if the term is such a condition as
+    `solved` writes it; otherwise None."""
     match term:
         case t.Compare(operator="==" | "!=", left=left, right=t.Construct(constructor=name, arguments=arguments)):
             own = (isinstance(a, t.Argument) and a.constructor == name and a.value == left for a in arguments)
             return name if arguments and all(own) else None
-        case _:  # says it of nothing
+        case _:  # not such a condition
             return None
 
 
 @by_identity(10_000)
 def without_points(formula: t.Term) -> t.Term:
-    """The formula without the quantified variables that can have one value only, or few that are written down."""
+    """The formula without the quantified variables that can have only one value, or few between two literals."""
     if not any(isinstance(part, t.Quantified) for part in subterms(formula)):
         return formula
     return transform(formula, _without)
@@ -95,13 +95,13 @@ def _matched(pattern: t.Term, known: t.Term, unknown: set[t.Variable]) -> Solved
                 waiting.extend(reversed(tuple(zip(items, parts, strict=True))))
             case _ if turned is not None:
                 waiting.append(turned)
-            case _:  # determines nothing as it stands
+            case _:  # determines no variable
                 rest.append(t.Compare("==", pattern, known))
     return Solved(values, tuple(rest))
 
 
 def _turned(pattern: t.Arithmetic, known: t.Term, unknown: Collection[t.Variable]) -> tuple[t.Term, t.Term] | None:
-    """``s + t == known`` as ``s == known - t``, where only s is unknown, or only t; of a difference likewise."""
+    """``s + t == known`` as ``s == known - t``, if only s is unknown, or only t; likewise for a difference."""
     left, right, sort = pattern.left, pattern.right, REAL if pattern.sort == REAL else INTEGER
     if pattern.operator not in ("+", "-") or _mentions(left, unknown) == _mentions(right, unknown):
         return None
@@ -113,8 +113,8 @@ def _turned(pattern: t.Arithmetic, known: t.Term, unknown: Collection[t.Variable
 
 
 def _within(value: t.Term, sort: Sort) -> tuple[t.Term, ...] | None:
-    """What has to hold for a term's value to be of a sort; None where no formula says it. Of a natural it is said in
-    any case: where a solver puts something for a variable, that is known beside the formula at best."""
+    """The conditions for a term's value to be of a sort; None if no formula expresses them. For NATURAL the condition
+    is always stated: if a solver substitutes for a variable, its sort is at best known outside the formula."""
     if sort == NATURAL and value.sort in (INTEGER, NATURAL):
         return (t.Compare(">=", value, t.Literal(0, INTEGER)),)
     return () if value.sort == sort or (sort == INTEGER and value.sort == NATURAL) else None
@@ -136,7 +136,7 @@ def _without(term: t.Term) -> t.Term:
 
 
 def _eliminated(variables: tuple[t.Variable, ...], parts: list[t.Term]) -> tuple[tuple[t.Variable, ...], list[t.Term]]:
-    """Of "there are `variables` such that all `parts` hold": the variables still needed, and the parts then."""
+    """The variables still needed in "there are `variables` such that all `parts` hold", and the remaining parts."""
     while variables and len(parts) <= PARTS_SEARCHED:
         for at, part in enumerate(parts):
             found = solved(part, variables)
@@ -153,7 +153,7 @@ def _eliminated(variables: tuple[t.Variable, ...], parts: list[t.Term]) -> tuple
 def _cases(
     variables: tuple[t.Variable, ...], parts: list[t.Term]
 ) -> Iterator[tuple[tuple[t.Variable, ...], list[t.Term]]]:
-    """The same for each of a variable's few values, where the parts bound a whole number by numbers."""
+    """The same for each of a variable's few values, if the parts bound a whole number by literals."""
     for variable in variables:
         values = _range(variable, parts) if len(parts) <= PARTS_SEARCHED else None
         if values is not None:
@@ -181,7 +181,7 @@ def _range(variable: t.Variable, parts: Sequence[t.Term]) -> range | None:
 
 
 def _bounds(part: t.Term, variable: t.Variable) -> Iterator[tuple[str, Fraction]]:
-    """``("<", 3)`` where a part says that the variable is less than 3."""
+    """``("<", 3)`` if a part states that the variable is less than 3."""
     if isinstance(part, t.Compare) and part.operator in FLIPPED:
         flipped = part.right, part.left, FLIPPED[part.operator]
         for one, other, sign in ((part.left, part.right, part.operator), flipped):
@@ -191,8 +191,8 @@ def _bounds(part: t.Term, variable: t.Variable) -> Iterator[tuple[str, Fraction]
 
 
 def _closed(term: t.Quantified, variables: tuple[t.Variable, ...], parts: Sequence[t.Term]) -> t.Term:
-    """That there are such values, or (of `forall`) that there are none: its last part as the consequence of the others,
-    which reads better."""
+    """The formula that such values exist, or (for `forall`) that none do, with the last part as the consequence of the
+    others, which reads better."""
     if term.quantifier is t.Quantifier.EXISTS:
         body = conjunction(parts)
     else:

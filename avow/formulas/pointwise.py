@@ -1,9 +1,9 @@
-"""Functions that are outputs, a point at a time.
+"""Outputs that are functions, one point at a time.
 
-Where guarantees speak of ``out.f`` at one place each, for all places (``forall(x | out.f(x) > in.g(x))``), some
-function meets them all if and only if at every point some value does: the values at other points do not matter, and
-one can be chosen for each. So ``for all inputs some function`` becomes ``for all inputs and points some value``: no
-function is left to be found, and it does not matter that it may have no description, or grow without bound.
+If each guarantee mentions ``out.f`` at one point, for all points (``forall(x | out.f(x) > in.g(x))``), some function
+meets them all if and only if at every point some value does: the values at other points do not matter, and one can be
+chosen for each. So ``for all inputs some function`` becomes ``for all inputs and points some value``: no function has
+to be found, and it does not matter whether it has a description or is bounded.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Values = Mapping[Variable, Variable]
 
 @dataclass(frozen=True, slots=True)
 class Pointwise:
-    """Guarantees about one point. `values` has the output that stands for each function's value at `point`."""
+    """Guarantees about one point. `values` maps each function to the output that represents its value at `point`."""
 
     point: tuple[Variable, ...]
     guarantees: Mapping[str, Term]
@@ -38,8 +38,8 @@ class Pointwise:
 
 
 def pointwise(guarantees: Mapping[str, Term], outputs: Sequence[Variable]) -> Pointwise | None:
-    """The guarantees about one point that say the same; None where they say something of several points at once, or
-    of outputs that are no functions with parameters of the same sorts."""
+    """The equivalent guarantees about one point; None if they relate several points, or if the outputs are not
+    functions with parameters of the same sorts."""
     kinds = {v.sort.parameters if isinstance(v.sort, FunctionSort) else None for v in outputs}
     if len(kinds) != 1 or any(depth(formula) > CONDITION_DEPTH for formula in guarantees.values()):
         return None
@@ -66,7 +66,7 @@ def _result(sort: Sort) -> Sort:
 
 
 def _parts(term: Term, over: tuple[Variable, ...], values: Values) -> Iterator[tuple[tuple[Variable, ...], Term]]:
-    """What is demanded, as parts that are each demanded for all values of some variables. No name is bound twice."""
+    """The formula as parts, each demanded for all values of some variables. No name is bound twice."""
     match term:
         case And(items=items):
             for item in items:
@@ -81,7 +81,7 @@ def _parts(term: Term, over: tuple[Variable, ...], values: Values) -> Iterator[t
             others = [item for item in items if item is not opens]
             for inner, part in _parts(opens, (), values):
                 yield from _parts(disjunction((*others, part)), (*over, *inner), values)
-        case _:  # one part, whatever it is
+        case _:  # a single part
             yield over, term
 
 
@@ -90,13 +90,13 @@ def _is_several(term: Term) -> bool:
 
 
 def _at(over: Sequence[Variable], body: Term, point: Sequence[Variable], values: Values) -> Term | None:
-    """A part as what it says of the point; None if it speaks of several places."""
+    """A part restated for the point; None if it mentions several points."""
     places = {term.arguments for term in subterms(body) if isinstance(term, Apply) and term.function in values}
     if not places:
         return None if _speaks(body, values) else _for_all(over, body)
     place, *others = places
     if others or any(_speaks(a, values) or not free_variables(a) <= free_variables(body) for a in place):
-        return None  # places that differ, or depend on a function's value, or on a variable bound further inside
+        return None  # points that differ, or depend on a function's value, or on a variable bound further inside
     body = _replace(body, values)
     if _speaks(body, values):
         return None  # a function that is used as a whole

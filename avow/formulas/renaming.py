@@ -1,4 +1,4 @@
-"""Bound variables: which a term mentions, and giving every quantifier names of its own."""
+"""Bound variables: those that a term mentions, and renaming so that every quantifier has its own names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from avow.language.terms import Quantified, Role, Term, Variable
 
 
 def map_children(term: Term, change: Callable[[Term], Term]) -> Term:
-    """The term with its direct subterms changed; a quantifier's variables stay."""
+    """The term with its direct subterms changed; a quantifier's variables are kept."""
     return term.rebuild(tuple(map(change, term.children)))
 
 

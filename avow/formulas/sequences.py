@@ -1,10 +1,10 @@
 """Sequences as a length and a function from positions: the form in which solvers (and the search for witnesses) can
-say something about ``forall(i | i < length(s) -> s(i) > 0)``.
+handle ``forall(i | i < length(s) -> s(i) > 0)``.
 
-What the function yields outside the length is anything at all, where in RCL it is some unspecified value that depends
-on the sequence and the position alone. So the changed formulas hold in more cases than the original ones: if they
-contradict one another then the original ones do, whatever lies outside. The other way round, what meets them counts
-only together with `defined`: that no element outside a sequence matters.
+Outside the length the function yields any value, whereas in RCL it is an unspecified value that depends on the sequence
+and the position alone. So the changed formulas hold in more cases than the original ones: if they contradict one
+another, so do the original ones. Conversely, a solution of them is valid only together with `defined`: that no element
+outside a sequence matters.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ Label = TypeVar("Label")
 
 @dataclass(frozen=True, slots=True)
 class Flat(Generic[Label]):
-    """Formulas without some sequences: `parts` has the length and the function that stand for each."""
+    """Formulas without some sequences: `parts` maps each to the length and the function that represent it."""
 
     formulas: Mapping[Label, t.Term]
     parts: Mapping[t.Variable, tuple[t.Variable, t.Variable]]
 
     def variables(self, originals: Iterable[t.Variable]) -> tuple[t.Variable, ...]:
-        """The variables that stand for these."""
+        """The variables that represent the originals."""
         return tuple(part for v in originals for part in self.parts.get(v, (v,)))
 
     def restored(self, term: t.Term) -> t.Term:
-        """A formula with the sequences again: their lengths and elements in the place of what stands for them."""
+        """A formula with the sequences restored: their lengths and elements replace the variables for them."""
         lengths: dict[t.Term, t.Term] = {length: t.Length(v, NATURAL) for v, (length, _) in self.parts.items()}
         elements: dict[t.Term, t.Variable] = {element: v for v, (_, element) in self.parts.items()}
 
@@ -46,13 +46,13 @@ class Flat(Generic[Label]):
             match part:
                 case t.Apply(function=function, arguments=(at,)) if function in elements:
                     return t.Index(elements[function], put(at), part.sort)
-                case _:  # an element is only asked for by its position
+                case _:  # an element is accessed only by its position
                     return lengths[part] if part in lengths else map_children(part, put)
 
         return put(term)
 
     def values(self, found: Mapping[t.Variable, Value]) -> dict[t.Variable, Value] | None:
-        """The values of the original variables; None where one is too long to be of use."""
+        """The values of the original variables; None if a sequence is too long to be useful."""
         parts = {part for pair in self.parts.values() for part in pair}
         values = {variable: value for variable, value in found.items() if variable not in parts}
         for variable, (length, element) in self.parts.items():
@@ -67,8 +67,8 @@ class Flat(Generic[Label]):
 
 
 def flatten(formulas: Mapping[Label, t.Term], sequences: Iterable[t.Variable]) -> Flat[Label] | None:
-    """The formulas without these sequences; None where a sequence is used as a whole in another value, or there is
-    none of them."""
+    """The formulas without these sequences; None if a sequence is used as a whole in another value, or if there are
+    none."""
     parts = {}
     for variable in sequences:
         sort = variable.sort
@@ -101,14 +101,14 @@ def _change(term: t.Term, parts: Mapping[t.Variable, tuple[t.Variable, t.Variabl
                     same = _same(one, other, term, parts)
                     return same if operator == "==" else t.Not(same)
             return term
-        case _:  # says nothing of a sequence itself: its parts may
+        case _:  # not about a sequence itself, but its parts may be
             return map_children(term, lambda child: _change(child, parts))
 
 
 def _same(
     s: t.Variable, other: t.Term, within: t.Term, parts: Mapping[t.Variable, tuple[t.Variable, t.Variable]]
 ) -> t.Term:
-    """That a sequence is another one; the equation itself where nothing simpler says so."""
+    """The formula that two sequences are equal; the equation itself if there is no simpler form."""
     length, element = parts[s]
     sort = _item(s)
     k = _position(within)
@@ -136,7 +136,7 @@ def _same(
             other_length, other_element = parts[other]
             each = t.Implies(inside, t.Compare("==", here, t.Apply(other_element, (k,), _item(other))))
             return t.And((t.Compare("==", length, other_length), t.Quantified(t.Quantifier.FORALL, (k,), each)))
-        case _:  # no simpler form: the sequence stays, and `flatten` refuses
+        case _:  # no simpler form: the sequence remains, and `flatten` returns None
             return t.Compare("==", s, other)
 
 

@@ -1,6 +1,6 @@
 """Walking terms of any depth.
 
-Contracts are data from outside: a formula nested ten thousand deep must not end in a RecursionError. A recursive
+Contracts are external data: a formula nested ten thousand deep must not cause a RecursionError. A recursive
 function is written as a generator that *yields* its recursive calls and returns its result; `run` keeps the stack.
 """
 
@@ -46,9 +46,9 @@ def depth(term: Term) -> int:
 
 
 def transform(term: Term, function: Callable[[Term], Term]) -> Term:
-    """Rebuild from the leaves up, `function` applied to every rebuilt subterm.
+    """Rebuild from the leaves up, applying `function` to every rebuilt subterm.
 
-    It knows nothing of scopes: a function that touches variables has to tell free from bound ones itself.
+    It ignores scopes: a function that changes variables must itself distinguish free from bound ones.
     """
 
     def steps(current: Term) -> Steps[Term]:

@@ -1,7 +1,7 @@
 """Tuples as their items: ``out.w == (l, r)`` as two equations of numbers.
 
-With a tuple among its variables a formula is beyond the solver's methods for arithmetic. Its items have the same
-meaning, and are what these methods know about.
+The solver's methods for arithmetic do not handle a formula with a tuple variable. Variables for its items have the same
+meaning, and these methods handle them.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from avow.language.terms import Compare, In, Not, Quantified, SetTerm, Term, Tup
 
 @dataclass(frozen=True, slots=True)
 class Untupled:
-    """Formulas without some tuples. `parts` has, for each, the tuple of the variables that stand for its items."""
+    """Formulas without some tuples. `parts` maps each to the tuple of the variables that represent its items."""
 
     formulas: Mapping[tuple[bool, str], Term]
     parts: Mapping[Variable, TupleTerm]
 
     def variables(self, originals: Iterable[Variable]) -> tuple[Variable, ...]:
-        """The variables that stand for these."""
+        """The variables that represent the originals."""
         return tuple(v for original in originals for v in _leaves(self.parts.get(original, original)))
 
     def values(self, originals: Iterable[Variable], found: Mapping[Variable, Value]) -> dict[Variable, Value]:
@@ -36,7 +36,7 @@ class Untupled:
 
 
 def untupled(formulas: Mapping[tuple[bool, str], Term], variables: Iterable[Variable]) -> Untupled | None:
-    """The formulas without these variables' tuples; None if none of the variables is one."""
+    """The formulas without these variables' tuples; None if none of the variables is a tuple."""
     parts = {v: made for v in variables if isinstance(made := _made(v), TupleTerm)}
     if not parts or any(depth(formula) > REWRITTEN_DEPTH for formula in formulas.values()):
         return None
@@ -44,7 +44,7 @@ def untupled(formulas: Mapping[tuple[bool, str], Term], variables: Iterable[Vari
 
 
 def _made(variable: Variable) -> Term:
-    """A variable, or the tuple of variables that stand for its items."""
+    """A variable, or the tuple of variables that represent its items."""
     if not isinstance(variable.sort, TupleSort):
         return variable
     items = (Variable(variable.role, f"{variable.name} item {k}", s) for k, s in enumerate(variable.sort.items))
@@ -79,5 +79,5 @@ def _split(term: Term) -> Term:
             return same if operator == "==" else Not(same)
         case In(item=TupleTerm() as item, collection=SetTerm(items=items)):
             return disjunction(_split(Compare("==", item, one)) for one in items)
-        case _:  # no tuple is compared by it: its parts may be
+        case _:  # compares no tuples itself, but its parts may
             return map_children(term, _split)

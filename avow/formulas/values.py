@@ -1,7 +1,7 @@
-"""Concrete values of each sort, shared by everything that computes with them (evaluation, tests, monitors, simulation).
+"""Concrete values of each sort, shared by all code that computes with them (evaluation, tests, monitors, simulation).
 
 BOOL is bool; INTEGER and NATURAL are int; REAL is `Fraction` (exact); STRING is str; an enumeration's element is an
-`Element`; an algebraic value is a `Data`; a tuple is a tuple; a sequence is a list frozen as `SequenceValue`; a
+`Element`; an algebraic value is a `Data`; a tuple is a tuple; a sequence is a `SequenceValue`; a
 function is a `FunctionValue`; an element of an unspecified sort is an `Opaque`.
 """
 
@@ -27,7 +27,7 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """``move(1, 2)``."""
+    """A value of an algebraic data type: ``move(1, 2)``."""
 
     constructor: str
     arguments: tuple[Value, ...] = ()
@@ -73,7 +73,7 @@ class FunctionValue:
 
 
 class Binary(Fraction):
-    """A number as a float32 or float64 holds it, exact; shown by the shortest digits that mean it there."""
+    """The exact value of a float32 or float64; shown by the shortest digits that denote it in that format."""
 
     __slots__ = ("_hash", "digits")
     digits: str
@@ -106,7 +106,7 @@ def show(value: Value) -> str:
             return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
         case tuple():
             return f"({', '.join(map(show, value))})"
-        case _:  # the others have a text of their own
+        case _:  # the others define `__str__`
             return str(value)
 
 

@@ -1,4 +1,4 @@
-"""Values as terms, and in the contract's own words: ``in.status = red, in.at = {(0, 0)}``."""
+"""Values as terms, and as text in the contract's notation: ``in.status = red, in.at = {(0, 0)}``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from avow.language.terms import Construct, EnumValue, Literal, Role, Term, Tuple
 
 
 def value_term(value: Value, sort: s.Sort) -> Term:
-    """A value as RCL writes it; of a sort whose values it can write: no function, no sequence, no unspecified type."""
+    """The term for a value. The sort must have literals in RCL: no function, sequence or unspecified type."""
     match sort, value:
         case s.EnumSort(), Element(name=name):
             return EnumValue(name, sort)

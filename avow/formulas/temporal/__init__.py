@@ -1,5 +1,5 @@
-"""Clauses that speak of other steps, as one step with memory.
+"""Clauses that refer to other steps, as formulas of one step with memory.
 
-`cells.compile_node` gives of a node's clauses formulas of one step, and the cells that they read: what each remembers,
-how it begins and how a step changes it. Engines see first-order terms and nothing else.
+`cells.compile_node` turns a node's clauses into formulas of one step, and the state variables that they read: what each
+stores, its initial value and its update at a step. Engines see only first-order terms.
 """

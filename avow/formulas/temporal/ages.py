@@ -1,4 +1,5 @@
-"""Ages along silences and steps: what is kept of ``F since G`` where the time between steps counts."""
+"""Timers over silences (the time between steps) and steps: the state of ``F since G`` if the time between steps
+matters."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from avow.language import terms as t
 from avow.language.sorts import BOOL, REAL
 
 CLOCK = t.Variable(t.Role.INPUT, f"dt{CELL}", REAL)
-"""The time since the step before, in seconds; it says nothing at the first step of a run."""
+"""The time since the previous step, in seconds; meaningless at the first step of a run."""
 
 ELAPSED = t.Variable(t.Role.INPUT, f"elapsed{CELL}", REAL)
 """The time since the latest step, in seconds, within a silence."""
@@ -34,13 +35,13 @@ class Instant:
 
 
 class Trend(StrEnum):
-    """What a formula does in a silence."""
+    """How a formula's value changes in a silence."""
 
     STAYS = "stays"
     FALLS = "falls"
-    """Once false, it stays so."""
+    """Once false, it stays false."""
     RISES = "rises"
-    """Once true, it stays so."""
+    """Once true, it stays true."""
     CHANGES = "changes"
 
     def flipped(self) -> Trend:
@@ -54,16 +55,17 @@ class Lasting:
     now: t.Term
     """Its value at a step."""
     silent: Callable[[Instant], t.Term]
-    """Its value in the silence before a step, over what the step before has left (nothing, before the first)."""
+    """Its value in the silence before a step, over the state that the previous step left (none before the first)."""
     last: t.Term | None
-    """Where it has one value all through a silence: that of the silence after a step, over the step's own values."""
+    """If its value is constant throughout a silence: that value in the silence after a step, over the step's own
+    values."""
     breaks: tuple[t.Term, ...] = ()
-    """How long after a step it may change, over what that step has left."""
+    """The times after a step at which it may change, over the state that the step left."""
     trend: Trend = Trend.STAYS
 
     @property
     def steady(self) -> bool:
-        """In a silence it is as it was at the step."""
+        """Whether its value in a silence is that at the step."""
         return self.last == self.now
 
 
@@ -79,35 +81,35 @@ NONE: t.Term = t.Literal(Fraction(-1), REAL)
 
 @dataclass(slots=True)
 class Record:
-    """What is kept of ``holds since began`` (`holds` None: always) along silences and steps: whether it is so, or the
-    age of the latest (earliest) beginning since which `holds` was so, -1 for none."""
+    """The state of ``holds since began`` (`holds` None: always) over silences and steps: whether it is true, or a timer
+    since the latest (earliest) beginning since which `holds` was true, -1 for none."""
 
     begun: Callable[[Lasting, Instant], t.Term]
-    """That there is a silence before a step, and a formula is so at an instant of it."""
+    """The condition that there is a silence before a step, and a formula is true at an instant of it."""
     longest: Fraction | None
-    """Older than that, nothing is told apart."""
+    """Timer values above this are not distinguished."""
     kind: Kind
     holds: Lasting | None
     began: Lasting
     inside: bool
-    """Whether `holds` is so wherever it begins, as what is written says."""
+    """Whether `holds` is syntactically implied by `began`."""
     breaks: tuple[t.Term, ...]
-    """In order."""
+    """In ascending order."""
     relation: str
     limit: t.Term
     limit_in_silence: Callable[[Instant], t.Term]
     most: Fraction | None
     left: t.Term = t.FALSE
-    """What the step before has left."""
+    """The state that the previous step left."""
 
     def step(self, left: t.Term) -> t.Term:
-        """What a step leaves."""
+        """The state that a step leaves."""
         self.left = left
         holds = t.TRUE if self.holds is None else self.holds.now
         return self._point(self._until(CLOCK), holds, self.began.now)
 
     def silent(self, instant: Instant) -> t.Term:
-        """Whether it is so at an instant of the silence before a step."""
+        """Whether it is true at an instant of the silence before a step."""
         begins = instant.elapsed == NO_TIME
         kept = self.left if begins else self._until(instant.elapsed)
         if instant.side is Side.AFTER and not begins:
@@ -119,7 +121,7 @@ class Record:
         counts = conjunction((holds, t.Compare("<=", NO_TIME, kept)))
         old = conjunction((counts, t.Compare(sided(self.relation, instant.side), kept, limit)))
         fresh = conjunction((began, t.Compare(self.relation, NO_TIME, limit)))
-        if self.kind is Kind.EARLIEST and instant.side is Side.AFTER:  # it begins here, and grows while that holds
+        if self.kind is Kind.EARLIEST and instant.side is Side.AFTER:  # begins here, and grows while it holds
             at_once = conjunction((began, holds, t.Compare(sided(self.relation, Side.AFTER), NO_TIME, limit)))
             fresh = disjunction((fresh, at_once)) if at_once != fresh else fresh
         if self.kind is Kind.LATEST:
@@ -128,7 +130,7 @@ class Record:
 
     @property
     def trend(self) -> Trend:
-        """What it does in a silence."""
+        """How it changes in a silence."""
         began, holds = self.began.trend, Trend.STAYS if self.holds is None else self.holds.trend
         match self.kind:
             case Kind.LATEST:
@@ -149,7 +151,7 @@ class Record:
         return holds, self.begun(self.began, instant)
 
     def _until(self, end: t.Term) -> t.Term:
-        """What is kept at the end of the silence's first so many seconds, of which some may have gone by."""
+        """The state `end` seconds into the silence."""
         once = self._changing_once(end)
         if once is not None:
             return choice(t.Compare("<", NO_TIME, end), once, self.left)
@@ -163,7 +165,7 @@ class Record:
         return self._interval(kept, start, end)
 
     def _changing_once(self, end: t.Term) -> t.Term | None:
-        """The same, where something begins (or ceases to) once at most, and what holds is told by that or stays."""
+        """The same, if `began` changes at most once and `holds` is `began` or constant; otherwise None."""
         if not self.breaks:
             return None
         together = self.holds is self.began
@@ -198,12 +200,12 @@ class Record:
                     return choice(first, going_on, later)
                 begins = choice(first, self._at_most(end), later)
                 return choice(on, choice(known, self._older(self.left, end), begins), ended)
-            case _:  # piece by piece
+            case _:  # interval by interval
                 return None
 
     def _interval(self, kept: t.Term, start: t.Term, end: t.Term) -> t.Term:
-        """What is kept at the end of a time without change: what had begun all through it ends with it, and `holds`
-        need not be so before that."""
+        """The state at the end of an interval without change: if `began` is true throughout, it ends with the interval,
+        and `holds` need not be true before that."""
         holds, began = self._there(Instant(end, Side.BEFORE))
         length = end if start == NO_TIME else t.Arithmetic("-", end, start, REAL)
         match self.kind:
@@ -224,7 +226,7 @@ class Record:
 
     @property
     def _never_matters(self) -> bool:
-        """A silence of no length leaves what it finds, without being told apart."""
+        """Whether a silence of length zero leaves the state unchanged without a case distinction."""
         steady = self.began.steady and (self.holds is None or self.holds is self.began)
         waiting = self.holds is not None and self.holds.steady and self.began.last in (self.began.now, t.FALSE)
         return steady or (waiting and self.inside)
@@ -239,13 +241,13 @@ class Record:
         return choice(conjunction(young), older, NONE)
 
     def _at_most(self, age: t.Term) -> t.Term:
-        """Beyond a limit that is written down an age stays."""
+        """The timer, which does not grow beyond a limit that is a literal."""
         if self.longest is None:
             return age
         return t.Operation(t.Builtin.MIN, (age, t.Literal(self.longest + 1, REAL)), REAL)
 
     def _point(self, kept: t.Term, holds: t.Term, began: t.Term) -> t.Term:
-        """What is kept after a step, or an instant."""
+        """The state after a step, or an instant."""
         match self.kind:
             case Kind.EVER:
                 return disjunction((began, conjunction((holds, kept))))
@@ -258,7 +260,7 @@ class Record:
 
 
 def sided(relation: str, side: Side) -> str:
-    """How an age that grows is held against a limit just before (after) an instant, by its value there."""
+    """The relation of a growing timer to a limit just before (after) an instant, by its value at the instant."""
     match side:
         case Side.AT:
             return relation

@@ -1,4 +1,4 @@
-"""A cell: what one step leaves to the next."""
+"""State variables (cells): values that one step leaves to the next."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avow.language import sorts as s
 from avow.language import terms as t
 
 CELL = "#"
-"""In the name of every cell, and in that of no port."""
+"""A character in the name of every state variable, and of no port."""
 
 
 class Unsaid(Exception):  # noqa: N818 - it names what happened
@@ -28,18 +28,19 @@ class Unsaid(Exception):  # noqa: N818 - it names what happened
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one step leaves to the next."""
+    """A state variable: a value that one step leaves to the next."""
 
     before: t.Variable
-    """What the step before has left: a function of the `parameters`, where there are some. Its name says which record
-    it is of, so that a formula that reads it has another digest where the record is another."""
+    """The value that the previous step left: a function of the `parameters`, if there are any. Its name identifies the
+    record, so that formulas that read different records have different digests."""
     parameters: tuple[t.Variable, ...]
     initial: t.Term | None
-    """What it is before the first step, at every argument; None: any value, which nothing looks at."""
+    """The value before the first step, at every argument; None: any value, which is never read."""
     now: t.Term
-    """What this step leaves, at the `parameters`: over the node's ports and what the step before has left."""
+    """The value that this step leaves, at the `parameters`: over the node's ports and the state that the previous step
+    left."""
     record: t.History | None = field(default=None, compare=False, repr=False)
-    """What it is kept for; None of whether a step is the first, and of what lasts through a silence."""
+    """The term that it is kept for; None for the flag of the first step, and for values that last through a silence."""
 
     @property
     def name(self) -> str:
@@ -51,17 +52,17 @@ class Cell:
 
     @property
     def read(self) -> t.Term:
-        """What the step before has left at the `parameters`."""
+        """The value that the previous step left at the `parameters`."""
         return at(self.before, self.parameters)
 
     def begins(self, cell: t.Variable | None = None) -> t.Term:
-        """That a variable (the cell's own) is as the cell is before the first step."""
+        """The formula that a variable (by default the cell's own) has the cell's value before the first step."""
         if self.initial is None:
             return t.TRUE
         return self._everywhere(equation(at(cell or self.before, self.parameters), self.initial))
 
     def leaves(self, after: t.Variable) -> t.Term:
-        """That a variable is what this step leaves."""
+        """The formula that a variable has the value that this step leaves."""
         return self._everywhere(equation(at(after, self.parameters), self.now))
 
     def _everywhere(self, formula: t.Term) -> t.Term:
@@ -69,7 +70,7 @@ class Cell:
 
 
 def some_value(sort: s.Sort) -> t.Term | None:
-    """A value of a sort, written down; None of an unspecified type, which has no name for one, and of functions."""
+    """A literal value of a sort; None for an unspecified type, which has no literals, and for functions."""
     match sort:
         case s.BoolSort():
             return t.FALSE
@@ -92,7 +93,7 @@ def some_value(sort: s.Sort) -> t.Term | None:
                 if None not in arguments:
                     return t.Construct(made.name, tuple(a for a in arguments if a is not None), sort)
             return None
-        case s.EnumSort() | s.OpaqueSort() | s.FunctionSort() | s.SetSort():  # nothing is known of it
+        case s.EnumSort() | s.OpaqueSort() | s.FunctionSort() | s.SetSort():  # no literal of it
             return None
         case _:
             assert_never(sort)
@@ -104,7 +105,7 @@ def at(variable: t.Variable, parameters: tuple[t.Variable, ...]) -> t.Term:
 
 
 def at_the_parameters(name: str, parts: Iterable[t.Term], sort: s.Sort) -> tuple[t.Variable, tuple[t.Variable, ...]]:
-    """The variable of a cell for what is said of some terms, and its parameters: their bound variables."""
+    """The variable of a cell for a record over some terms, and its parameters: their bound variables."""
     bound = {v for part in parts for v in free_variables(part) if v.role is t.Role.BOUND}
     parameters = tuple(sorted(bound, key=lambda v: v.name))
     kept = s.FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort

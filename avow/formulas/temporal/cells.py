@@ -1,7 +1,7 @@
-"""A clause with history as a formula of one step over cells.
+"""A clause with history as a formula of one step over state variables (cells).
 
-A cell is what one step leaves to the next. Equal records share one. What speaks of a quantified variable is remembered
-for each of its values: such a cell is a function.
+A cell holds a value that one step leaves to the next. Equal records share one. A record that mentions a quantified
+variable is kept for each of its values: such a cell is a function.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from avow.language.subterms import histories
 
 @dataclass(frozen=True, slots=True)
 class Remembering:
-    """A node whose clauses are formulas of one step over its ports and what `cells` have kept; names, sentences and
-    texts of the clauses are as they were."""
+    """A node whose clauses are formulas of one step over its ports and the values of `cells`; names, sentences and
+    texts of the clauses are unchanged."""
 
     node: Node
     cells: tuple[Cell, ...]
     unsaid: Mapping[str, Unsaid] = field(default_factory=dict)
-    """The clauses that speak of other steps all the same, each with the reason."""
+    """The clauses that still refer to other steps, each with the reason."""
 
     @property
     def before(self) -> tuple[t.Variable, ...]:
@@ -38,18 +38,18 @@ class Remembering:
 
 
 def remembers(node: Node) -> bool:
-    """Whether a clause of the node speaks of other steps."""
+    """Whether a clause of the node refers to other steps."""
     return any(histories(clause.formula) for clause in node.clauses)
 
 
 def compile_node(node: Node) -> Remembering:
-    """The node's clauses as formulas of one step. What has none is left as it is, and told of; so is what has limits in
-    seconds (of these, too: `avow.formulas.temporal.clock`)."""
+    """The node's clauses as formulas of one step. A clause without such a form is unchanged and listed in `unsaid`; so
+    is one with limits in seconds (which `avow.formulas.temporal.clock` handles, too)."""
     return compiled(node, Records())
 
 
 def compiled(node: Node, records: Records) -> Remembering:
-    """The node's clauses, by records that make no cells for others."""
+    """The node's clauses compiled with `records`, which must not have made cells for other clauses."""
     unsaid: dict[str, Unsaid] = {}
 
     def said(clauses: Iterable[Clause]) -> Iterator[Clause]:
@@ -67,20 +67,20 @@ def compiled(node: Node, records: Records) -> Remembering:
 
 @dataclass(slots=True)
 class Records:
-    """The cells of some formulas, made as they are asked for."""
+    """The cells of some formulas, made on demand."""
 
     cells: list[Cell] = field(default_factory=list)
     _values: dict[str, t.Term] = field(default_factory=dict)
     _first: Cell | None = None
 
     def clause(self, formula: t.Term) -> t.Term:
-        """A clause, which may be a response, as a formula of one step. Raises Unsaid, and has then made no cell."""
+        """A clause, which may be a response, as a formula of one step. Raises Unsaid without having made a cell."""
         with self._undone():
             return self.term(in_the_past(formula))
 
     @contextmanager
     def _undone(self) -> Iterator[None]:
-        """What was made is taken back where a clause has no formula of one step."""
+        """Remove the cells made inside if a clause has no formula of one step."""
         cells, values, first = len(self.cells), dict(self._values), self._first
         try:
             yield
@@ -90,9 +90,9 @@ class Records:
             raise
 
     def term(self, term: t.Term) -> t.Term:
-        """A term of the past as one of this step. Raises Unsaid."""
+        """A past-time term as a term of this step. Raises Unsaid."""
         if isinstance(term, t.History):
-            meaning = digest(term)  # what means the same has one cell: a cell is named by its meaning
+            meaning = digest(term)  # equal meanings share a cell, which is named by its meaning
             if meaning not in self._values:
                 self._values[meaning] = self._record(term)
             return self._values[meaning]
@@ -157,8 +157,8 @@ class Records:
         return self.term(term.limit.amount)
 
     def _latest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
-        """``holds since[<= amount] began``: the cell has how many steps ago the latest beginning is, -1 for none. One
-        that is older than a limit that is written down is as good as none."""
+        """``holds since[<= amount] began``: the cell counts the steps since the latest beginning, -1 for none. A
+        beginning older than a literal limit counts as none."""
         most = written(amount)
 
         def age(before: t.Term) -> t.Term:
@@ -171,8 +171,8 @@ class Records:
         return conjunction((t.Compare("<=", _ZERO, found), t.Compare(relation, found, amount)))
 
     def _earliest(self, term: t.History, holds: t.Term, began: t.Term, relation: str, amount: t.Term) -> t.Term:
-        """``holds since[>= amount] began``: the cell has how many steps ago the earliest beginning is, -1 for none.
-        Beyond a limit that is written down it stays."""
+        """``holds since[>= amount] began``: the cell counts the steps since the earliest beginning, -1 for none. It
+        stops growing beyond a literal limit."""
         most = written(amount)
 
         def age(before: t.Term) -> t.Term:
@@ -185,7 +185,7 @@ class Records:
         return conjunction((t.Compare("<=", _ZERO, found), t.Compare(relation, found, amount)))
 
     def _kept(self, term: t.History, sort: Sort, initial: t.Term, now: Callable[[t.Term], t.Term]) -> t.Term:
-        """What a step leaves, as a function of what the one before has left: also the value now."""
+        """The value that a step leaves, as a function of the value left by the previous one; also the value now."""
         cell = self._cell(term, now, initial, sort)
         return cell.now
 
@@ -207,7 +207,8 @@ class Records:
         initial: t.Term | None,
         sort: Sort | None = None,
     ) -> Cell:
-        """A new cell for a record; `now` is what a step leaves, or makes that of what the one before has left."""
+        """A new cell for a record; `now` is the value that a step leaves, or computes it from the value left by the
+        previous step."""
         if sort is None:
             assert not callable(now)
             sort = now.sort
@@ -219,13 +220,13 @@ class Records:
 
 
 def written(amount: t.Term) -> int | None:
-    """A number of steps that is written down."""
+    """The number of steps if it is a literal; otherwise None."""
     value = amount.value if isinstance(amount, t.Literal) else None
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
 def longest_limits(formulas: Iterable[t.Term]) -> int:
-    """The most steps that the limits in one formula come to together, of those that are written down."""
+    """The largest sum of the literal step limits in one formula."""
     totals = (
         sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
         for formula in formulas
@@ -242,8 +243,8 @@ def _if(condition: t.Term, then: t.Term, otherwise: t.Term) -> t.Term:
 
 
 def _with_any_value(term: t.Term) -> t.Term:
-    """What is kept of a term for the next step: some value where the term has none, so that every run can be judged.
-    A claim that looks at it is not met, whatever it is (`avow.language.definedness`)."""
+    """The value of a term that is kept for the next step: an arbitrary value if the term has none, so that every run
+    can be judged. A claim that reads an arbitrary value is not met (`avow.language.definedness`)."""
     has, otherwise = defined(term), some_value(term.sort)
     return term if term.sort == BOOL or has == t.TRUE or otherwise is None else _if(has, term, otherwise)
 

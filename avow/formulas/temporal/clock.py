@@ -1,11 +1,13 @@
-"""Clauses with limits in seconds, as formulas of one step over cells and the time since the step before.
+"""Clauses with limits in seconds, as formulas of one step over state variables (cells) and the time since the previous
+step.
 
 A run's positions are its steps and every instant between them. In the silence after a step ports keep their values,
-events are false, `previous`, counts and what is counted in steps stay, and ages grow; a clause is demanded at every
-position. An age counts from where something ended (began), also where a silence ended with it.
+events are false, `previous`, counts and records with limits in steps are constant, and timers grow; a clause is
+demanded at every position. A timer runs from the position where something ended (began), also if a silence ended with
+it.
 
-In a silence each record with a limit changes once, when its age meets the limit. A step therefore looks at the silence
-before it at these instants only, and between them: no formula of a step speaks of all instants.
+In a silence each record with a limit changes once, when its timer reaches the limit. A step therefore checks the
+silence before it only at these instants and between them: no formula of a step quantifies over all instants.
 """
 
 from __future__ import annotations
@@ -41,17 +43,17 @@ from avow.language.subterms import histories, timed
 
 _EVER = (t.Past.ONCE, t.Past.HISTORICALLY, t.Past.SINCE)
 GOES_ON = t.Compare("<", NO_TIME, CLOCK)
-"""From step to step, time goes by."""
+"""Time passes from step to step."""
 
 
 def compile_timed(node: Node, longest: Fraction | None = None) -> Remembering:
-    """As `compile_node`, also of clauses with limits in seconds: they read `CLOCK` (and so do cells). `longest`: beyond
-    which no age is told apart, where others than this node's clauses matter."""
+    """As `compile_node`, also for clauses with limits in seconds: they read `CLOCK` (and so do cells). `longest`: timer
+    values above it are not distinguished; needed if other clauses than this node's matter."""
     return compiled(node, Timed(longest=longest or longest_limit(c.formula for c in node.clauses)))
 
 
 def longest_limit(formulas: Iterable[t.Term]) -> Fraction | None:
-    """The longest limit in seconds; None where one is not written down."""
+    """The longest limit in seconds; None if there is none or one is not a literal."""
     limits = [h.limit for formula in formulas for h in histories(formula) if h.limit is not None]
     seconds = [limit.amount for limit in limits if not limit.steps]
     known = [Fraction(a.value) for a in seconds if isinstance(a, t.Literal) and not isinstance(a.value, bool | str)]
@@ -59,19 +61,19 @@ def longest_limit(formulas: Iterable[t.Term]) -> Fraction | None:
 
 
 def arrival(term: t.History) -> t.Variable:
-    """Whether a message of an input has come since the step before; at the first step all inputs' have."""
+    """The variable for whether a message of an input arrived since the previous step; at the first step all did."""
     (port,) = term.arguments
     assert isinstance(port, t.Variable)
     return t.Variable(t.Role.INPUT, f"arrived {port.name}{CELL}", BOOL)
 
 
 def is_arrival(variable: t.Variable) -> bool:
-    """Whether it says that a message has arrived."""
+    """Whether the variable is an `arrival`."""
     return variable.name.endswith(CELL) and variable.name.startswith("arrived ")
 
 
 def events(remembering: Remembering) -> tuple[t.Variable, ...]:
-    """What a step's formulas read beside ports and cells: `CLOCK`, and which messages have arrived."""
+    """The variables that a step's formulas read besides ports and cells: `CLOCK`, and which messages have arrived."""
     spoken = (*(clause.formula for clause in remembering.node.clauses), *(cell.now for cell in remembering.cells))
     cells = set(remembering.before)
     found = {v for term in spoken for v in free_variables(term) if v.name.endswith(CELL) and v not in cells}
@@ -79,13 +81,13 @@ def events(remembering: Remembering) -> tuple[t.Variable, ...]:
 
 
 def pace_of(node: Node) -> t.Limit | None:
-    """How far apart the node's steps are, as far as its contract says (``steps(every 20 ms)``)."""
+    """The time between the node's steps (``steps(every 20 ms)``); None if its contract does not give it."""
     return next((clause.pace for clause in node.guarantees if clause.pace is not None), None)
 
 
 def one_step(node: Node) -> Remembering:
-    """As `compile_timed`; what else a step reads are inputs of the node, and what is known of the time between steps
-    are assumptions: it comes from outside."""
+    """As `compile_timed`, with the other variables that a step reads as inputs of the node, and the constraints on the
+    time between steps as assumptions, since the environment determines it."""
     paced = tuple(replace(c, kind=ClauseKind.ASSUMPTION) for c in node.guarantees if c.pace is not None)
     others = tuple(c for c in node.guarantees if c.pace is None)
     made = compile_timed(replace(node, assumptions=(*node.assumptions, *paced), guarantees=others))
@@ -106,16 +108,16 @@ def one_pace(nodes: Iterable[Node]) -> bool:
 
 @dataclass(slots=True)
 class Timed(Records):
-    """The cells of some formulas, of which some may have limits in seconds."""
+    """The cells of some formulas, which may have limits in seconds."""
 
     _positions: dict[str, Lasting] = field(default_factory=dict)
     _in_time: bool = False
     longest: Fraction | None = None
-    """Older than that, nothing is told apart."""
+    """Timer values above this are not distinguished."""
     _machines: dict[str, Cell] = field(default_factory=dict)
 
     def clause(self, formula: t.Term) -> t.Term:
-        """A clause at a step and in the silence before it. Raises Unsaid, and has then made no cell."""
+        """A clause at a step and in the silence before it. Raises Unsaid without having made a cell."""
         if timed(formula) is None:
             return Records.clause(self, formula)
         with self._undone():
@@ -129,26 +131,26 @@ class Timed(Records):
             return self.over(in_the_past(formula))
 
     def past(self, formula: t.Term, *, in_time: bool) -> t.Term:
-        """A formula of the past at a step, over positions where that is wanted. Raises Unsaid."""
+        """A past-time formula at a step, over positions if `in_time`. Raises Unsaid."""
         if not in_time:
             return Records.term(self, formula)
         with self._timing():
             return self.over(formula).now
 
     def instants(self, formula: Lasting) -> tuple[Mapping[Side, t.Term], tuple[t.Term, ...]]:
-        """Of a formula in the silence after a step, over what that has left: its values so many seconds (`ELAPSED`)
-        after the step, and when it may change: for each value of a quantified variable, which is then only an argument
-        of what is remembered. Raises Unsaid."""
+        """A formula in the silence after a step, over the state that the step left: its values `ELAPSED` seconds after
+        the step, and the times at which it may change. A quantified variable may occur in these times only as an
+        argument of a cell. Raises Unsaid."""
         for at in formula.breaks:
             if any(v.role is t.Role.BOUND for v in free_variables(_unapplied(at))):
                 raise Unsaid("limits in seconds that hang on a quantified variable")
         found = {side: formula.silent(Instant(ELAPSED, side)) for side in Side}
-        begun = t.Compare("<=", ELAPSED, NO_TIME)  # right after the step: what that itself demands, it may have had
+        begun = t.Compare("<=", ELAPSED, NO_TIME)  # right after the step, whose instant is not in the silence
         found[Side.AFTER] = t.Conditional(begun, formula.silent(Instant(NO_TIME, Side.AFTER)), found[Side.AFTER], BOOL)
         return found, formula.breaks
 
     def throughout(self, formula: Lasting) -> t.Term:
-        """That a formula is true all through the silence before a step. Raises Unsaid."""
+        """The condition that a formula is true throughout the silence before a step. Raises Unsaid."""
         match formula.trend:
             case Trend.STAYS:
                 assert formula.last is not None
@@ -208,7 +210,7 @@ class Timed(Records):
                 if any(self.over(part).last is None for part in term.arguments):
                     raise Unsaid(f"`{term.operator}` of what may change between steps", term.span)
                 return self._constant(self._record(term), t.FALSE)
-            case _:  # what is of steps only stays as it was at the last
+            case _:  # the others only change at steps
                 now = self._record(term)
                 return self._constant(now, now)
 
@@ -219,7 +221,7 @@ class Timed(Records):
         return Lasting(now, lambda i: t.Compare(sided("<=", i.side), i.elapsed, amount), None, (amount,), Trend.FALLS)
 
     def _aged(self, term: t.History) -> Lasting:
-        """A record of the past that looks at positions: by the age of the latest or the earliest that counts."""
+        """A past-time record over positions, by a timer since the latest or the earliest beginning."""
         if term.operator is t.Past.HISTORICALLY:
             unmet = negation(term.arguments[0])
             return self._negated(self._machine(term, _kind(term), None, self.over(unmet)))
@@ -271,10 +273,10 @@ class Timed(Records):
         return Lasting(now, record.silent, None, tuple(dict.fromkeys(breaks)), trend)
 
     def _kept_for(self, record: Record) -> Cell:
-        """The cell of a record, which all with the same beginnings share, whatever their limits."""
+        """The cell of a record; records with the same `holds` and `began` share it, whatever their limits."""
         began, holds = record.began.now, t.TRUE if record.holds is None else record.holds.now
         parts = [part for part in (record.holds, record.began) if part is not None]
-        silent = [p.last for p in parts if p.last is not None and p.last != p.now]  # an event, and what is said as one
+        silent = [p.last for p in parts if p.last is not None and p.last != p.now]  # an event, and a formula like one
         name = f"{record.kind}{CELL}{digest(t.History(t.Past.SINCE, (holds, began, *silent), BOOL))[:12]}"
         if name not in self._machines:
             ever = record.kind is Kind.EVER
@@ -285,7 +287,7 @@ class Timed(Records):
         return self._machines[name]
 
     def _seconds(self, term: t.History) -> tuple[str, Lasting, Fraction | None]:
-        """The limit: how an age is held against it, its length, and the length where it is written down."""
+        """The limit: the relation of a timer to it, its length, and the length if it is a literal."""
         if term.limit is None:
             return "", self._constant(NO_TIME, NO_TIME), None
         amount = self.over(term.limit.amount)
@@ -302,7 +304,7 @@ class Timed(Records):
         return Lasting(now, lambda _: self._held(last), last)
 
     def _held(self, last: t.Term) -> t.Term:
-        """What the step before has left to the silence after it; a formula is false before the first step."""
+        """The value that the previous step left for the silence after it; a formula is false before the first step."""
         if last.sort != BOOL and not free_variables(last):
             return last
         if last == t.FALSE:
@@ -316,7 +318,7 @@ class Timed(Records):
         return known.read
 
     def begun(self, formula: Lasting, instant: Instant) -> t.Term:
-        """That there is a silence before this step, and a formula is so in it."""
+        """The condition that there is a silence before this step, and a formula is true in it."""
         found = formula.silent(instant)
         return found if formula.last is not None else conjunction((negation(self._is_first()), found))
 
@@ -325,7 +327,7 @@ class Timed(Records):
 
     @contextmanager
     def _timing(self) -> Iterator[None]:
-        """Inside, terms are over positions: what means another thing there has another name."""
+        """Inside, terms are over positions: records with another meaning there have another name."""
         before, self._in_time = self._in_time, True
         try:
             yield
@@ -334,7 +336,7 @@ class Timed(Records):
 
     @contextmanager
     def _undone(self) -> Iterator[None]:
-        """What was made is taken back where a clause has no formula of one step."""
+        """Remove the cells made inside if a clause has no formula of one step."""
         positions, machines = dict(self._positions), dict(self._machines)
         with Records._undone(self):
             try:
@@ -360,12 +362,12 @@ def _trend(term: t.Term, parts: tuple[Lasting, ...]) -> Trend:
             return _together((parts[0].trend.flipped(), parts[1].trend))
         case t.Conditional() if parts[0].trend is Trend.STAYS and term.sort == BOOL:
             return _together((parts[1].trend, parts[2].trend))
-        case _:  # it may go either way
+        case _:  # it may change either way
             return Trend.CHANGES
 
 
 def _inside(term: t.History) -> bool:
-    """Whether what has to hold since the beginning is a part of the beginning."""
+    """Whether the formula that must hold since the beginning is a conjunct of the beginning."""
     holds, *others = term.arguments
     return all(began == holds or (isinstance(began, t.And) and holds in began.items) for began in others)
 
@@ -376,7 +378,7 @@ def _together(trends: Iterable[Trend]) -> Trend:
 
 
 def _closed(formula: Lasting) -> tuple[t.Term, ...]:
-    """The breaks of a formula, none of which may be of one of many values of a variable. Raises Unsaid."""
+    """The breaks of a formula. Raises Unsaid if one depends on a bound variable that is not free in the formula."""
     own = free_variables(formula.now)
     for at in formula.breaks:
         if any(v.role is t.Role.BOUND and v not in own for v in free_variables(at)):
@@ -385,14 +387,14 @@ def _closed(formula: Lasting) -> tuple[t.Term, ...]:
 
 
 def _unapplied(term: t.Term) -> t.Term:
-    """The term without what functions that have kept something are given."""
+    """The term with each application of a cell that is a function replaced by the function."""
     if isinstance(term, t.Apply) and isinstance(term.function, t.Variable) and term.function.name.find(CELL) >= 0:
         return term.function
     return term.rebuild(tuple(map(_unapplied, term.children))) if term.children else term
 
 
 def _sorted(breaks: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
-    """In order, whatever their values are."""
+    """In ascending order, whatever their values."""
     if len(breaks) < 2:
         return breaks
     one, other = breaks
@@ -400,7 +402,7 @@ def _sorted(breaks: tuple[t.Term, ...]) -> tuple[t.Term, ...]:
 
 
 def _remade(term: t.Term, parts: list[t.Term]) -> t.Term:
-    """The term with other parts; what is sure is not kept in formulas."""
+    """The term with other parts, simplified where a part is a truth value."""
     match term:
         case t.And():
             return conjunction(parts)
@@ -410,13 +412,13 @@ def _remade(term: t.Term, parts: list[t.Term]) -> t.Term:
             return negation(parts[0])
         case t.Implies() if t.FALSE in parts[:1] or t.TRUE in parts[1:]:
             return t.TRUE
-        case _:  # nothing to leave out
+        case _:  # nothing to simplify
             same = all(one is other for one, other in zip(term.children, parts, strict=True))
             return term if same else term.rebuild(tuple(parts))
 
 
 def _small(made: t.Term, said: t.Term) -> t.Term:
-    """A formula that can be worked with. Raises Unsaid: each limit inside another doubles the formula a few times."""
+    """The formula. Raises Unsaid if it is too large: each limit inside another doubles the formula a few times."""
     sizes: dict[int, int] = {}
 
     def size(term: t.Term) -> int:

@@ -1,5 +1,4 @@
-"""Responses, said by the past: `T -> within[n steps](R)` is broken where, so many steps ago, T was met and R was not
-since."""
+"""Responses in past-time form: `T -> within[n steps](R)` is violated if T held n steps ago and R has not held since."""
 
 from __future__ import annotations
 
@@ -13,20 +12,20 @@ from avow.language.sorts import BOOL
 
 
 def in_the_past(formula: t.Term) -> t.Term:
-    """A clause without responses: what it demands of later steps, said of earlier ones. Raises Unsaid where it demands
-    that something comes at some time, which no first steps of a run can break."""
+    """The clause without responses: its demands on later steps, expressed over earlier ones. Raises Unsaid if it
+    demands that something happens eventually, which no finite prefix of a run can violate."""
     match formula:
         case t.Quantified(quantifier=t.Quantifier.FORALL):
             return formula.rebuild((in_the_past(formula.body),))
         case t.Implies() | t.History() if (found := _response(formula)) is not None:
             triggers, response = found
             return _demanded(conjunction(triggers), response)
-        case _:  # it has none
+        case _:  # no response in it
             return formula
 
 
 def _response(formula: t.Term) -> tuple[list[t.Term], t.History] | None:
-    """What stands before a response that is a formula's right side, and the response; None where there is none."""
+    """The premises of a response that is a formula's right side, and the response; None if there is none."""
     triggers = list[t.Term]()
     while isinstance(formula, t.Implies):
         triggers.append(formula.left)
@@ -55,8 +54,8 @@ def _demanded(trigger: t.Term, response: t.History) -> t.Term:
 
 
 def pending(formula: t.Term) -> t.Term | None:
-    """When a clause that is a response demands something of steps to come (of any values of its quantified variables),
-    as a formula of the past; None where it is no response, or one that no first steps can break."""
+    """The past-time formula for when a response clause demands something of future steps (for some values of its
+    quantified variables); None if it is not a response, or one that no finite prefix can violate."""
     if (found := responding(formula)) is None:
         return None
     waits = _waits(conjunction(found[1]), found[2])
@@ -75,22 +74,23 @@ def _waits(trigger: t.Term, response: t.History) -> t.Term | None:
         case t.Past.UNTIL:
             going = negation(response.arguments[1])
             return t.History(t.Past.SINCE, (going, conjunction((trigger, going))), BOOL, None, response.span)
-        case _:  # it comes at some time
+        case _:  # eventually
             return None
 
 
 @dataclass(frozen=True, slots=True)
 class Due:
-    """``T -> next(R)`` and its like: `triggers` together are T, `outer` the quantified variables around it."""
+    """``T -> next(R)`` and the like: T is the conjunction of `triggers`, `outer` are the quantified variables around
+    it."""
 
     outer: tuple[t.Variable, ...]
     triggers: tuple[t.Term, ...]
     full: t.Term
-    """That all of what a trigger demands has come due, of some trigger, as a formula of the past."""
+    """The past-time formula that everything some trigger demands has come due."""
 
 
 def due(formula: t.Term) -> Due | None:
-    """When a clause that is a response demands something; None of other clauses."""
+    """When a response clause demands something; None for other clauses."""
     found = responding(formula)
     if found is None:
         return None
@@ -102,14 +102,14 @@ def due(formula: t.Term) -> Due | None:
         case t.Past.WITHIN | t.Past.FOR:
             assert response.limit is not None
             full = t.History(t.Past.SINCE, (t.TRUE, full), BOOL, replace(response.limit, relation=">="))
-        case _:  # with the trigger
+        case _:  # due with the trigger
             pass
     return Due(outer, triggers, full)
 
 
 def responding(formula: t.Term) -> tuple[tuple[t.Variable, ...], tuple[t.Term, ...], t.History] | None:
-    """Of a clause that is a response: the variables of the quantifiers around it, what triggers it, and the response;
-    None of other clauses."""
+    """The variables of the quantifiers around a response clause, its triggers, and the response; None for other
+    clauses."""
     outer = list[t.Variable]()
     while isinstance(formula, t.Quantified) and formula.quantifier is t.Quantifier.FORALL:
         outer.extend(formula.variables)
@@ -119,8 +119,8 @@ def responding(formula: t.Term) -> tuple[tuple[t.Variable, ...], tuple[t.Term, .
 
 
 def fulfilled(formula: t.Term) -> t.Term | None:
-    """When a clause ``T -> within[…](R)`` is met (of any values of its quantified variables), as a formula of the past;
-    None of other clauses."""
+    """The past-time formula for when a clause ``T -> within[…](R)`` is met (for some values of its quantified
+    variables); None for other clauses."""
     found = responding(formula)
     if found is None or found[2].operator is not t.Past.WITHIN:
         return None
