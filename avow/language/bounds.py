@@ -13,8 +13,8 @@ from avow.language.sorts import BoolSort
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A comparison with a constant, read with the constant on the right. Where it is a condition, or stands under `not`
-    or `or`, the same may be said the other way (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
+    """A comparison with a constant, read with the constant on the right. If it is in a condition, or under `not` or
+    `or`, a sentence may express it by the opposite (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
 
     term: t.Compare
     sign: str
@@ -42,12 +42,12 @@ def bounds(formula: t.Term) -> Iterator[Bound]:
                 stack += [(otherwise, turned), (then, turned), (condition, True)]
             case t.Iff() | t.Or() | t.Not() | t.Operation(sort=BoolSort()):
                 stack += [(part, True) for part in reversed(term.children)]
-            case _:  # what holds of its parts is not turned round by anything else
+            case _:  # other terms do not turn their parts
                 stack += [(part, turned) for part in reversed(term.children)]
 
 
 def constant(term: t.Term) -> Fraction | None:
-    """The number that a term without variables is; None for every other term."""
+    """The value of a numeric term without variables; None for every other term."""
     match term:
         case t.Literal(value=bool() | str()):
             return None

@@ -1,4 +1,4 @@
-"""Formulas that a hasty reader may bracket differently: `and` or `or` beside `->` or `<=>` without parentheses."""
+"""Formulas that a reader may bracket wrongly: `and` or `or` beside `->` or `<=>` without parentheses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from avow.language.syntax import Connective, Sign, TermSyntax, walk
 
 @dataclass(frozen=True, slots=True)
 class Misreading:
-    """`mixed` (and/or) stands beside `operator` (-> or <=>); `shown` is the text as it is read, bracketed."""
+    """`mixed` (and/or) occurs beside `operator` (-> or <=>); `shown` is the text with the brackets that the language
+    implies."""
 
     mixed: str
     operator: str
@@ -21,7 +22,7 @@ class Misreading:
 
 
 def misreadings(formula: TermSyntax, text: str) -> Iterator[Misreading]:
-    """Every place in the formula where the language's reading differs from the one in which `->` and `<=>` bind tighter
+    """Every place in the formula where the language's parse differs from one in which `->` and `<=>` bind tighter
     than `and` and `or`. (``a -> b or c`` means the same either way.)"""
     inner: set[int] = set()
     for tree in walk(formula):
@@ -42,7 +43,7 @@ def _operands(tree: TermSyntax) -> tuple[TermSyntax, ...]:
 
 
 def _bracketed(tree: Connective, text: str) -> str:
-    """The formula as it is read, with parentheses around what binds tighter."""
+    """The formula as the language parses it, with parentheses around the parts that bind tighter."""
     parts = [
         f"({_bracketed(part, text)})" if isinstance(part, Connective) else _shortened(text, part) for part in tree.items
     ]

@@ -1,4 +1,4 @@
-"""The formula checker, part three: what speaks of other steps than this one, and lengths of time."""
+"""The formula checker, part three: operators that refer to other steps, and lengths of time."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _PLACE = "a response stands as the whole right side of a clause's outermost `->`
 
 
 class Histories(Terms):
-    """Records of the past, and responses."""
+    """Past-time operators and responses."""
 
     response: syntax.TermSyntax | None = None
-    """Where a response may stand."""
+    """The only part that may be a response."""
     whole: syntax.TermSyntax | None = None
-    """The clause."""
+    """The clause's formula."""
 
     def clause(self, tree: syntax.TermSyntax) -> Term | None:
-        """A clause's formula, which may speak of other steps and be a response."""
+        """A clause's formula, which may refer to other steps and be a response."""
         self.response, self.whole = _right_side(tree), syntax.unparenthesised(tree)
         return self.formula(tree)
 
@@ -79,7 +79,7 @@ class Histories(Terms):
         return History(operator, made, sort, bound, self.span(tree))
 
     def pace(self, tree: syntax.PaceSyntax) -> Term | None:
-        """A node's pace, which is a guarantee of its own."""
+        """A node's pace, which is a guarantee by itself."""
         told = " ".join(token.text for token in tree.words)
         relation = {"every": "==", "at most": "<="}.get(told)
         scale = _scale(tree.length.unit.text)
@@ -99,7 +99,7 @@ class Histories(Terms):
         return History(Past.STEPS, (), BOOL, Limit(relation, amount, False), self.span(tree))
 
     def _limits(self, tree: syntax.TermSyntax, operator: Past, limit: syntax.LimitSyntax | None) -> bool:
-        """Whether it has a limit where it needs one, and one of its kind; reports it if not."""
+        """Whether the operator has a limit if it needs one, and one of the right kind; reports it if not."""
         if limit is None:
             if operator not in _ALWAYS_LIMITED:
                 return True
@@ -216,7 +216,7 @@ class Histories(Terms):
 
 
 def _right_side(tree: syntax.TermSyntax) -> syntax.TermSyntax:
-    """The right side of a formula's outermost `->`, under universal quantifiers; the formula, where it has none."""
+    """The right side of a formula's outermost `->`, under universal quantifiers; the formula if it has none."""
     tree = syntax.unparenthesised(tree)
     while isinstance(tree, syntax.Quantification) and tree.quantifier is Quantifier.FORALL:
         tree = syntax.unparenthesised(tree.body)
@@ -226,7 +226,7 @@ def _right_side(tree: syntax.TermSyntax) -> syntax.TermSyntax:
 
 
 def _scale(unit: str) -> Fraction | None:
-    """How many seconds a unit is."""
+    """The length of a unit in seconds; None if it is not a unit of time."""
     if unit in LONG_UNITS:
         return Fraction(LONG_UNITS[unit])
     return Fraction(1, 10 ** UNITS[unit]) if unit in UNITS else None

@@ -1,4 +1,4 @@
-"""The formula checker, part one: what every part shares, literals, and what names mean."""
+"""The formula checker, part one: the parts' common base, literals, and name resolution."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from avow.language.terms import Construct, EnumValue, Item, Literal, Past, Role,
 
 
 class Names(ABC):
-    """Literals and names; a formula's scope, and where to report. The scope's `bound` variables change on the way and
-    are as before afterwards."""
+    """Literals and names, with a formula's scope and its reports. The scope's `bound` variables change during a check
+    and are restored afterwards."""
 
     def __init__(self, scope: Scope, reports: Reports) -> None:
         self.scope = scope
@@ -44,15 +44,15 @@ class Names(ABC):
 
     @abstractmethod
     def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
-        """A term of any sort; `expected` helps only where the text leaves the sort open (``<>``)."""
+        """A term of any sort; `expected` is used only if the text leaves the sort open (``<>``)."""
 
     @abstractmethod
     def history(self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax]) -> Term | None:
-        """A form that speaks of other steps than this one."""
+        """A term with an operator that refers to other steps."""
 
     @abstractmethod
     def defined(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
-        """What a definition of the scope says of these arguments."""
+        """A definition of the scope applied to these arguments."""
 
     def error(
         self,
@@ -69,7 +69,7 @@ class Names(ABC):
         return self.reports.source.span(tree.start, tree.end)
 
     def between(self, first: TermSyntax, last: TermSyntax) -> Span:
-        """The place from the start of one part to the end of another."""
+        """The span from the start of one part to the end of another."""
         return self.reports.source.span(first.start, last.end)
 
     def text(self, tree: Syntax) -> str:
@@ -80,7 +80,7 @@ class Names(ABC):
         return [self.term(t) for t in trees]
 
     def wanted(self, tree: TermSyntax, sort: Sort, what: str) -> Term | None:
-        """The term, converted to the sort that its place asks for."""
+        """The term, converted to the sort that its context requires."""
         term = self.term(tree, sort)
         if term is None:
             return None
@@ -103,7 +103,7 @@ class Names(ABC):
 
     def string(self, tree: Text) -> Term | None:
         if not tree.text.endswith('"') or tree.start in self.reports.odd:
-            return None  # quotation marks of another kind, or none at the end: reported by the lexer
+            return None  # other quotation marks, or no closing one: reported by the lexer
         return Literal(unquote(tree.text), STRING, self.span(tree))
 
     # --- names -------------------------------------------------------------------------------------------------------
@@ -151,7 +151,7 @@ class Names(ABC):
         return None
 
     def undeclared(self, name: str, tree: Syntax, what: str = "name", *, text: bool = False) -> None:
-        """Reports a name that nothing has; `text` where a text is wanted."""
+        """Reports an undeclared name; `text`: a string is expected."""
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
         hint = FOREIGN_NAMES.get(name.casefold()) or did_you_mean(name, self.scope.known())
@@ -222,7 +222,7 @@ class Names(ABC):
         return None
 
     def elsewhere(self, before: str, name: str, tree: Syntax) -> None:
-        """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""
+        """Reports `before.name` inside a node: a misspelt role, a field, or another node's variable."""
         scope = self.scope
         own = [f"{r}.{name}" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
         word = {"in": "in", "input": "in", "out": "out", "output": "out"}.get(before.casefold().removesuffix("s"))

@@ -1,4 +1,4 @@
-"""The formula checker, part two: functions and operators applied, tuples, sets and sequences, comparisons."""
+"""The formula checker, part two: function and operator applications, tuples, sets and sequences, comparisons."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from avow.language.operators import OPERATORS, Mistyped, operation
 from avow.language.printer import show_sort
 
 _BUILTINS = frozenset(t.Builtin)
-"""Words that are operators directly before a parenthesis, unless the contract gives them another meaning."""
+"""Names that are operators directly before a parenthesis, unless the contract declares them."""
 _PAST = frozenset(t.Past) - {t.Past.SINCE, t.Past.UNTIL}
 _ORDERINGS = frozenset(("<", "<=", ">", ">="))
 _OPERATORS = {"EQ": "==", "NE": "!=", "LE": "<=", "GE": ">=", "LT": "<", "GT": ">"}
@@ -206,7 +206,7 @@ class Terms(Names):
         return None if items is None else t.SetTerm(tuple(items), s.SetSort(joined(items)), self.span(tree))
 
     def collection(self, tree: syntax.TermSyntax, item: s.Sort | None) -> t.Term | None:
-        """The right-hand side of ``in``, or a quantifier's domain that is no type: a set or a sequence."""
+        """The right-hand side of ``in``, or a quantifier's domain that is not a type: a set or a sequence."""
         tree = syntax.unparenthesised(tree)
         if isinstance(tree, syntax.Name) and self.scope.taken(tree.text) is not None:
             sort = self.scope.environment.sort(tree.text)
@@ -407,7 +407,7 @@ def _is_open(tree: syntax.TermSyntax) -> bool:
 
 
 def _combined(operator: str, left: t.Term, right: t.Term, span: Span) -> t.Arithmetic:
-    """``left operator right``: REAL if a side is, or for `/`; a difference of naturals may be negative."""
+    """``left operator right``: REAL if a side is REAL, or for `/`; a difference of naturals is an INTEGER."""
     if operator == "/" or s.REAL in (left.sort, right.sort):
         return t.Arithmetic(operator, widen(left), widen(right), s.REAL, span)
     natural = left.sort == s.NATURAL and right.sort == s.NATURAL and operator != "-"

@@ -1,7 +1,7 @@
 """Surface formulas to typed terms: every name resolved, every widening explicit, every error reported.
 
-A part in error becomes None and is not mentioned again, so that one run reports every independent error of a formula.
-Recursion is as deep as the formula, which the parser bounds (`NESTING`). The checker is a class in four parts:
+A part in error becomes None and is not reported again, so that one run reports every independent error of a formula.
+Recursion is as deep as the formula, which the parser limits (`NESTING`). The checker is a class in four parts:
 `check_names`, `check_terms`, `check_history`, and here connectives, quantifiers and definitions.
 """
 
@@ -31,7 +31,7 @@ from avow.language.syntax import Syntax, TermSyntax
 
 
 class Checker(Histories):
-    """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
+    """Types the formulas of one scope: `formula` for sort BOOL, `term` for any sort, `wanted` for a given sort."""
 
     def term(self, tree: syntax.TermSyntax, expected: Sort | None = None) -> t.Term | None:
         match tree:
@@ -179,7 +179,7 @@ class Checker(Histories):
         return False
 
     def domain(self, tree: syntax.TermSyntax) -> tuple[Sort, t.Term | None] | None:
-        """What a quantified variable ranges over: a sort, and the set or sequence of it where it is less than that."""
+        """The range of a quantified variable: a sort, and the set or sequence if it is only part of the sort."""
         tree = syntax.unparenthesised(tree)
         sort = self.type_in_term(tree)
         if sort is not None:
@@ -205,7 +205,7 @@ class Checker(Histories):
         return sort.item, collection
 
     def type_in_term(self, tree: syntax.TermSyntax) -> Sort | None:
-        """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None where it names none."""
+        """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None if it names none."""
         match tree:
             case syntax.BuiltinName(text=text):
                 return BUILTINS.get(text, REAL)
@@ -217,10 +217,10 @@ class Checker(Histories):
             case syntax.SequenceDisplay(items=(only,)):
                 item = self.type_in_term(only)
                 return None if item is None else SequenceSort(item)
-            case _:  # a term that names no sort
+            case _:  # a term that does not name a sort
                 return None
 
-    # --- local definitions, checked where they stand and written out where they are used -----------------------------
+    # --- local definitions, checked in place and expanded where they are used ----------------------------------------
 
     def defined(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> t.Term | None:
         entry, scope = self.scope.defined[name], self.scope
@@ -240,7 +240,7 @@ class Checker(Histories):
         return expand(definition, given, self.span(tree), lambda other: self.scope.taken(other) is not None)
 
     def definition(self, entry: Defined, use: Syntax | None = None) -> Definition | None:
-        """What is defined, checked once in this node; None where that is in error, which is reported."""
+        """The definition, checked once in this node; None if it is in error, which is reported."""
         tree, reports = entry.tree, entry.reports
         if tree is None or reports is None or entry.state == "done":
             return entry.found

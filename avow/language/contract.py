@@ -1,4 +1,4 @@
-"""A checked contract: what the language floor hands to all others."""
+"""A checked contract: the language layer's result, which all other layers use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from avow.language.sorts import Sort
 from avow.language.terms import TRUE, History, Limit, Past, Role, Term, Variable
 
 TO_WRITE = "to_write"
-"""What a draft calls the guarantee that a person has yet to write."""
+"""The name that a draft gives to a guarantee that a person has yet to write."""
 
 
 class ClauseKind(StrEnum):
@@ -23,29 +23,30 @@ class ClauseKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Clause:
-    """One ``assume(…)`` or ``guarantee(…)``. `name` is the given one, else ``A1``, ``G2``… by position from 1."""
+    """One ``assume(…)`` or ``guarantee(…)``. `name` is the given name, or else ``A1``, ``G2``… by position from 1."""
 
     kind: ClauseKind
     name: str
     position: int
     formula: Term
-    """What it says: the formula as written, and that it has a value (`avow.language.definedness`)."""
+    """Its meaning: the formula as written, and that it has a value (`avow.language.definedness`)."""
     sentence: str | None = None
     text: str = field(default="", compare=False)
     """The formula as written in the file."""
     span: Span | None = field(default=None, compare=False, repr=False)
     sentence_span: Span | None = field(default=None, compare=False, repr=False)
     written: Term | None = field(default=None, compare=False, repr=False)
-    """The formula without that, where it was read from a file: for what is said of the text."""
+    """The formula as written, without the conditions for a value, if it was read from a file: for messages about the
+    text."""
 
     @property
     def unwritten(self) -> bool:
-        """Whether it is a draft's placeholder: a guarantee `to_write` that says TRUE."""
+        """Whether it is a draft's placeholder: a guarantee `to_write` with the formula TRUE."""
         return self.kind is ClauseKind.GUARANTEE and self.name == TO_WRITE and self.formula == TRUE
 
     @property
     def pace(self) -> Limit | None:
-        """How far apart the node's steps are, where the clause is ``steps(every 20 ms)`` or its like."""
+        """The time between the node's steps, if the clause has the form ``steps(every 20 ms)``."""
         formula = self.formula
         return formula.limit if isinstance(formula, History) and formula.operator is Past.STEPS else None
 
@@ -77,7 +78,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Partial:
-    """A contract in another notation, and what of it is left out."""
+    """A contract in another notation, and the parts that are left out."""
 
     text: str
     missing: tuple[Diagnostic, ...] = ()
@@ -86,7 +87,7 @@ class Partial:
 @dataclass(frozen=True, slots=True)
 class Definition:
     """``define hot(i : NATURAL) = in.temp(i) > 80``. The parameters are bound variables of the body, in which other
-    definitions are written out."""
+    definitions are expanded."""
 
     name: str
     parameters: tuple[Variable, ...]
@@ -106,9 +107,9 @@ class Node:
     guarantees: tuple[Clause, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     relay: bool = field(default=False, compare=False, repr=False)
-    """Made of what several outputs say to one input; no contract has it."""
+    """Generated to merge several outputs into one input; not from a contract."""
     definitions: tuple[Definition, ...] = field(default=(), compare=False, repr=False)
-    """What its clauses may call by name; they are written out in every formula."""
+    """The definitions that its clauses may use by name; they are expanded in every formula."""
 
     @property
     def clauses(self) -> tuple[Clause, ...]:
@@ -116,7 +117,7 @@ class Node:
 
     @property
     def unwritten(self) -> bool:
-        """Whether some of what it guarantees is still to be written, so that nothing is said of what it leaves open."""
+        """Whether a guarantee is still to be written, so that cases it leaves open are not reported."""
         return any(clause.unwritten for clause in self.guarantees)
 
     def clause(self, name: str) -> Clause:
@@ -137,15 +138,15 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Contract:
-    """All that one or more .rcl files declare. `types` are the context's names for sorts, in order;
-    `constants` are names for values (they are already expanded in every formula)."""
+    """The declarations of one or more .rcl files. `types` are the context's names for sorts, in order;
+    `constants` are names for values (already expanded in every formula)."""
 
     files: tuple[str, ...]
     types: tuple[tuple[str, Sort], ...]
     constants: tuple[tuple[str, Term], ...]
     nodes: tuple[Node, ...]
     definitions: tuple[Definition, ...] = field(default=(), compare=False, repr=False)
-    """Those of the context that speak of no input or output."""
+    """The definitions of the context that mention no input or output."""
 
     def node(self, name: str) -> Node:
         """The node of that name. Raises KeyError."""
@@ -157,5 +158,5 @@ class Contract:
 
 @by_identity(20_000)
 def _named(first: tuple[Any, ...], then: tuple[Any, ...]) -> dict[str, Any]:
-    """By name: a node may have thousands of ports, each of which is looked up. The first of a name counts."""
+    """An index by name: a node may have thousands of ports, each of which is looked up. The first of a name is kept."""
     return {each.name: each for each in (*reversed(then), *reversed(first))}

@@ -1,4 +1,4 @@
-"""Where a term of one sort may stand for another: INTEGER and NATURAL widen to REAL, and nothing else changes."""
+"""Conversions between sorts: INTEGER and NATURAL widen to REAL; there are no others."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ NUMERIC = (s.IntegerSort, s.NaturalSort, s.RealSort)
 
 
 def alike(left: s.Sort, right: s.Sort) -> bool:
-    """Whether the sorts are one for a comparison: equal, NATURAL and INTEGER counting as one."""
+    """Whether the sorts are the same for a comparison: equal, with NATURAL and INTEGER identified."""
     return left == right or (isinstance(left, WHOLE) and isinstance(right, WHOLE)) or _in_parts(left, right, alike)
 
 
 def fits(sort: s.Sort, wanted: s.Sort) -> bool:
-    """Whether every value of `sort` is one of `wanted` as it stands."""
+    """Whether every value of `sort` is a value of `wanted` without conversion."""
     return sort == wanted or (sort == s.NATURAL and wanted == s.INTEGER) or _in_parts(sort, wanted, fits)
 
 
 def _in_parts(left: s.Sort, right: s.Sort, same: Callable[[s.Sort, s.Sort], bool]) -> bool:
-    """Whether two tuples or sequences are of a kind, and their items are the `same`."""
+    """Whether the sorts are two tuples or two sequences, with items that are pairwise the `same`."""
     match left, right:
         case s.TupleSort(items=a), s.TupleSort(items=b):
             return left.labels == right.labels and len(a) == len(b) and all(map(same, a, b))
@@ -44,7 +44,7 @@ def widen(term: Term) -> Term:
 
 
 def convert(term: Term, wanted: s.Sort) -> Term | None:
-    """The term as one of sort `wanted`; None where that cannot be."""
+    """The term converted to sort `wanted`; None if that is impossible."""
     if fits(term.sort, wanted):
         return term
     if wanted == s.REAL and isinstance(term.sort, WHOLE):
@@ -66,14 +66,15 @@ def convert(term: Term, wanted: s.Sort) -> Term | None:
 
 
 def _as_record(sort: s.Sort, wanted: s.Sort) -> bool:
-    """Whether a tuple that is written down may stand for one of that sort: a record's items stand in their order."""
+    """Whether a tuple term may be used as a record (or tuple) of that sort: the items of a record are in declared
+    order."""
     if not isinstance(sort, s.TupleSort) or not isinstance(wanted, s.TupleSort):
         return False
     return len(sort.items) == len(wanted.items) and sort.labels in ((), wanted.labels)
 
 
 def widest(left: s.Sort, right: s.Sort) -> s.Sort | None:
-    """The sort in which both have a place, if there is one."""
+    """The smallest sort to which both convert, or None."""
     if left == right:
         return left
     if isinstance(left, NUMERIC) and isinstance(right, NUMERIC):
@@ -89,7 +90,7 @@ def widest(left: s.Sort, right: s.Sort) -> s.Sort | None:
 
 
 def common(terms: list[Term]) -> list[Term] | None:
-    """The terms brought to one sort, or None."""
+    """The terms converted to one sort, or None."""
     if not terms or all(alike(t.sort, terms[0].sort) for t in terms):
         return terms
     target = _widest(terms)
@@ -99,15 +100,15 @@ def common(terms: list[Term]) -> list[Term] | None:
 
 
 def joined(terms: list[Term]) -> s.Sort:
-    """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative, also
-    within tuples and sequences. Every one of them is a value of it: a variable that ranges over them has this sort."""
+    """The item sort of a set or sequence of these terms (non-empty, already `common`): INTEGER if some may be negative,
+    also within tuples and sequences. Each term is a value of it: a variable that ranges over them has this sort."""
     found = _widest(terms)
     assert found is not None, "they are alike"
     return found
 
 
 def _widest(terms: list[Term]) -> s.Sort | None:
-    """The sort in which each of them has a place, if there is one."""
+    """The smallest sort to which all of them convert, or None."""
     found: s.Sort | None = terms[0].sort
     for term in terms:
         found = None if found is None else widest(found, term.sort)

@@ -1,7 +1,7 @@
-"""The context: type and constant declarations, of one or several files, to an `Environment`.
+"""The context: elaborates the type and constant declarations of one or several files to an `Environment`.
 
-Declarations may refer to later ones; a circle is an error. A set of fresh names given as a constant declares an
-enumeration of that name, whose name also stands for the set of its elements.
+Declarations may refer to later ones; a cycle is an error. A constant whose value is a set of fresh names declares an
+enumeration of that name; the name also denotes the set of its elements.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Declared:
     tree: syntax.Declaration
     reports: Reports
     state: str = "new"
-    """new, open (being elaborated: meeting it again is a circle), or done."""
+    """new, open (being elaborated: meeting it again is a cycle), or done."""
 
     @property
     def name(self) -> Token:
@@ -49,11 +49,11 @@ class Declarations:
     environment: Environment = field(default_factory=Environment)
     declared: dict[str, _Declared] = field(default_factory=dict)
     owners: dict[str, str] = field(default_factory=dict)
-    """Which type declaration writes down an element or constructor: known before anything is elaborated."""
+    """The type declaration that contains each element or constructor: known before anything is elaborated."""
     definitions: dict[str, Defined] = field(default_factory=dict)
-    """Those of the contexts; each node checks those anew that speak of its inputs and outputs."""
+    """The definitions of the contexts; each node re-checks those that mention its inputs and outputs."""
     open: int = 0
-    """How many declarations wait for one that they refer to."""
+    """The number of declarations that wait for one that they refer to."""
 
     def add(self, trees: Sequence[syntax.Declaration], reports: Reports) -> None:
         for tree in trees:
@@ -125,7 +125,7 @@ class Declarations:
         declared.state = "done"
 
     def is_small(self, name: str, extent: tuple[int, int], place: Token, reports: Reports) -> bool:
-        """Whether a sort or value is not too large or deep to be worked with; reports it if it is."""
+        """Whether a sort or value is within the limits of size and depth; reports it if not."""
         size, depth = extent
         if size <= DECLARED_PARTS and depth <= NESTING:
             return True
@@ -141,7 +141,7 @@ class Declarations:
     # --- definitions -------------------------------------------------------------------------------------------------
 
     def define(self, tree: syntax.Define, reports: Reports, into: dict[str, Defined], scope: Scope) -> None:
-        """A definition by its name, its parameters read; its body is checked when it is looked up."""
+        """Registers a definition by name, with its parameters; its body is checked when it is looked up."""
         parameters: dict[str, Variable] = {}
         sound = True
         for part in tree.parameters:
@@ -163,7 +163,7 @@ class Declarations:
             self.environment.broken.add(tree.name.text)
 
     def of_ports(self, name: str) -> bool:
-        """Whether a definition of the context speaks of inputs or outputs, or one that it names does."""
+        """Whether a definition of the context mentions inputs or outputs, directly or through another definition."""
         waiting, seen = [name], {name}
         while waiting:
             tree = self.definitions[waiting.pop()].tree
@@ -215,7 +215,8 @@ class Declarations:
             environment.constants[name] = term
 
     def half_known(self, value: syntax.SetDisplay, fresh: Sequence[syntax.Name], reports: Reports) -> None:
-        """Reports the new names of a set that has known ones too: a set declares its elements, or collects them."""
+        """Reports the new names of a set that also has known ones: a set either declares its elements or lists known
+        values."""
         new = {t.start for t in fresh}
         known = [t for t in value.items if t.start not in new]
         for tree in fresh if known else ():
@@ -226,12 +227,12 @@ class Declarations:
             self.environment.broken.add(tree.text)
 
     def fresh_names(self, trees: Sequence[syntax.TermSyntax]) -> list[syntax.Name]:
-        """Those of the trees that are names which nothing has."""
+        """The trees that are undeclared names."""
         taken = (self.declared, self.owners, self.environment.elements)
         return [t for t in trees if isinstance(t, syntax.Name) and not any(t.text in names for names in taken)]
 
     def needed_by(self, value: syntax.TermSyntax) -> None:
-        """Elaborates first what a constant's value mentions: other constants, and the types of elements."""
+        """Elaborates the declarations that a constant's value mentions: other constants, and the types of elements."""
         for name in _names(value):
             owner = self.owners.get(name)
             other = self.declared.get(name) or (self.declared[owner] if owner is not None else None)
@@ -247,7 +248,7 @@ class Declarations:
     # --- types -------------------------------------------------------------------------------------------------------
 
     def type_of(self, tree: syntax.TypeSyntax, reports: Reports, name: str) -> s.Sort | None:
-        """The sort that a type denotes; `name` is what a new set of names is to be called."""
+        """The sort that a type denotes; `name` is the name for a new set of names."""
         match tree:
             case syntax.BuiltinType(text=text):
                 return s.BUILTINS.get(text, s.BUILTINS["REAL"])
@@ -359,7 +360,7 @@ class Declarations:
         return found if isinstance(found, s.EnumSort) else None
 
     def free_name(self, name: str) -> str:
-        """`name` itself for the declaration being elaborated; a set written in place gets one that nothing else has."""
+        """`name` itself for the declaration being elaborated; a set written in place gets an unused name."""
         declared = self.declared.get(name)
         if declared is not None and declared.state == "open":
             return name
@@ -370,7 +371,7 @@ class Declarations:
         return free
 
     def introduce(self, sort: s.EnumSort | s.DataSort, names: Sequence[Token], reports: Reports) -> s.Sort | None:
-        """The sort, its elements made known; or the sort that an equal set was before."""
+        """The sort, with its elements declared; or the known sort of an equal set."""
         environment = self.environment
         if sort.name not in self.declared:
             for known in (*environment.types.values(), *environment.anonymous.values()):

@@ -1,9 +1,10 @@
-"""That a claim has a value: partial operations (a quotient by zero, an element that a sequence does not have) are
-written out as conditions of the claim itself, so that every engine asks for them.
+"""Definedness of claims: the conditions of partial operations (a quotient by zero, an element that a sequence does not
+have) become part of the claim itself, so that every engine checks them.
 
-A claim that has no value is not met. `1 / in.x == 1 or 1 / in.x != 1` says `in.x != 0` as well; what its own guards
-exclude (``in.x != 0 -> 1 / in.x < 2``) asks for nothing. A part of a conjunction (disjunction, implication) need not
-have a value where another part, which always has one or stands before it, makes the whole false (true).
+A claim that has no value is not met. `1 / in.x == 1 or 1 / in.x != 1` implies `in.x != 0` as well; an operation that
+the claim itself guards (``in.x != 0 -> 1 / in.x < 2``) adds no condition. A part of a conjunction (disjunction,
+implication) need not have a value if another part, which always has one or comes before it, makes the whole false
+(true).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _ZERO = t.Literal(0, NATURAL)
 
 
 def with_value(claim: t.Term) -> t.Term:
-    """The claim, and that it has a value. The same of what it gives is that again."""
+    """The conjunction of the claim and that it has a value. Idempotent."""
     if any(isinstance(part, t.History) for part in subterms(claim)):
         claim = _at_their_steps(claim)
         if any(map(_is_response, subterms(claim))):
@@ -37,7 +38,8 @@ def with_value(claim: t.Term) -> t.Term:
 
 
 def _at_their_steps(term: t.Term) -> t.Term:
-    """What speaks of other steps has its conditions at those: a formula without a value was not so there."""
+    """The term with the conditions of its history operators at the steps they refer to: a formula without a value
+    counts as false there."""
     parts = tuple(map(_at_their_steps, term.children))
     if isinstance(term, t.History):
         parts = tuple(with_value(part) if part.sort == BOOL else part for part in parts)
@@ -45,7 +47,7 @@ def _at_their_steps(term: t.Term) -> t.Term:
 
 
 def _responding(claim: t.Term) -> t.Term:
-    """A response stays where it stands: a condition of it that has no value did not come about."""
+    """A claim with a response keeps its form: a trigger without a value counts as false."""
     match claim:
         case t.Implies(left=left, right=right):
             return t.Implies(with_value(left), _responding(right), claim.span)
@@ -59,7 +61,7 @@ def _is_response(term: t.Term) -> bool:
 
 
 def demanded(claim: t.Term) -> t.Term:
-    """What a claim demands beside that it has a value: the converse of `with_value`."""
+    """The claim without the condition that it has a value: the inverse of `with_value`."""
     parts = _parts(claim) if _is_partial(claim) else ()
     for k in range(1, len(parts)):
         rest = t.And(parts[k:], claim.span) if k + 1 < len(parts) else parts[k]
@@ -69,7 +71,7 @@ def demanded(claim: t.Term) -> t.Term:
 
 
 def unless_without_value(claim: t.Term) -> t.Term:
-    """The claim, or that it has no value: what is meant where it stands under a `not`."""
+    """The claim, or that it has no value: its meaning under a `not`."""
     needed = _needed(claim)
     return claim if needed == t.TRUE else t.Implies(needed, claim, claim.span)
 
@@ -83,7 +85,7 @@ def _is_partial(term: t.Term) -> bool:
 
 
 def may_lack_value(term: t.Term) -> bool:
-    """Whether it may have no value although its parts have one."""
+    """Whether the term may lack a value although its parts have one."""
     match term:
         case t.Arithmetic(operator=sign):
             return sign == "/"
@@ -99,7 +101,7 @@ def may_lack_value(term: t.Term) -> bool:
         case t.Operation(operator=operator):
             match operator:
                 case t.Builtin.XOR | t.Builtin.ABS | t.Builtin.MIN | t.Builtin.MAX | t.Builtin.MOD | t.Builtin.DIV:
-                    return False  # of `mod` and `div` the divisor is a positive number that is written down
+                    return False  # the divisor of `mod` and `div` is a positive literal
                 case _:
                     assert_never(operator)
         case t.Argument():
@@ -109,8 +111,8 @@ def may_lack_value(term: t.Term) -> bool:
 
 
 def defined(term: t.Term, sequences: Collection[t.Variable] | None = None, facts: Facts = ()) -> t.Term:
-    """A condition under which it does not matter to a formula what lies outside any partial operation; with
-    `sequences`, outside these. `facts` hold where it is asked."""
+    """A condition under which a formula does not depend on the values of partial operations outside their domains; with
+    `sequences`, on elements outside these only. `facts` hold in its context."""
     match term:
         case t.Not(body=body):
             found = defined(body, sequences, facts)
@@ -130,7 +132,7 @@ def defined(term: t.Term, sequences: Collection[t.Variable] | None = None, facts
             needed = [(guard, defined(part, sequences, (*facts, *_parts(guard)))) for guard, part in branches]
             safe = (t.Implies(guard, inner, term.span) for guard, inner in needed if inner != t.TRUE)
             found = _all((defined(condition, sequences, facts), *safe))
-        case _:  # no connective: all of it matters
+        case _:  # no connective: all parts matter
             found = _all(_risks(term, sequences, facts))
     return _all(part for part in _parts(found) if part not in facts)
 
@@ -138,14 +140,14 @@ def defined(term: t.Term, sequences: Collection[t.Variable] | None = None, facts
 def _in_turn(
     items: Sequence[t.Term], guards: Sequence[t.Term], sequences: Collection[t.Variable] | None, facts: Facts
 ) -> t.Term:
-    """Each of the items matters only where the guards of those hold that always have a value, and of those before."""
+    """Each item matters only if the guards of the items that always have a value, and of those before it, hold."""
     partial = [_is_partial(item) for item in items]
     safe = [guard for guard, doubtful in zip(guards, partial, strict=True) if not doubtful]
     found, asked = list[t.Term](), list[t.Term]()
     for item, guard, doubtful in zip(items, guards, partial, strict=True):
         if doubtful:
             inner = defined(item, sequences, (*facts, *_parts(_all((*safe, *asked)))))
-            asked += _parts(inner)  # what is asked once may be taken for granted further on
+            asked += _parts(inner)  # a condition required once may be assumed for later items
             if inner != t.TRUE:
                 found.append(t.Implies(_all(safe), inner, item.span) if safe else inner)
             safe.append(guard)
@@ -153,7 +155,7 @@ def _in_turn(
 
 
 def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts) -> Iterator[t.Term]:
-    """What an atom needs to be defined; of a formula within it, what that formula needs."""
+    """The conditions for an atom to be defined, including those of formulas within it."""
     match atom:
         case t.Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
             asked = [t.Compare("<=", _ZERO, index, atom.span)] if index.sort != NATURAL else []
@@ -166,11 +168,11 @@ def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts)
         case t.History(operator=t.Past.PREVIOUS | t.Past.CHANGED) if atom.arguments[0].sort != BOOL:
             yield from _risks_before(atom, sequences, facts)
             return
-        case _:  # has a value where its parts have one
+        case _:  # has a value if its parts have one
             assert sequences is not None or not may_lack_value(atom), f"no condition of a {type(atom).__name__}"
     for part in atom.children:
         if isinstance(atom, t.History) and part.sort == BOOL:
-            continue  # its own conditions stand in it
+            continue  # it contains its own conditions
         if part.sort == BOOL or isinstance(part, t.Conditional):
             yield from _parts(defined(part, sequences, facts))
         else:
@@ -178,9 +180,10 @@ def _risks(atom: t.Term, sequences: Collection[t.Variable] | None, facts: Facts)
 
 
 def _risks_before(atom: t.History, sequences: Collection[t.Variable] | None, facts: Facts) -> Iterator[t.Term]:
-    """What a value of the step before needs: that it was one there. What holds now says nothing of that step."""
+    """The conditions for a value of the previous step: that it was defined there. Facts about this step do not apply to
+    that step."""
     value, *initial = atom.arguments
-    if not initial:  # `changed` compares it with the value of now
+    if not initial:  # `changed` compares it with the present value
         yield from _parts(defined(value, sequences, facts))
     before = defined(value, sequences)
     first = defined(initial[0], sequences) if initial else t.TRUE
@@ -216,11 +219,11 @@ def _denial(term: t.Term) -> t.Term:
 
 _Sum = dict[t.Term, Fraction]
 _ONE = t.Literal(1, INTEGER)
-"""Its coefficient is the constant of a sum."""
+"""Key for the constant of a sum."""
 
 
 def _follows(goal: t.Compare, facts: Facts) -> bool:
-    """Whether one or two of the facts plainly give the goal, by adding them up."""
+    """Whether the goal follows from the sum of at most two of the facts."""
     facts = tuple(_denial(fact.body) if isinstance(fact, t.Not) else fact for fact in facts)
     if goal in facts:
         return True
@@ -233,13 +236,13 @@ def _follows(goal: t.Compare, facts: Facts) -> bool:
 
 
 def _at_most_zero(rest: _Sum) -> bool:
-    """Whether a sum is at most zero whatever the values are of the naturals in it."""
+    """Whether a sum is at most zero for all values of the naturals in it."""
     signed = (_ONE, _TINY)
     return all(n <= 0 if term in signed or term.sort == NATURAL else n == 0 for term, n in rest.items())
 
 
 def _below(fact: t.Term) -> list[_Sum]:
-    """Sums that are at most zero where a comparison holds."""
+    """Sums that are at most zero if a comparison holds."""
     match fact:
         case t.Compare(operator="<" | "<=" as sign, left=left, right=right):
             return [_added(_sum(left), _times(_sum(right), -1), _strict(sign, left, right))]
@@ -259,7 +262,7 @@ def _below(fact: t.Term) -> list[_Sum]:
 
 
 _TINY = t.Literal(0, REAL)
-"""As a summand, some positive number: by it one side of a strict comparison of reals is smaller than the other."""
+"""As a summand, an unspecified positive number: the difference between the sides of a strict comparison of reals."""
 
 
 def _strict(sign: str, left: t.Term, right: t.Term) -> _Sum:

@@ -1,6 +1,6 @@
-"""Local definitions: written out where a formula uses them, and put back where a formula is shown to people.
+"""Local definitions: expanded in the formulas that use them, and folded back when a formula is shown to people.
 
-No engine knows of definitions: the terms that they work on, and the digests of these, have them written out.
+Engines do not see definitions: the terms that they work on, and the digests of these, have them expanded.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from avow.language.terms import Apply, Quantified, Role, Term, Variable
 def expand(
     definition: Definition, given: Sequence[Term], span: Span | None = None, taken: Callable[[str], bool] | None = None
 ) -> Term:
-    """The body with these terms in the place of the parameters, at one place in the text. Its quantified variables get
-    other names where theirs are `taken` there."""
+    """The body with these terms in place of the parameters, at one place in the text. Its quantified variables are
+    renamed if their names are `taken` there."""
     named = {part.name for part in subterms(definition.body) if isinstance(part, Variable)}
     free = {part.name for term in given for part in subterms(term) if isinstance(part, Variable)}
 
@@ -40,7 +40,7 @@ def expand(
             case Quantified(quantifier=quantifier, variables=variables, body=body):
                 inner = {v: new(v) for v in variables}
                 return Quantified(quantifier, tuple(inner.values()), put(body, {**values, **inner}), span)
-            case _:  # its parts have the parameters
+            case _:  # the parameters are in its parts
                 parts = tuple(put(child, values) for child in term.children)
                 return replace(term.rebuild(parts) if parts else term, span=span)
 
@@ -49,8 +49,8 @@ def expand(
 
 @by_identity(20_000)
 def show_clause(clause: Clause, node: Node, style: StyleName = "unicode") -> str:
-    """The clause's formula for people: what its text calls by the name of a definition has that name, and the
-    definitions stand behind it."""
+    """The clause's formula for people: instances of the definitions that its text uses are shown by name, followed by
+    the definitions."""
     known = used(clause.text, node.definitions)
     shown = show_term(folded(clause.formula, known), style)
     where = r",\ \text{where}\ " if style == "latex" else ", where "
@@ -63,7 +63,7 @@ def _said(definition: Definition, known: Sequence[Definition], style: StyleName)
 
 
 def used(text: str, definitions: Iterable[Definition]) -> tuple[Definition, ...]:
-    """The definitions that a text names, and those that they name."""
+    """The definitions that a text names, directly or through other definitions."""
     found: list[Definition] = []
     waiting, left = [text], list(definitions)
     while waiting:

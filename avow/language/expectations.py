@@ -49,16 +49,16 @@ _IN_FORMULA = {
     "ELSE": "write `if F then s else t`, or `A -> B` for: if A then B",
     "IF": "put parentheses around it: `x == (if c then a else b)`",
 }
-"""By the token that does not fit."""
+"""Hints by the unexpected token."""
 
 
 def explain(
     start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str], reports: Reports
 ) -> None:
-    """Report the token `found`, which is at that position and where one of `expected` (terminals) should stand."""
-    if expected == {"COLON", "COMMA"}:  # after a port's name, most need its type
+    """Report the token `found` at position `at`, where one of the terminals `expected` should be."""
+    if expected == {"COLON", "COMMA"}:  # after a port's name, its type is usually missing
         expected = frozenset({"COLON"})
-    if expected == {"NAME", "DEFINE"}:  # where a declaration begins, most want the name
+    if expected == {"NAME", "DEFINE"}:  # at the start of a declaration, the name is usually missing
         expected = frozenset({"NAME"})
     hint = _hint(start, tokens, at, found, expected)
     if found.type == "$END" and tokens:
@@ -168,5 +168,5 @@ _LIKE = frozenset(("forall", "all", "every", "foreach", "exists", "exist", "exis
 
 
 def about_keyword(found: Token) -> str | None:
-    """What to say where a name is wanted and a keyword stands."""
+    """The message for a keyword where a name is expected."""
     return f"`{found.text}` is a keyword and cannot be a name" if found.text in KEYWORDS else None

@@ -11,13 +11,13 @@ _OPERANDS = frozenset((
     *("NAME", "NUMBER", "UNIT", "STRING", "BUILTIN", "TRUE", "FALSE", "EMPTY_SEQUENCE"),
     *("RPAR", "RBRACE", "RSQUARE", "CLOSING"),
 ))  # fmt: skip
-"""With which an operand ends."""
+"""The tokens that end an operand."""
 _APPLIED = _OPERANDS | {"FORALL", "EXISTS", "UNIQUE", "MATCHES", "SINCE"}
-"""What stands before the parenthesis, or a limit's bracket, of something applied."""
+"""The tokens before the parenthesis of an application, or a limit's bracket."""
 _OPENS = frozenset(("LPAR", "LBRACE", "LSQUARE", "OPENING", "SIGN", "DOT"))
-"""After which there is no space."""
+"""The tokens that no space follows."""
 _CLOSES = frozenset(("RPAR", "RBRACE", "RSQUARE", "CLOSING", "LIMIT", "COMMA", "DOT", "APPLIED"))
-"""Before which there is none."""
+"""The tokens that no space precedes."""
 TEXTS = {"NOT_IN": "!in", "EMPTY_SEQUENCE": "<>", "SEMICOLON": "|"}
 
 
@@ -34,12 +34,13 @@ def flat(found: Sequence[Token]) -> str:
 
 
 def flat_text(text: str) -> str:
-    """As `flat`, of a piece of text that has been read."""
+    """As `flat`, for a piece of text that has already been read."""
     return flat(tokens(Reports(Source("", text))))
 
 
 def without_doubled(found: Sequence[Token]) -> list[Token]:
-    """The tokens without parentheses that directly enclose parentheses and apply to nothing."""
+    """The tokens without redundant parentheses: those that directly enclose other parentheses and are not an
+    application's."""
     partners: dict[int, int] = {}
     stack: list[int] = []
     for at, token in enumerate(found):
@@ -56,8 +57,8 @@ def without_doubled(found: Sequence[Token]) -> list[Token]:
 
 
 def _told_apart(found: Sequence[Token]) -> list[tuple[str, str]]:
-    """The kind and text of each token, where a sign has several uses by its use: `OPENING` and `CLOSING` of a sequence,
-    a `SIGN` before a number, brackets of what is `APPLIED`, the end of the `LIMIT` of `since`."""
+    """The kind and text of each token; a sign with several uses is classified by its use: `OPENING` and `CLOSING` of a
+    sequence, a `SIGN` before a number, `APPLIED` brackets of an application, the end of the `LIMIT` of `since`."""
     out: list[tuple[str, str]] = []
     open_: list[str] = []
     before = ""

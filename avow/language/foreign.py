@@ -1,7 +1,7 @@
-"""Signs and words of other notations (mathematics, programming languages), each with what RCL has for it.
+"""Signs and words of other notations (mathematics, programming languages), each with its RCL equivalent.
 
-A foreign sign is an error whose hint says what to write. Where it can mean one thing only, it is read as that thing, so
-that nothing else is reported because of it.
+A foreign sign is an error whose hint says what to write. If it has only one possible meaning, it is read as that, so
+that it causes no further errors.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class Foreign(NamedTuple):
-    """A foreign sign: what to write instead, and the token (type and text) that it is read as; None: it is left out."""
+    """A foreign sign: what to write instead, and the token (type and text) that it is read as; None: it is skipped."""
 
     hint: str
     token: tuple[str, str] | None = None
@@ -74,16 +74,16 @@ SIGNS: dict[str, Foreign] = {
     **_hint(_QUOTES, "'", "`", "“", "”", "„", "’", "′", "‘"),
     **_hint(_ONE_STEP, "@", "□", "◇", "◊", "◯"),
 }
-"""Signs, by what they look like."""
+"""Foreign signs by their text."""
 
 
 def foreign(sign: str) -> Foreign:
-    """What is known of a sign that the lexer took for foreign."""
+    """The entry for a sign that the lexer classified as foreign."""
     return SIGNS.get(sign, SIGNS["\\"])
 
 
 def invisible(character: str) -> str | None:
-    """The name of a character that nobody sees, such as a no-break space; None for any other."""
+    """The name of an invisible character, such as a no-break space; None for any other."""
     if unicodedata.category(character) not in ("Cf", "Zs", "Zl", "Zp"):
         return None
     return f"U+{ord(character):04X} ({unicodedata.name(character, 'without a name').lower()})"
@@ -112,7 +112,7 @@ FOREIGN_NAMES = {
     **dict.fromkeys(("none", "null", "nullptr", "nil", "nan"), "every variable has a value of its type"),
     **dict.fromkeys(("inf", "infinity"), "a REAL is finite"),
 }
-"""Names that other languages give to values and functions, in small letters, with what to write."""
+"""Other languages' names of values and functions, in lower case, with the text to write instead."""
 
 OPERATORS = {
     **dict.fromkeys(("implies", "then"), "write `->`"),
@@ -134,7 +134,7 @@ OPERATORS = {
     **dict.fromkeys(("if", "when", "whenever"), "write `A -> B` for: if A then B, `A <=> B` for: A if and only if B"),
     "length": "write `length(s)`",
 }
-"""Words that stand where an operator should, in small letters, with what to write."""
+"""Words used in place of an operator, in lower case, with the text to write instead."""
 
 FOREIGN_TYPES = {
     **dict.fromkeys(("string", "str", "text"), "STRING"),
@@ -143,4 +143,4 @@ FOREIGN_TYPES = {
     **dict.fromkeys(("nat", "natural", "unsigned", "n", "uint", "uint8", "uint16", "uint32", "uint64"), "NATURAL"),
     **dict.fromkeys(("float", "double", "real", "number", "decimal", "r", "float32", "float64"), "REAL"),
 }
-"""Other languages' names of the built-in types, in small letters."""
+"""Other languages' names of the built-in types, in lower case."""

@@ -1,8 +1,8 @@
-"""``avow fmt``: the canonical layout of a file. Comments are kept, the meaning is unchanged, formatting twice changes
-nothing.
+"""``avow fmt``: the canonical layout of a file. Comments are kept, the meaning is unchanged, and formatting is
+idempotent.
 
-The layout is made from the surface syntax, so every parenthesis, number and name stays as it was written; `A` and `G`
-are spelled out, and a quantifier's `;` becomes `|`. A part with a comment inside it keeps its own lines, re-indented.
+The layout is derived from the surface syntax, so every parenthesis, number and name is kept as written; `A` and `G` are
+spelled out, and a quantifier's `;` becomes `|`. A part with a comment inside it keeps its lines, re-indented.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SHORT = {"A": "assume", "G": "guarantee"}
 
 
 def format_text(text: str, file: str) -> str:
-    """The text in the canonical layout. Raises `Rejected` where its syntax has errors (its types may have)."""
+    """The text in the canonical layout. Raises `Rejected` if its syntax has errors (type errors are allowed)."""
     before = _Read(text, file)
     after = _Layout(before.source, before.stream, before.comments, before.syntax).file()
     _must_say_the_same(before, after)
@@ -35,7 +35,7 @@ def format_text(text: str, file: str) -> str:
 
 
 class _Read:
-    """A file's text, tokens, comments and syntax. Raises `Rejected` where its syntax has errors."""
+    """A file's text, tokens, comments and syntax. Raises `Rejected` if its syntax has errors."""
 
     def __init__(self, text: str, file: str) -> None:
         source = clean_text(text, file)
@@ -51,7 +51,7 @@ class _Read:
             raise Rejected(*errors)
 
     def words(self) -> Iterator[tuple[str, Token]]:
-        """What the file says, whatever its layout: its tokens without doubled parentheses, and then its comments."""
+        """The file's content independent of layout: its tokens without doubled parentheses, then its comments."""
         for token, after in pairwise((*without_doubled(self.stream), Token("$END", "", 0, 0))):
             is_section = token.type == "NAME" and after.type in ("LPAR", "NAME", "STRING")
             word = _SHORT.get(token.text, token.text) if is_section else TEXTS.get(token.type, token.text)
@@ -61,7 +61,7 @@ class _Read:
 
 
 def _must_say_the_same(before: _Read, after: str) -> None:
-    """Raises `Rejected` where the text does not read back as what it was made from."""
+    """Raises `Rejected` if the text does not read back as its original."""
     try:
         again = [word for word, _ in _Read(after, before.source.file).words()]
     except Rejected:
@@ -94,7 +94,7 @@ class _Layout:
             self.formulas |= {c.formula.start: c.formula for c in node.clauses if c.formula is not None}
 
     def flat(self, start: int, end: int) -> str:
-        """What stands between two offsets, on one line."""
+        """The text between two offsets, on one line."""
         return flat(self.stream[bisect_left(self.starts, start) : bisect_left(self.starts, end)])
 
     def whole(self, tree: syntax.Syntax) -> str:
@@ -110,13 +110,13 @@ class _Layout:
             self.lines.append("")
 
     def blank_before(self, start: int) -> bool:
-        """Whether the text has an empty line before this place."""
+        """Whether the text has an empty line before this offset."""
         gap = self.text[:start]
         return gap[len(gap.rstrip(" \t\r\n\f")) :].count("\n") > 1
 
     def flush(self, until: int, indent: int, *, apart: bool = False) -> None:
-        """Write the comments before `until`; `apart`: an empty line before them, or where there are none, now."""
-        first, closed = True, False  # closed: the line ends with a `//` comment, and can take no further one
+        """Write the comments before `until`; `apart`: put an empty line before them, or here if there are none."""
+        first, closed = True, False  # closed: the line ends with a `//` comment, and takes no other one
         while self.next_comment < len(self.comments) and self.comments[self.next_comment].start < until:
             comment = self.comments[self.next_comment]
             self.next_comment += 1
@@ -136,7 +136,7 @@ class _Layout:
             self.blank()
 
     def relaid(self, text: str, indent: int, further: int) -> list[str]:
-        """The lines of a piece kept as it is: the first without indentation, the others moved to `indent + further`."""
+        """The lines of a piece kept as is: the first without indentation, the others moved to `indent + further`."""
         first, *rest = [line.rstrip() for line in text.split("\n")]
         rest = [line[: len(line) - len(line.lstrip())].expandtabs(4) + line.lstrip() for line in rest]
         least = min((len(line) - len(line.lstrip()) for line in rest if line), default=0)
@@ -172,7 +172,7 @@ class _Layout:
     def part(self, is_declaration: bool) -> None:
         first = self.at
         depth = 0
-        while True:  # to the end of the part: `;` for a declaration, else the closing parenthesis
+        while True:  # up to `;` for a declaration, else the closing parenthesis
             kind = self.kind()
             depth += (kind in ("LPAR", "LBRACE")) - (kind in ("RPAR", "RBRACE"))
             self.at += 1
@@ -277,11 +277,11 @@ class _Layout:
                 lines = _enclosed("if ", self.laid(condition, indent + 3, width), "")
                 lines += _enclosed(f"{pad}then ", self.laid(then, indent + 5, width), "")
                 return [*lines, *_enclosed(f"{pad}else ", self.laid(otherwise, indent + 5, width), "")]
-            case _:  # a term or type, which stays on its line
+            case _:  # a term or type, which is kept on one line
                 return [line]
 
     def broken_set(self, tree: syntax.Syntax, indent: int, width: int) -> list[str] | None:
-        """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
+        """A long set over several lines, as many elements on each as fit; None if it is short or not a set."""
         if not isinstance(tree, syntax.SetType | syntax.SetDisplay) or indent + len(self.whole(tree)) <= width:
             return None
         lines = ["{"]

@@ -1,4 +1,4 @@
-"""Text to tokens. The token types are the terminals of grammar.lark; what is no token is reported and left out.
+"""Text to tokens. The token types are the terminals of grammar.lark; text that is not a token is reported and skipped.
 
 One regular expression, one pass, linear in the text. Lark's own lexers are not used: they stop at the first error.
 """
@@ -36,13 +36,13 @@ KEYWORDS = {
     **dict.fromkeys(("REAL", "INTEGER", "NATURAL", "BOOL", "STRING"), "BUILTIN"),
 }
 LIMITED = frozenset(("once", "historically", "held", "within", "for"))
-"""Words that are operators directly before a limit, ``once[5 steps](…)``; `since` has one too."""
+"""Names that are operators directly before a limit, ``once[5 steps](…)``; `since` takes a limit too."""
 UNITS = {"ns": 9, "us": 6, "ms": 3, "s": 0}
 """Units of time by the decimal places of a second; minutes and hours are whole seconds."""
 LONG_UNITS = {"min": 60, "h": 3600}
 STEPS = ("steps", "step")
 _UNITS = frozenset((*UNITS, *LONG_UNITS, *STEPS))
-"""Words that are units directly behind a number."""
+"""Names that are units directly after a number."""
 SYMBOLS = {
     "-->": "ARROW",
     "<=>": "IFF",
@@ -97,11 +97,11 @@ _RECORD = re.compile(r"\s*[A-Za-z_][A-Za-z0-9_']*\s*(?:,\s*[A-Za-z_][A-Za-z0-9_'
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 _PLAIN = {"ne": "NE", "not_in": "NOT_IN", "empty": "EMPTY_SEQUENCE", "string": "STRING"}
-"""Groups of the pattern that are a token as they stand."""
+"""Groups of the pattern that are tokens without further processing."""
 
 
 def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]:
-    """All tokens of the text, and (into `comments`, where given) its comments. Reports what is no token."""
+    """All tokens of the text; appends its comments to `comments`, if given. Reports text that is not a token."""
     text = reports.source.text
     found: list[Token] = []
     append = found.append
@@ -163,16 +163,16 @@ _BRACKET = (
 
 
 class _Other:
-    """Reports what is no token of RCL once, and reads it as what it must mean, or leaves it out."""
+    """Reports each piece that is not an RCL token once, and replaces it by the token it must mean, or skips it."""
 
     def __init__(self, reports: Reports, found: list[Token]) -> None:
         self.reports = reports
         self.found = found
         self.square = 0
-        """How many square brackets of limits and records are open."""
+        """The number of open square brackets of limits and records."""
 
     def read(self, kind: str, piece: str, start: int, end: int) -> int:
-        """Reads one piece of the text; the offset where reading goes on."""
+        """Reads one piece of the text; returns the offset at which to continue."""
         reports = self.reports
         if kind in ("foreign", "unique"):
             return self.sign(piece, start, end)
@@ -215,14 +215,14 @@ class _Other:
             return private.end()
         hint, token = foreign(piece)
         reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
-        if token is None or piece == "::":  # which may stand for several things
+        if token is None or piece == "::":  # a sign with several possible meanings
             reports.torn.append(start)
         if token is not None:
             self.stand_in(token, start, end)
         return end
 
     def among_topics(self) -> bool:
-        """Whether the latest section that has begun is a list of topics."""
+        """Whether the current section is a list of topics."""
         return next((t.type for t in reversed(self.found) if t.type in _SECTIONS), "") == "TOPICS"
 
     def bracket(self, piece: str, start: int, end: int) -> None:
@@ -236,12 +236,12 @@ class _Other:
         elif piece == "]" and self.square:
             self.square -= 1
             self.found.append(Token("RSQUARE", piece, start, end))
-        elif piece == "[" or not self.reports.torn:  # the partner of one that was reported is not
+        elif piece == "[" or not self.reports.torn:  # the partner of a reported one is not reported
             self.reports.error("RCL101", f"`{piece}` is not RCL", start, end, hint=_BRACKET)
             self.reports.torn.append(start)
 
     def section(self, word: str, kind: str, start: int, end: int) -> str:
-        """The token type of a keyword that begins a clause or section, or that someone took for a name."""
+        """The token type of a keyword that begins a clause or section, or that is used as a name."""
         reports = self.reports
         before = self.found[-1] if self.found else Token("", "", -1, -1)
         if before.type == "SLASH" and before.end == start and self.among_topics():
@@ -256,7 +256,7 @@ class _Other:
         return kind
 
     def junk(self, start: int, end: int) -> int:
-        """Characters that have no place, up to the next that has one."""
+        """Reports characters that RCL does not use, up to the next one that it does."""
         text = self.reports.source.text
         self.reports.torn.append(start)
         while end < len(text) and (match := _PATTERN.match(text, end)) and match.lastgroup == "junk":
@@ -301,7 +301,7 @@ def unquote(text: str) -> str:
 
 
 def quote(value: str) -> str:
-    """A string token of that value."""
+    """The text of a string token with that value."""
     escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\t", "\\t")
     return f'"{escaped}"'
 

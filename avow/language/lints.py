@@ -1,7 +1,8 @@
-"""Warnings: what is allowed and probably not meant. Each has a code (RCL4xx) and can be switched off.
+"""Warnings: text that is legal and probably a mistake. Each has a code (RCL4xx) and can be switched off.
 
 A plan's `lints_off` switches one off for a system. So does a comment ``// avow: allow RCL401``: after code, for its
-line; on a line of its own, for the declaration, node or part of a node that follows; at the head of a file, for all.
+line; on a line of its own, for the declaration, node or part of a node that follows; at the head of a file, for the
+whole file.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _CODE = re.compile(r"[A-Za-z]+[0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class LintedFile:
-    """A file as the lints want it: its syntax, its comments, and where to report."""
+    """The lints' input for a file: its syntax, its comments, and its reports."""
 
     syntax: FileSyntax
     comments: tuple[Token, ...]
@@ -41,8 +42,8 @@ class LintedFile:
 
 
 def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract | None, off: frozenset[str]) -> None:
-    """Report every warning about the files, about the nodes that are sound, and (where all of it is) about the contract
-    that the files declare."""
+    """Report every warning about the files, about their sound nodes, and about the contract that the files declare if
+    all of it is sound."""
     found: list[Diagnostic] = []
     trees = [(file, tree) for file in files for tree in file.syntax.nodes]
     for file, tree in trees:
@@ -57,14 +58,14 @@ def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract 
 
 
 def of_node(file: LintedFile, tree: NodeSyntax, node: Node) -> Iterator[Diagnostic]:
-    """What hangs on the text of one node and on nothing else but what it names."""
+    """The warnings that depend only on the text of one node and the declarations that it names."""
     yield from _about_text(file, tree)
     yield from _about_node(node)
     yield from _in_vain(file, tree.definitions, spoken(tree))
 
 
 def of_all(contract: Contract, files: Sequence[LintedFile], of_nodes: Iterable[frozenset[str]]) -> Iterator[Diagnostic]:
-    """What hangs on all nodes together. `of_nodes`: the names that each of them speaks of."""
+    """The warnings that depend on all nodes together. `of_nodes`: the names that each of them mentions."""
     yield from _spellings(contract)
     contexts = [(file, [d for d in file.syntax.declarations if isinstance(d, Define)]) for file in files]
     if any(trees for _, trees in contexts):
@@ -75,7 +76,7 @@ def of_all(contract: Contract, files: Sequence[LintedFile], of_nodes: Iterable[f
 
 
 def tell(found: Iterable[Diagnostic], files: Sequence[LintedFile], off: frozenset[str]) -> None:
-    """Report what is not switched off, by its code or its whole message, and what the files' comments do not allow."""
+    """Report the warnings neither switched off, by code or whole message, nor allowed by the files' comments."""
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
     for diagnostic in (*found, *(unknown for file in files for unknown in _no_lints(file))):
@@ -101,12 +102,12 @@ def _warning(
 
 
 def allows(comment: Token) -> bool:
-    """Whether it is a comment that allows something."""
+    """Whether the comment allows a lint."""
     return _ALLOW.search(comment.text) is not None
 
 
 def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
-    """The codes that comments allow, each with the first and last line for which they do."""
+    """The codes that comments allow, each with the first and last line to which they apply."""
     source = file.reports.source
     found = []
     for comment in file.comments:
@@ -130,7 +131,7 @@ def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
 
 
 def _no_lints(file: LintedFile) -> Iterator[Diagnostic]:
-    """What the comments allow and is no lint."""
+    """Warnings about allowed codes that are not a lint's."""
     for comment in file.comments:
         match = _ALLOW.search(comment.text)
         for code in sorted(set(_CODE.findall(match.group(1)))) if match is not None else ():
@@ -170,7 +171,7 @@ def _about_text(file: LintedFile, node: NodeSyntax) -> Iterator[Diagnostic]:
 
 
 def _in_vain(file: LintedFile, trees: Iterable[Define], named: Collection[str]) -> Iterator[Diagnostic]:
-    """Definitions that nothing speaks of (`named`: what is spoken of), and parameters."""
+    """Unused definitions (`named`: the names in use), and unused parameters."""
     span = file.reports.source.span
     for tree in trees:
         name = tree.name.text
@@ -184,7 +185,7 @@ def _in_vain(file: LintedFile, trees: Iterable[Define], named: Collection[str]) 
 
 
 def spoken(node: NodeSyntax) -> frozenset[str]:
-    """The names that a node's definitions and clauses speak of."""
+    """The names that a node's definitions and clauses mention."""
     bodies = [*(d.body for d in node.definitions), *(c.formula for c in node.clauses if c.formula is not None)]
     return frozenset(name for body in bodies for name in _spoken(body))
 
@@ -260,12 +261,12 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
 
 
 def uncarried(node: str, port: str) -> str:
-    """What RCL405 says of a variable."""
+    """The message of RCL405 for a variable."""
     return f"no topic of `{node}` carries `{port}`"
 
 
 def _looked_up(node: Node) -> Iterator[Diagnostic]:
-    """Each total function that the node looks up by its value, once."""
+    """A warning for each total function that the node looks up by its value."""
     found = {look.function: look for clause in reversed(node.clauses) for look in lookups(clause.formula)}
     for port in (*node.inputs, *node.outputs):
         look = found.get(port.variable)
@@ -292,7 +293,7 @@ def _variables(term: t.Term, *roles: t.Role) -> set[tuple[t.Role, str]]:
 
 
 def _now(term: t.Term) -> t.Term:
-    """The term without the values before: what it says of this step."""
+    """The term without previous values: what it states about this step."""
     if isinstance(term, t.History) and term.operator is t.Past.PREVIOUS:
         return _now(term.arguments[1])
     parts = tuple(map(_now, term.children))
@@ -307,14 +308,14 @@ def _unused(term: t.Term) -> Iterator[t.Variable]:
 
 
 def _calculated(term: t.Term) -> Iterator[t.Term]:
-    """The positions of elements that are calculated from quantified ones."""
+    """The element positions that are computed from quantified variables."""
     for part in subterms(term):
         if isinstance(part, t.Index) and isinstance(part.index, t.Arithmetic) and _variables(part.index, t.Role.BOUND):
             yield part.index
 
 
 def _always(term: t.Term) -> bool:
-    """Whether the sorts alone make the formula true; False where that is not plain."""
+    """Whether the sorts alone make the formula true; False if that is not obvious."""
     match term:
         case t.Literal(value=True):
             return True
@@ -343,7 +344,7 @@ def _always(term: t.Term) -> bool:
 
 
 def _spellings(contract: Contract) -> Iterator[Diagnostic]:
-    """Names of one kind that look like one name, unless one node uses both: then they are different things."""
+    """Names of one kind that are probably one name, unless one node uses both: then they are distinct."""
     places: dict[str, dict[str, Span | None]] = {what: {} for what in ("package", "message type", "topic", "variable")}
     together: set[tuple[str, str]] = set()
     for node in contract.nodes:
@@ -369,11 +370,11 @@ _DIGITS = re.compile(r"[0-9]+|'+$")
 
 
 def similar(names: Sequence[str]) -> list[tuple[str, str]]:
-    """The pairs (earlier, later) of names that look like two spellings of one.
+    """The pairs (earlier, later) of names that are probably two spellings of one.
 
     Names of five letters and more that differ by one letter, of nine and more also by two, or only in capitals and
-    underscores. Names that differ only in numbers or primes (``arm1``, ``arm2``; ``x``, ``x'``) are meant to differ.
-    Time grows linearly with the number of names: candidates share what is left of them without one or two letters.
+    underscores. Names that differ only in numbers or primes (``arm1``, ``arm2``; ``x``, ``x'``) are taken as distinct.
+    Time is linear in the number of names: candidates share a form with one or two letters deleted.
     """
     buckets: dict[str, list[int]] = {}
     found: dict[tuple[int, int], None] = {}
@@ -401,7 +402,7 @@ def _one_thing(one: str, other: str) -> bool:
 
 
 def _deletions(name: str) -> set[str]:
-    """The name, and what is left of it without one letter (without two, for long names)."""
+    """The name, and its forms with one letter deleted (also two, for long names)."""
     if len(name) < 5:
         return {name}
     once = {name[:i] + name[i + 1 :] for i in range(len(name))}

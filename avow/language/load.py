@@ -1,6 +1,6 @@
 """RCL files and texts to a checked contract; formulas of other files (plans) to typed terms.
 
-Every function reports all that is wrong at once. Nothing here raises anything but `Rejected`.
+Every function reports all errors at once, and raises only `Rejected`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ NOTHING = Contract((), (), (), ())
 
 
 def load_contract(paths: Sequence[Path], shelf: Shelf | None = None) -> Contract:
-    """The contract that the files declare together. Raises `Rejected` with every error of every file. `shelf`: where it
-    is kept what their nodes say."""
+    """The contract that the files declare together. Raises `Rejected` with every error of every file. `shelf`: the
+    cache of their checked nodes."""
     contract, diagnostics = check_paths(paths, shelf=shelf)
     errors = tuple(d for d in diagnostics if d.is_error)
     if contract is None or errors:
@@ -44,9 +44,9 @@ def load_contract(paths: Sequence[Path], shelf: Shelf | None = None) -> Contract
 def check_paths(
     paths: Iterable[Path], *, off: frozenset[str] = frozenset(), shelf: Shelf | None = None
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
-    """The contract of the files, or None, and everything there is to say about them, lints included.
+    """The contract of the files, or None, and all diagnostics about them, lints included.
 
-    `off`: codes of lints not to report. A file that cannot be read is reported too. `shelf`: as `load_contract` has it.
+    `off`: codes of lints not to report. A file that cannot be read is reported too. `shelf`: as for `load_contract`.
     """
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
@@ -61,20 +61,20 @@ def check_paths(
 
 
 def read_in_part(paths: Iterable[Path]) -> Contract:
-    """As much of a contract as can be read, whatever is wrong in it: to look names up, never to verify."""
+    """As much of a contract as can be read despite its errors: for looking names up, never for verification."""
     found = [source for path in paths if isinstance(source := read_source(path), Source)]
     return _checked(found, frozenset(), True)[0]
 
 
 def syntax_faults(text: str, span: Span | None) -> tuple[Diagnostic, ...]:
-    """Why a text is no formula, whatever its names mean; empty where it may be one."""
+    """The syntax errors of a formula; empty if the text can be a formula for some meaning of its names."""
     return tuple(in_order(syntax_of(text, span)[1]))
 
 
 def check_text(
     text: str, file: str, *, off: frozenset[str] = frozenset()
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
-    """The contract that a text declares, or None where it has errors; and all errors and lints."""
+    """The contract that a text declares, or None if it has errors; and all errors and lints."""
     found = clean_text(text, file)
     if isinstance(found, Diagnostic):
         return None, (found,)
@@ -82,7 +82,7 @@ def check_text(
 
 
 def read_source(path: Path) -> Source | Diagnostic:
-    """A file's text, or why it is none."""
+    """A file's text, or the error why it cannot be read."""
     file = str(path)
     start = Span(file, 1, 1, 1, 1)
     try:
@@ -98,7 +98,7 @@ def read_source(path: Path) -> Source | Diagnostic:
 
 
 def decode(data: bytes, file: str) -> Source | Diagnostic:
-    """The text that a file's (or a pipe's) bytes are, or why they are none."""
+    """The text of a file's (or a pipe's) bytes, or the error why they are not a text."""
     start = Span(file, 1, 1, 1, 1)
     if len(data) > CONTRACT_BYTES:
         return Diagnostic("RCL003", f"the file is larger than {CONTRACT_BYTES // 1_000_000} MB", start)
@@ -116,7 +116,8 @@ def decode(data: bytes, file: str) -> Source | Diagnostic:
 
 
 def clean_text(text: str, file: str) -> Source | Diagnostic:
-    """A text as the lexer wants it: without byte order mark, with plain line ends; or why it is none."""
+    """A text prepared for the lexer, without byte order mark and with plain line ends; or the error why it is not a
+    text."""
     if len(text) > CONTRACT_BYTES:
         return Diagnostic("RCL003", f"the text is larger than {CONTRACT_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -135,14 +136,14 @@ def check_sources(
     partial: bool = False,
     shelf: Shelf | None = None,
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
-    """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
+    """As `check_paths`, for texts already read. `partial`: other files are missing, so names may be declared there."""
     contract, diagnostics = _checked(sources, off, partial, shelf)
     return (None if any(d.is_error for d in diagnostics) else contract), diagnostics
 
 
 def warnings_of(texts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
-    """As `check_sources` of (file, text) pairs, warnings only, for what a report quotes. Where the same texts were
-    checked already under other names, the places in the contract have those."""
+    """As `check_sources` for (file, text) pairs, warnings only, for the texts that a report quotes. If the same texts
+    were already checked under other file names, the spans in the contract have those names."""
     given = tuple(text for _, text in texts)
     known = _under.get(given, tuple(file for file, _ in texts))
     contract, found = check_sources([Source(file, text) for file, text in zip(known, given, strict=True)])
@@ -158,11 +159,11 @@ def warnings_of(texts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tu
 
 
 _under: dict[tuple[str, ...], tuple[str, ...]] = {}
-"""Texts checked lately → the names that they had, each its own."""
+"""Recently checked texts → their file names, all distinct."""
 
 
 _lately: dict[tuple[object, ...], tuple[Contract, tuple[Diagnostic, ...]]] = {}
-"""What was checked lately: a run loads a contract, and then asks what there is to say of it."""
+"""Recent results: a run loads a contract, and then requests its diagnostics."""
 
 
 def _checked(
@@ -215,13 +216,13 @@ def _whole(sources: Sequence[Source], off: frozenset[str], partial: bool) -> tup
 def check_in_part(
     sources: Sequence[Source], *, off: frozenset[str] = frozenset()
 ) -> tuple[Contract, tuple[Diagnostic, ...]]:
-    """As `check_sources`, with as much of the contract as can be read where something is wrong: to help its author,
-    never to verify."""
+    """As `check_sources`, with as much of the contract as can be read if there are errors: to help its author, never
+    for verification."""
     return _checked(sources, off, False)
 
 
 def sound_nodes(contract: Contract, files: Sequence[FileSyntax]) -> tuple[Node, ...]:
-    """The nodes of a contract of which nothing is missing for an error in it."""
+    """The nodes of a contract that are complete: no part is missing because of an error."""
     written = {node.name.text: node for syntax in files for node in syntax.nodes}
     return tuple(node for node in contract.nodes if node.name in written and _is_whole(node, written[node.name]))
 
@@ -236,8 +237,8 @@ def _is_whole(node: Node, written: NodeSyntax) -> bool:
 
 
 def unless_torn(reports: Reports) -> Reports:
-    """Where to report syntax errors: nowhere if a comment swallows the rest of the file, since what is missing then
-    says nothing."""
+    """The reports for syntax errors: discarded if a comment swallows the rest of the file, since missing parts then
+    mean nothing."""
     return Reports(reports.source) if any(d.code == "RCL103" for d in reports.found) else reports
 
 
@@ -281,11 +282,11 @@ def parse_formula(
     """A formula given as text (in a plan, say) as a term of sort BOOL.
 
     With `node`, names mean what they mean in that node: ``in.v``, ``out.v``, or bare. Without, ports are written
-    ``agent.command`` (``agent.in.phase`` or ``agent.out.phase`` where the node has both) and become
+    ``agent.command`` (``agent.in.phase`` or ``agent.out.phase`` if the node has both) and become
     ``Variable(role, "agent.command", sort)``. `extra` are further names, which become bound variables. `roles` are the
-    roles that ports may have; a bare name then means the port of that role. With `remembers` it may speak of
-    other steps; as a `clause`, it may be a response as well. `span` is where the text stands. Raises `Rejected`, with
-    every error.
+    roles that ports may have; a bare name then means the port of that role. With `remembers` it may refer to other
+    steps; as a `clause`, it may be a response as well. `span` is the place of the text. Raises `Rejected` with every
+    error.
     """
     tree, reports = syntax_of(text, span)
     checker = _checker(reports, node, contract, extra, roles, remembers=remembers or clause)
@@ -301,7 +302,7 @@ def parse_term(
     *,
     sort: Sort | None = None,
 ) -> Term:
-    """As `parse_formula`, of a term of any sort (``move(0, 1)``, ``red``); with `sort`, converted to that."""
+    """As `parse_formula`, for a term of any sort (``move(0, 1)``, ``red``); with `sort`, converted to that."""
     tree, reports = syntax_of(text, span)
     checker = _checker(reports, node, contract)
     if tree is None or sort is None:
@@ -318,8 +319,7 @@ def _sound(term: Term | None, reports: Reports) -> Term:
 def syntax_of(
     text: str, span: Span | None, marked: Callable[[list[Token]], list[Token]] = list
 ) -> tuple[TermSyntax | None, Reports]:
-    """The tree of a formula, None where it has none, and what there is to say of it. `marked` may say what else its
-    words are."""
+    """The tree of a formula, or None if it has syntax errors, and its reports. `marked` may change the token types."""
     source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
     reports = Reports(source)
     found = marked(tokens(reports))
@@ -329,7 +329,8 @@ def syntax_of(
 
 
 def one_step(tree: TermSyntax, reports: Reports, contract: Contract) -> Term | None:
-    """A part of a formula's tree, as `parse_formula` without a node; None where `reports` says why."""
+    """A part of a formula's tree as a term, as by `parse_formula` without a node; None if it has errors, which are in
+    `reports`."""
     return _checker(reports, None, contract).formula(tree)
 
 

@@ -1,9 +1,9 @@
 """Total functions that a contract looks up by their value, as if some arguments had none.
 
 RCL's functions are total: ``REAL x REAL --> NATURAL`` gives every place a number. A
-formula such as ``not exists(x, y in REAL | in.number(x, y) == i + 1)`` uses it the other way round, as a numbering of
-some places. It then means less than it seems to: "this place has no number" cannot be said, and no place need be the
-only one with its number. A relation (``REAL x REAL x NATURAL --> BOOL``) can say both.
+formula such as ``not exists(x, y in REAL | in.number(x, y) == i + 1)`` uses it in reverse, as a numbering of some
+places. It then means less than it seems to: it cannot express "this place has no number", and several places may have
+the same number. A relation (``REAL x REAL x NATURAL --> BOOL``) can express both.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from avow.language.subterms import subterms
 from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable
 
 _NAMES = (NaturalSort, IntegerSort, StringSort, OpaqueSort)
-"""Sorts of which values are names of things; a REAL is a measure, an element of an enumeration a state."""
+"""Sorts whose values can name things; a REAL is a measure, an element of an enumeration a state."""
 _ENDLESS = (RealSort, *_NAMES)
 
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """``exists(x, y in REAL | in.number(x, y) == i + 1)``: `place` asks which arguments of `function` have a value."""
+    """``exists(x, y in REAL | in.number(x, y) == i + 1)``: `place` tests which arguments of `function` have a value."""
 
     function: Variable
     place: Quantified
 
 
 def lookups(formula: Term) -> Iterator[Lookup]:
-    """Every place in the formula that asks which arguments of an input or output, a total function from infinitely many
-    arguments to names of things, have a given value."""
+    """Every place in the formula that tests which arguments of an input or output have a given value, where that is a
+    total function from infinitely many arguments to names of things."""
     for part in subterms(formula):
         if isinstance(part, Quantified):
             function = _asked(part)
@@ -39,8 +39,8 @@ def lookups(formula: Term) -> Iterator[Lookup]:
 
 
 def _asked(quantified: Quantified) -> Variable | None:
-    """The function of which the quantified formula asks which arguments have a value: nothing else in it speaks of
-    them (a formula that does bounds them, and may know what it does)."""
+    """The function for which the quantified formula tests which arguments have a value; None if another part of it
+    mentions the arguments (it then bounds them, probably on purpose)."""
     bound = set(quantified.variables)
     speaking = [part for part in _operands(quantified.body) if bound & _variables(part)]
     if len(speaking) != 1:
@@ -77,8 +77,8 @@ def _operands(body: Term) -> Iterator[Term]:
 
 
 def _names_things(function: Variable, value: Term) -> bool:
-    """Whether the function gives names to infinitely many things. One that is asked for constants only (``count(t) ==
-    0`` at some step t) may be a history: unless its arguments are a continuum, that is no sign."""
+    """Whether the function gives names to infinitely many things. A function compared only with constants (``count(t)
+    == 0`` at some step t) may be a history: it counts only if its arguments are a continuum."""
     sort = function.sort
     if not isinstance(sort, FunctionSort) or not isinstance(sort.result, _NAMES):
         return False

@@ -61,7 +61,7 @@ def check_node(
     declarations: Declarations,
     reports: Reports,
 ) -> Node:
-    """The node, with those of its clauses that are sound; what is not is reported."""
+    """The node with its sound clauses; errors in the others are reported."""
     broken = set(node.broken)
     scope = Scope(declarations.environment, inputs, outputs, broken=broken, node=node.name.text, remembers=True)
     topics = tuple(_topics(node, scope, reports))
@@ -89,7 +89,7 @@ def check_node(
 
 
 def _definitions(node: NodeSyntax, scope: Scope, declarations: Declarations, reports: Reports) -> Mapping[str, Defined]:
-    """What the node's clauses may call by name: of the context, checked where it is used, and its own."""
+    """The definitions that the node's clauses may use: those of the context, checked on use, and its own."""
     found = {
         name: entry if entry.found is not None or entry.state == "done" else replace(entry, state="new")
         for name, entry in declarations.definitions.items()
@@ -141,8 +141,8 @@ def _clause(
 
 
 def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:
-    """Whether the formula with its constants written out can still be worked with. Without constants it is as large and
-    as deep as it is written, which the parser has seen to."""
+    """Whether the formula with its constants expanded is within the limits of size; reports it if not. Without
+    constants its size and depth are those of the text, which the parser has checked."""
     if not scope.environment.constants and not scope.defined:
         return True
     size, depth = term_extent(formula)
@@ -156,8 +156,8 @@ def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bo
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:
-    """The topics. One topic may stand in the list several times, with a variable each time: its messages carry them
-    all, each in fields of its own."""
+    """The topics. A topic may be listed several times, each time with a variable: its messages carry them all, each in
+    its own fields."""
     seen: dict[str, list[Topic]] = {}
     for tree in node.topics.items if node.topics is not None else ():
         name = tree.name
@@ -178,7 +178,7 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
 
 
 def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Reports) -> bool:
-    """Whether a topic may be listed again like this; reports it if not."""
+    """Whether a topic may be listed in addition to the earlier entries; reports it if not."""
     other = next((t for t in earlier if _same_type(t) != _same_type(topic) or t.port in (None, topic.port)), None)
     other = other or (earlier[0] if earlier and topic.port is None else None)
     if other is None:
@@ -193,7 +193,7 @@ def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Rep
 
 
 def _same_type(topic: Topic) -> tuple[str, ...]:
-    """A topic's type as it is in ROS 1 and 2 alike: ``package/msg/Type`` is ``package/Type``."""
+    """A topic's type in a form common to ROS 1 and 2: ``package/msg/Type`` is ``package/Type``."""
     parts = topic.ros_type.split("/")
     return (parts[0], parts[-1], *(p for p in parts[1:-1] if p != "msg"))
 

@@ -1,6 +1,6 @@
 """The names that terms are made with: roles of variables, quantifiers, operators of one step and over steps.
 
-`avow.language.terms` offers them as well, beside the nodes that they name.
+`avow.language.terms` re-exports them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """Where a variable's value comes from."""
+    """The source of a variable's value."""
 
     INPUT = "in"
     OUTPUT = "out"
@@ -24,7 +24,7 @@ class Quantifier(StrEnum):
 
 
 class Builtin(StrEnum):
-    """An operator that is written like a function: ``xor(p, q)``. `avow.language.operators` has what each means."""
+    """An operator that is written like a function: ``xor(p, q)``. `avow.language.operators` defines their meanings."""
 
     XOR = "xor"
     ABS = "abs"
@@ -35,7 +35,7 @@ class Builtin(StrEnum):
 
 
 class Past(StrEnum):
-    """An operator that speaks of more than one step of a run. `avow.formulas.temporal` has what each means."""
+    """An operator that refers to more than one step of a run. `avow.formulas.temporal` defines their meanings."""
 
     PREVIOUS = "previous"
     ROSE = "rose"
@@ -53,8 +53,8 @@ class Past(StrEnum):
     EVENTUALLY = "eventually"
     ARRIVED = "arrived"
     STEPS = "steps"
-    """A node's pace, as a clause of its own: ``steps(at most 100 ms)``; its limit says how far apart steps are."""
+    """A node's pace, as a clause by itself: ``steps(at most 100 ms)``; its limit is the time between steps."""
 
 
 RESPONSES = frozenset((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL, Past.EVENTUALLY))
-"""They speak of later steps, and stand only as the right side of a clause's outermost `->`, or as the clause."""
+"""Operators that refer to later steps; allowed only as a clause, or as the right side of its outermost `->`."""

@@ -1,9 +1,9 @@
-"""The table of operators: how each is written, how tightly it binds, what it takes and yields, what it means.
+"""The table of operators: the notation, precedence, typing and meaning of each.
 
 Every pass reads its column here: printers, the checker, evaluation, the translation to Z3 (whose printing is our
-SMT-LIB), Dafny, RML, and programs proved by Hoare triples. An entry has every column or a `Why`; one that is forgotten
-is an error at import. What is no operator but structure (quantifiers, application, membership, tuples, sequences) is
-told apart by a `match` with `assert_never` in each pass.
+SMT-LIB), Dafny, RML, and programs proved by Hoare triples. An entry has every column or a `Why`; a missing one is an
+error at import. Forms that are structure and not operators (quantifiers, application, membership, tuples, sequences)
+are handled by a `match` with `assert_never` in each pass.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetS
 from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term
 
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
-"""The comparison that holds where one does not."""
+"""The comparison that holds if and only if the given one does not."""
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 """A comparison of order with its sides exchanged."""
 
 
 class Level(IntEnum):
-    """How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands."""
+    """How tightly a form binds; a part is put in parentheses if it binds less tightly than its place demands."""
 
     LOOSEST = -1
     IFF = 0
@@ -47,7 +47,7 @@ class Level(IntEnum):
 
 
 class Typing(StrEnum):
-    """What an operator takes and yields, as people are told."""
+    """The argument and result types of an operator, as shown to people."""
 
     FORMULA = "formula → formula"
     FORMULAS = "formulas → formula"
@@ -61,50 +61,50 @@ class Typing(StrEnum):
 
     @property
     def takes_formulas(self) -> bool:
-        """Whether all that it is of are formulas."""
+        """Whether all arguments are formulas."""
         return self in (Typing.FORMULA, Typing.FORMULAS)
 
 
 @dataclass(frozen=True, slots=True)
 class Why:
-    """In the place of an entry: the reason why there is none. A backend refuses the operator by name with it."""
+    """In place of an entry: the reason why there is none. A backend refuses the operator by name, with this reason."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """One operator. Signs between operands carry their spaces; of what is written like a function there is the name."""
+    """One operator. Infix signs include their spaces; an operator written like a function is given by its name."""
 
     name: str
-    """As RCL writes it; in a table of operators, its key."""
+    """The RCL notation; the key in a table of operators."""
     level: Level
     typing: Typing
     text: str
     unicode: str
     latex: str
     evaluate: Callable[..., Any] | Why
-    """Of values (`avow.formulas.values`) to a value."""
+    """A function from values (`avow.formulas.values`) to a value."""
     z3: Callable[..., Any] | Why
-    """Of the module z3 and expressions to an expression; numbers are Python's (`z.If(a < 0, -a, a)`), as one that z3
-    makes by itself is of another context."""
+    """A function from the module z3 and expressions to an expression; numbers are Python's (`z.If(a < 0, -a, a)`),
+    because z3 creates its own numbers in another context."""
     smtlib: str
     """The head of its form in the scripts that Z3 prints."""
     dafny: str
-    """The sign between its operands, or the function of the generated module that it is a call of."""
+    """The infix sign, or the function of the generated module that it calls."""
     rml: str | Why
-    """The sign in an RML condition; or `lifted`: conditions tell the cases apart."""
+    """The sign in an RML condition; or `lifted`: conditions distinguish the cases."""
     program: str | Why
-    """How a program to be proved by Hoare triples writes it."""
+    """The notation in programs proved by Hoare triples."""
     definition: Callable[[Operation], Term] | Why
-    """The same said with forms of the terms: what has no such operator, and every pass that takes formulas apart, uses
-    it."""
+    """An equivalent in forms of the terms, for targets without the operator and for every pass that decomposes
+    formulas."""
     takes: tuple[int, int | None] | Why
-    """How many arguments, at least and at most, where it is written like a function."""
+    """The least and greatest number of arguments, if it is written like a function."""
 
     @property
     def rcl(self) -> str:
-        """How RCL writes it between or before its operands."""
+        """The RCL notation between or before its operands."""
         return self.text.replace(self.text.strip(), self.name) if self.level is not Level.ATOM else self.name
 
 
@@ -167,7 +167,8 @@ def _without_sign(term: Operation) -> Term:
 
 
 def _better(sign: str) -> Callable[[Operation], Term]:
-    """Of two numbers the second where it stands so to the first, and the same among those that are left."""
+    """The choice between two numbers by a comparison (the second if it compares so to the first), repeated over the
+    rest."""
 
     def choice(term: Operation) -> Term:
         one, other, *rest = term.arguments
@@ -219,13 +220,13 @@ _ROWS = (
     Operator("if", Level.LOOSEST, Typing.BRANCHES, "if ", "if ", r"\mathbf{if}\ ",
              _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
-# Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor.
+# Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor division.
 
 OPERATORS: Mapping[str, Operator] = {row.name: row for row in _ROWS}
 
 
 def _complete() -> None:
-    """Raises where an operator of the terms has no row, or a row an empty column."""
+    """Raises TypeError if an operator of the terms has no row, or a row an empty column."""
     missing = [name for name in Builtin if name not in OPERATORS]
     empty = [f"{row.name}: {f.name}" for row in _ROWS for f in fields(row) if getattr(row, f.name) in ("", None)]
     twice = len(OPERATORS) != len(_ROWS)
@@ -239,13 +240,13 @@ _complete()
 
 
 def definition(term: Operation) -> Term | None:
-    """The operation said with other forms, one step; None where it is no choice or connective but arithmetic."""
+    """The operation expressed by other forms, one level; None if it is arithmetic and not a choice or connective."""
     column = OPERATORS[term.operator].definition
     return None if isinstance(column, Why) else column(term)
 
 
 def implementation(column: Callable[..., Any] | Why) -> Callable[..., Any]:
-    """The function of a column of an operator that has one."""
+    """The function in a column, which must have one."""
     assert not isinstance(column, Why), column.reason
     return column
 
@@ -255,7 +256,7 @@ def implementation(column: Callable[..., Any] | Why) -> Callable[..., Any]:
 
 @dataclass(frozen=True, slots=True)
 class Mistyped:
-    """Why arguments do not fit: a code, a message, and which argument it is about (None: how many there are)."""
+    """The reason why arguments do not fit: a code, a message, and the position of the argument (None: wrong number)."""
 
     code: str
     message: str
@@ -264,7 +265,7 @@ class Mistyped:
 
 
 def _wrong_count(name: Builtin, given: int) -> Mistyped | None:
-    """That an operator has too few or too many arguments."""
+    """The error for too few or too many arguments, if any."""
     counts = OPERATORS[name].takes
     assert not isinstance(counts, Why), counts.reason
     least, most = counts
@@ -275,7 +276,7 @@ def _wrong_count(name: Builtin, given: int) -> Mistyped | None:
 
 
 def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Term | Mistyped:
-    """The operator applied to arguments, which are widened where they have to be; or why that means nothing."""
+    """The operator applied to arguments, which are widened if necessary; or the type error."""
     counted = _wrong_count(name, len(arguments))
     if counted is not None:
         return counted
@@ -314,8 +315,8 @@ def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Te
 
 
 def conditional(condition: Term, then: Term, otherwise: Term, span: Span | None) -> Term | None:
-    """``if condition then … else …`` of branches brought to one sort; None where they have none in common, or one that
-    no value of a term has (functions, sets)."""
+    """``if condition then … else …`` with branches converted to one sort; None if they have no common sort, or one that
+    a conditional cannot have (functions, sets)."""
     made = common([then, otherwise])
     if made is None or isinstance(made[0].sort, FunctionSort | SetSort):
         return None

@@ -1,8 +1,8 @@
-"""A file's clauses, found by their keywords and brackets, each then parsed on its own.
+"""Finds a file's clauses by their keywords and brackets, and parses each separately.
 
-This is the recovery of the parser: whatever is wrong inside a clause ends with it, so that all errors of a file are
-reported in one run and a broken node does not hide the next. Section keywords are reserved, so they can be trusted to
-begin a section even where a bracket before them was never closed.
+This is the parser's error recovery: an error inside a clause ends with the clause, so that all errors of a file are
+reported in one run and a broken node does not hide the next. Section keywords are reserved, so they begin a section
+even if a bracket before them was never closed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _LISTS = ("INPUTS", "OUTPUTS", "TOPICS")
 _CLAUSES = {"ASSUME": ClauseKind.ASSUMPTION, "GUARANTEE": ClauseKind.GUARANTEE}
 _SECTIONS = frozenset((*_LISTS, "DEFINE", *_CLAUSES))
 _CONTEXTS = frozenset(("context", "contexts", "type", "types", "constant", "constants"))
-"""What earlier tools and hasty authors write for `context`."""
+"""Words that earlier tools and authors use for `context`."""
 _SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
 
 
@@ -42,7 +42,7 @@ class _OutlineReader:
         self.at = 0
         self.complained = -1
         self.innermost: Token | None = None
-        """The bracket that the last search of `balanced` found closed by one of another kind."""
+        """The bracket that the last call of `balanced` found closed by one of another kind."""
         self.out = FileSyntax()
 
     # --- looking at tokens -------------------------------------------------------------------------------------------
@@ -52,7 +52,7 @@ class _OutlineReader:
         return self.tokens[at].type if at < len(self.tokens) else "$END"
 
     def found(self, at: int) -> tuple[str, int, int]:
-        """The token at a position in words, and its place."""
+        """The token at a position as text for messages, and its place."""
         if at >= len(self.tokens):
             end = self.tokens[-1].end if self.tokens else 0
             return "the end of the file", end, end
@@ -84,12 +84,12 @@ class _OutlineReader:
                     self.context()
                 case "NODE":
                     self.node()
-                case _:  # reported: reading goes on at the next clause
+                case _:  # reported: continue at the next clause
                     self.skip_to_top()
         return self.out
 
     def clause(self) -> str:
-        """The clause that begins here, or that a word seems to mean; empty, and reported, where there is none."""
+        """The kind of clause that begins here, or that a word seems to mean; empty, and reported, if there is none."""
         kind = self.kind()
         if kind in _TOP:
             return kind
@@ -110,7 +110,7 @@ class _OutlineReader:
         return meant
 
     def skip_to_top(self) -> None:
-        """Past the token here, to where a clause may begin."""
+        """Skips the token here and all up to the next possible beginning of a clause."""
         self.at += 1
         while self.at < len(self.tokens) and self.kind() not in _TOP:
             if self.kind() == "NAME" and (
@@ -124,7 +124,7 @@ class _OutlineReader:
             self.complain(
                 "RCL113", f"expected `{{` after {what} and not %", "names are made of letters, digits and `_`"
             )
-            for ahead in range(1, 5):  # what is left of a name that is none
+            for ahead in range(1, 5):  # the rest of an invalid name
                 if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
                     return None
                 if self.kind(ahead) == "LBRACE":
@@ -158,7 +158,7 @@ class _OutlineReader:
             self.reports.error("RCL115", "this `{` is never closed", brace.start, brace.end, hint="close it with `}`")
 
     def declaration(self, broken: set[str]) -> Declaration | None:
-        """The declaration here, to its `;`; of one in error, the names go to `broken`."""
+        """The declaration here, up to its `;`; if it has errors, its names go to `broken`."""
         first, relation = self.at, False
         stack: list[str] = []
         while self.at < len(self.tokens):
@@ -246,13 +246,13 @@ class _OutlineReader:
         self.missing(node, seen, closed)
 
     def about_keyword(self, hint: str) -> str:
-        """The hint, after what is to be said of a keyword that stands where a name may stand."""
+        """The hint, preceded by the message for a keyword in the place of a name."""
         said = about_keyword(self.tokens[self.at]) if self.at < len(self.tokens) else None
         return f"{said}; {hint}" if said else hint
 
     def missing(self, node: NodeSyntax, seen: dict[str, Token], closed: bool) -> None:
-        """Reports the sections that a node must have and does not. In one that is not `closed`, which has been
-        reported, those at the end may be still to come."""
+        """Reports the required sections that a node lacks. In a node that is not `closed` (already reported), the last
+        ones may follow later."""
         last = max((_ORDER[section] for section in seen), default=-1)
         for section in _LISTS:
             if section not in seen:
@@ -275,7 +275,8 @@ class _OutlineReader:
         return "STEPS" if kind == "NAME" and word == "steps" and self.kind(1) == "LPAR" else None
 
     def meant_section(self) -> str | None:
-        """The section that a misspelt word begins: reported, and read as that, so that nothing else is reported."""
+        """The section that a misspelt word begins: reported, and read as that section, so that nothing else is
+        reported."""
         word = self.tokens[self.at].text
         if self.kind() not in ("NAME", "IN", "OUT") or self.kind(1) not in ("LPAR", "NAME", "STRING"):
             return None
@@ -298,7 +299,7 @@ class _OutlineReader:
         if self.kind() == "RPAR":
             message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
             if self.out.parts and self.reports.is_torn(self.out.parts[-1][0], self.tokens[self.at].end):
-                self.complained = self.tokens[self.at].start  # `[0, 1)`: its partner may not have been readable
+                self.complained = self.tokens[self.at].start  # `[0, 1)`: its partner may be unreadable
         elif self.kind() in ("SEMICOLON", "COMMA", "DOT"):
             message, hint = "% stands between the parts of a node", "remove it"
         self.complain("RCL113", message, hint)
@@ -310,8 +311,8 @@ class _OutlineReader:
                 self.at += 1
 
     def balanced(self) -> int | None:
-        """Past the bracket here and its partner; the partner's position, or None where it has none (then: where the
-        search ended, at a section keyword or the end)."""
+        """Moves past the bracket here and its partner; returns the partner's position, or None if it has none (then:
+        where the search ended)."""
         opened = [self.tokens[self.at]]
         self.innermost = None
         self.at += 1
@@ -397,16 +398,16 @@ class _OutlineReader:
                 self.out.parts.extend((t.start, t.end) for t in listing.items)
 
     def unclosed(self, opening: Token) -> None:
-        """Reports a parenthesis without partner."""
+        """Reports a bracket without partner."""
         words, start, end = self.found(self.at)
-        if not self.reports.is_torn(opening.end, end):  # what could not be read may hold the partner
+        if not self.reports.is_torn(opening.end, end):  # text that could not be read may hold the partner
             note = (f"it should be closed before {words} here", self.reports.source.span(start, end))
             hint = f"close it with `{_SIGN[_OPEN[opening.type]]}`"
             message = f"this `{_SIGN[opening.type]}` is never closed"
             self.reports.error("RCL115", message, opening.start, opening.end, hint=hint, notes=(note,))
 
     def to_next_section(self, section: str, node: NodeSyntax, part: Sequence[Token]) -> None:
-        """Goes to where reading can begin again after a section in error with these tokens."""
+        """Moves to where reading can resume after a section in error with these tokens."""
         if section in _LISTS:
             node.broken.update(t.text for t in part if t.type == "NAME")
             node.broken.add("*")

@@ -50,8 +50,8 @@ def parse(
 def parse(
     start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
 ) -> syntax.Syntax | None:
-    """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
-    and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
+    """The tree of one part of a file, between the offsets `begin` (by default its first token's) and `end`. Returns
+    None after an error, and reports the first unless it follows from text that the lexer skipped or guessed."""
     from lark.exceptions import UnexpectedToken  # Lark takes long to import, and most runs parse nothing
 
     if start == "topics":
@@ -71,7 +71,7 @@ def parse(
             explain(start, tokens, at, bad, _accepted(start, tokens[:at]), reports)
         return None
     if start in ("formula", "topics") and reports.is_torn(begin, end):
-        return None  # what it says would be something else
+        return None  # its meaning would be wrong
     if tree.depth > NESTING:
         reports.error(
             "RCL110",
@@ -86,8 +86,8 @@ def parse(
 
 
 def _accepted(start: str, tokens: Iterable[Token]) -> frozenset[str]:
-    """The terminals that may follow these tokens. (Lark reduces as far as it can before it finds an error, so that the
-    state of the parser that failed accepts less.)"""
+    """The terminals that may follow these tokens. (Lark reduces as far as possible before it finds an error, so the
+    state of the failed parser accepts less.)"""
     machine = _lark().parse_interactive("", start=start)
     for token in tokens:
         machine.parser_state.feed_token(token)
@@ -106,34 +106,34 @@ _Made = TypeVar("_Made")
 
 
 def _made(kind: Callable[..., _Made], c: Sequence[Any], *fields: Any) -> _Made:
-    """A piece of syntax from the first of a rule's tokens and trees to the last, a level above the deepest of them."""
+    """A tree that spans a rule's tokens and trees, one level above the deepest of them."""
     depth = max([part.depth for part in c if type(part) is not Token], default=0)
     return kind(c[0].start, c[-1].end, depth + 1, *fields)
 
 
 def _word(kind: Callable[[int, int, int, str], _Made]) -> Callable[[list[Any]], _Made]:
-    """What one word says by its text."""
+    """A callback for a tree of one token, with its text."""
     return lambda c: kind(c[0].start, c[0].end, 1, c[0].text)
 
 
 def _chain(kind: Callable[..., _Made], c: list[Any], *fields: Any) -> _Made:
-    """Operands with signs between them, which count as deep as their term becomes."""
+    """A tree of operands with signs between them; its depth is that of the resulting term."""
     depth = max([part.depth for part in c[::2]]) + len(c) // 2
     return kind(c[0].start, c[-1].end, depth, *fields)
 
 
 def _listed(kind: Callable[..., _Made]) -> Callable[[list[Any]], _Made]:
-    """What stands between brackets, with commas."""
+    """A callback for a list between brackets, separated by commas."""
     return lambda c: _made(kind, c, tuple(c[1:-1:2]))
 
 
 def _joined(sign: syntax.Sign) -> Callable[[list[Any]], syntax.Connective]:
-    """Formulas with a sign between them."""
+    """A callback for formulas with a sign between them."""
     return lambda c: _made(syntax.Connective, c, sign, tuple(c[::2]))
 
 
 def _implied(sign: syntax.Sign) -> Callable[[list[Any]], syntax.Connective]:
-    """As `_joined`, of a sign whose chain is a deep term."""
+    """As `_joined`, for a sign whose chain becomes a deep term."""
     return lambda c: _chain(syntax.Connective, c, sign, tuple(c[::2]))
 
 
@@ -222,7 +222,7 @@ _CALLBACKS: dict[str, Callable[[list[Any]], Any]] = {
     "limit": _limit,
     "pace": _pace,
 }
-"""What becomes of the tokens and trees of a rule, by its name in the grammar."""
+"""The callback for the tokens and trees of each rule, by its name in the grammar."""
 
 
 # --- names of topics --------------------------------------------------------------------------------------------------
@@ -232,7 +232,7 @@ _SEGMENTS = frozenset(("NAME", *KEYWORDS.values()))
 
 def _topic_names(tokens: Sequence[Token]) -> list[Token]:
     """The tokens of a list of topics, each name that has several segments (`/robot1/scan`, `~scan`) as one NAME. White
-    space sets type and name apart; a word of the language is an ordinary segment (`/arm/in`)."""
+    space separates type and name; a keyword is an ordinary segment (`/arm/in`)."""
     found: list[Token] = []
     runs = 0
     for run in _runs(tokens):
@@ -250,7 +250,7 @@ def _topic_names(tokens: Sequence[Token]) -> list[Token]:
 
 
 def _runs(tokens: Sequence[Token]) -> Iterator[list[Token]]:
-    """Segments and slashes that stand close together; any other token by itself."""
+    """Groups of adjacent segments and slashes; any other token by itself."""
     run: list[Token] = []
     for token in tokens:
         part = token.type in _SEGMENTS or token.type == "SLASH"

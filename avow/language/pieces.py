@@ -1,8 +1,9 @@
-"""A contract node by node: what a node's text says, with what the files declare for all, hangs on nothing else.
+"""Checks a contract node by node: the result for a node depends only on its text and the files' common declarations.
 
-So it is kept from run to run (`avow.base.remembered.Shelf`), and after an edit one node is read and checked. A contract
-is only read so where nothing is wrong with it and every node begins a line; else, and where a node's text changes what
-the others may mean (a type that is written in place), it is read whole (`avow.language.load`), with the same result.
+The results are cached between runs (`avow.base.remembered.Shelf`), so that after an edit only one node is read and
+checked. This applies only if the contract has no errors and every node begins a line. Otherwise, and if a node's text
+can change the meaning of the others (a type that is written in place), the contract is read whole
+(`avow.language.load`), with the same result.
 """
 
 from __future__ import annotations
@@ -34,22 +35,22 @@ class _Whole(Exception):  # noqa: N818 - it says what to do
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """What a node's text says. Offsets count from its beginning."""
+    """The result for a node's text. Offsets count from its beginning."""
 
     node: Node
     lints: tuple[Diagnostic, ...]
     spoken: frozenset[str]
-    """The names that it speaks of."""
+    """The names that it mentions."""
     words: int
-    """How many tokens it has."""
+    """The number of its tokens."""
     parts: tuple[tuple[int, int], ...]
     allows: tuple[Token, ...]
-    """Comments that allow something."""
+    """Comments that allow a lint."""
 
 
 @dataclass(slots=True)
 class _Head:
-    """What stands before a file's first node, and where its nodes are."""
+    """The text before a file's first node, and the places of its nodes."""
 
     source: Source
     lines: int
@@ -65,7 +66,7 @@ class _Head:
 def by_pieces(
     sources: Sequence[Source], off: frozenset[str], shelf: Shelf
 ) -> tuple[Contract, tuple[Diagnostic, ...]] | None:
-    """As `check_sources`; None where the contract has to be read whole."""
+    """As `check_sources`; None if the contract has to be read whole."""
     try:
         return _by_pieces(sources, off, shelf)
     except _Whole:
@@ -151,13 +152,13 @@ def _sound(heads: Sequence[_Head]) -> None:
 
 
 def _size(declarations: Declarations) -> tuple[int, ...]:
-    """Of what a node's text may add to: else the next node would mean something else."""
+    """The sizes of the tables that a node's text may extend: if one grows, the next node could change its meaning."""
     e = declarations.environment
     return tuple(len(names) for names in (e.types, e.constants, e.elements, e.anonymous, e.places, e.broken))
 
 
 def _piece(source: Source, declarations: Declarations) -> _Piece:
-    """What the text of one node says, after the declarations of the files' heads."""
+    """The result for one node's text, given the declarations of the files' heads."""
     reports = Reports(source)
     comments: list[Token] = []
     found = tokens(reports, comments)
@@ -180,7 +181,7 @@ def _piece(source: Source, declarations: Declarations) -> _Piece:
 
 
 def _linted(head: _Head, pieces: Sequence[_Piece]) -> LintedFile:
-    """The file as the lints want it, whose nodes have been looked at."""
+    """The lints' input for a file whose nodes have already been checked."""
     if head.words + sum(piece.words for piece in pieces) > TOKENS:
         raise _Whole
     begun = list(zip((begin for begin, _, _ in head.stretches), pieces, strict=True))

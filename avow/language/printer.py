@@ -1,6 +1,6 @@
-"""Terms and sorts as text: RCL, Unicode mathematics, plain words, or LaTeX; with only the parentheses that are needed.
+"""Terms and sorts as text: RCL, Unicode mathematics, plain words, or LaTeX; with only the necessary parentheses.
 
-Printing in the style ``rcl`` and reading that again gives the equal term (tests hold this for generated terms).
+Printing in the style ``rcl`` and reading the result gives an equal term (tests check this for generated terms).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def show_term(term: t.Term, style: StyleName = "unicode") -> str:
 
 
 def show_sort(sort: s.Sort, style: StyleName = "rcl", named: Container[str] | None = None) -> str:
-    """A sort by its name, or written out where it has none (or none of those `named`)."""
+    """A sort by its name, or written out if it has none (or none of those `named`)."""
     chosen = STYLES[style]
     match sort:
         case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
@@ -83,7 +83,7 @@ class _Printer:
         self.style = style
 
     def show(self, term: t.Term, place: int, *, real: bool = False) -> str:
-        """`place`: how tightly the text must bind. `real`: a reader takes a number here for a REAL anyway."""
+        """`place`: how tightly the text must bind. `real`: a number here is read as a REAL in any case."""
         if isinstance(term, t.Widen):
             return self.show(term.term, place)
         text, level = self.form(term, real)
@@ -169,7 +169,7 @@ class _Printer:
                 assert_never(term)
 
     def history(self, term: t.History) -> tuple[str, int]:
-        """``once[5 steps](F)``, ``F since G``; in words where the style has some."""
+        """``once[5 steps](F)``, ``F since G``; in words if the style has some."""
         if term.operator is t.Past.STEPS and term.limit is not None and isinstance(term.limit.amount, t.Literal):
             told = {"==": "every", "<=": "at most"}[term.limit.relation]
             length = f"{told} {show_number(Fraction(term.limit.amount.value))[0]} s"
@@ -203,14 +203,14 @@ class _Printer:
         return self.style.limit(f"{relation}{shown}")
 
     def variable(self, term: t.Variable) -> str:
-        """``in.r``; of another node, ``sensor.r`` (in RCL ``sensor.in.r``, which has one meaning always)."""
+        """``in.r``; for another node, ``sensor.r`` (in RCL ``sensor.in.r``, which is never ambiguous)."""
         node, dot, name = term.name.partition(".")
         if not dot or term.role is t.Role.BOUND:
             return term.qualified
         return f"{node}.{term.role}.{name}" if self.style.careful else term.name
 
     def side(self, term: t.Term, place: int) -> str:
-        """A side of `->` or `<=>`. RCL has parentheses round `and` and `or` there, as the lint RCL401 asks for."""
+        """A side of `->` or `<=>`. RCL has parentheses around `and` and `or` there, as the lint RCL401 requires."""
         bare = (
             isinstance(term, t.And | t.Or)
             and len(term.items) > 1
@@ -286,7 +286,7 @@ class _Printer:
 
 
 def show_number(value: Fraction) -> tuple[str, int]:
-    """A number and how tightly its text binds: a decimal where it has one, else a division."""
+    """A number and how tightly its text binds: a decimal if it has one, else a division."""
     text = decimal(value)
     if text is None:
         return f"{value.numerator} / {value.denominator}", PRODUCT
@@ -294,7 +294,7 @@ def show_number(value: Fraction) -> tuple[str, int]:
 
 
 def _shows_real(term: t.Term) -> bool:
-    """Whether the printed term is a REAL for a reader who does not know what is wanted."""
+    """Whether the printed term is read as a REAL without knowing the expected sort."""
     match term:
         case t.Literal(value=value):
             return isinstance(value, Fraction) and value.denominator != 1
@@ -310,12 +310,13 @@ def _shows_real(term: t.Term) -> bool:
             return any(map(_shows_real, terms))
         case t.Conditional(then=then, otherwise=otherwise):
             return _shows_real(then) or _shows_real(otherwise)
-        case _:  # what is no number that was written down has its sort from its name
+        case _:  # a term that is not a literal number has its sort from its name
             return bool(term.sort == s.REAL)
 
 
 def _is_chain(items: tuple[t.Term, ...]) -> bool:
-    """Whether a conjunction is ``a < b <= c``: each comparison begins where the last one ended, all one way."""
+    """Whether a conjunction is ``a < b <= c``: each comparison begins with the last one's right side, all in one
+    direction."""
     previous: t.Term | None = None
     operators = set()
     for item in items:

@@ -24,7 +24,7 @@ _TOKENS = {
     "entity.name.type": Name.Class,
     "entity.name.function": Name.Label,
 }
-"""By the beginning of TextMate's names for scopes."""
+"""Token types by prefixes of TextMate's scope names."""
 
 
 def _token(scope: str) -> Any:

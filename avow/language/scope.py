@@ -1,4 +1,4 @@
-"""What names mean: those that a contract gives to sorts and values, and those of a place in a formula."""
+"""The meaning of names: a contract's names of sorts and values, and the names in scope at a place in a formula."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from avow.language.terms import Role, Term, Variable
 @dataclass(slots=True)
 class Environment:
     """`elements` maps every enumeration member and constructor to its sort; `broken` are names whose declaration is in
-    error, about which nothing more is said."""
+    error, about which nothing more is reported."""
 
     types: dict[str, Sort] = field(default_factory=dict)
     constants: dict[str, Term] = field(default_factory=dict)
@@ -27,11 +27,11 @@ class Environment:
     broken: set[str] = field(default_factory=set)
 
     def sort(self, name: str) -> Sort | None:
-        """The sort of that name, also of one that was written in place and named by us."""
+        """The sort of that name, including generated names of sorts that were written in place."""
         return self.types.get(name) or self.anonymous.get(name)
 
     def add_elements(self, sort: Sort) -> None:
-        """Make known what a declared sort, and those written in place in it, are made of."""
+        """Register the elements of a declared sort, and of those written in place in it."""
         if isinstance(sort, EnumSort):
             self.elements.update(dict.fromkeys(sort.members, sort))
         elif isinstance(sort, DataSort):
@@ -40,7 +40,7 @@ class Environment:
             self.add_inner(part)
 
     def add_inner(self, sort: Sort) -> None:
-        """As `add_elements`, of a sort that is part of another: an enumeration there may be one that has no name."""
+        """As `add_elements`, for a sort that is part of another, where an enumeration may have no declared name."""
         if not isinstance(sort, EnumSort | DataSort):
             self.add_elements(sort)
         elif self.sort(sort.name) is None:
@@ -61,16 +61,16 @@ def of_contract(contract: Contract) -> Environment:
 
 @dataclass(slots=True)
 class Defined:
-    """A definition in a scope: its text until it is looked up, and then what it says there."""
+    """A definition in a scope: its tree until it is looked up, then the checked definition."""
 
     parameters: tuple[Variable, ...]
     tree: Define | None = None
     reports: Reports | None = None
     bare: bool = True
-    """Whether its inputs and outputs may be named without `in.` and `out.`: a context does not know them."""
+    """Whether its inputs and outputs may be named without `in.` and `out.`; not in a context."""
     found: Definition | None = None
     state: str = "new"
-    """new, open (being checked: meeting it again is a circle), or done."""
+    """new, open (being checked: meeting it again is a cycle), or done."""
 
     @property
     def place(self) -> Span | None:
@@ -86,8 +86,8 @@ BOTH_ROLES = frozenset((Role.INPUT, Role.OUTPUT))
 class Scope:
     """The names that a formula may use.
 
-    Of a node: its `inputs` and `outputs`. Of a whole system: `nodes`, whose ports are written ``node.port``.
-    `bound` are the variables of the quantifiers around the place, and the extra names that the caller gave.
+    For a node: its `inputs` and `outputs`. For a whole system: `nodes`, whose ports are written ``node.port``. `bound`
+    are the variables of the enclosing quantifiers, and the extra names that the caller gave.
     """
 
     environment: Environment
@@ -99,14 +99,14 @@ class Scope:
     broken: set[str] = field(default_factory=set)
     node: str | None = None
     remembers: bool = False
-    """Whether it may speak of other steps than this one."""
+    """Whether the formula may refer to other steps than this one."""
     bare: bool = True
     """Whether inputs and outputs may be named without `in.` and `out.`."""
     defined: Mapping[str, Defined] = field(default_factory=dict)
 
     @property
     def named(self) -> str:
-        """The node as messages call it: one whose name cannot be read has none."""
+        """The node's name in messages; without a name if it cannot be read."""
         return f"node `{self.node}`" if self.node else "the node"
 
     def ports(self, role: Role) -> Mapping[str, Port]:
@@ -117,7 +117,7 @@ class Scope:
         return name in self.broken or "*" in self.broken or name in self.environment.broken
 
     def taken(self, name: str) -> tuple[str, Span | None] | None:
-        """What already has the name here, and where it was declared."""
+        """The kind of thing that already has the name here, and where it was declared; None if the name is free."""
         environment = self.environment
         if name in self.bound:
             return "a variable of an enclosing quantifier", self.bound[name].span
@@ -138,7 +138,7 @@ class Scope:
         return None
 
     def known(self) -> Iterator[str]:
-        """Every name that may stand for a value here."""
+        """Every name that may denote a value here."""
         yield from self.bound
         yield from self.defined
         for name in self.inputs:

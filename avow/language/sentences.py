@@ -1,9 +1,8 @@
-"""English sentences beside formulas that say something else.
+"""Detects English sentences that disagree with their formulas.
 
-A reader trusts the sentence, the tools the formula. Nobody can prove that the two agree, but three ways in which they
-often do not can be seen: a comparison the other way round (or with another number), a sentence that goes one way beside
-a formula that goes both (or the reverse), and an element that the sentence names and the formula does not.
-Each is a hint, with a code of its own; what cannot be seen to differ is left alone.
+Readers trust the sentence, the tools the formula. Their agreement cannot be proved, but three common differences can be
+detected: a reversed comparison (or another number), an implication beside an equivalence, and an element that the
+sentence names and the formula does not. Each is a hint with its own code; other differences are not reported.
 """
 
 from __future__ import annotations
@@ -34,13 +33,13 @@ class Mismatch:
 
 
 def mismatches(clause: Clause, elements: Mapping[str, str]) -> Iterator[Mismatch]:
-    """What the clause's sentence is seen to say otherwise than its formula; `elements` are those of its node."""
+    """The detected differences between the clause's sentence and its formula; `elements` are those of its node."""
     if clause.sentence is not None:
         yield from differences(clause.sentence, clause.written or clause.formula, elements)
 
 
 def differences(sentence: str, formula: t.Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
-    """What a sentence is seen to say otherwise than a formula in which these elements could stand."""
+    """The detected differences between a sentence and a formula in which these elements may occur."""
     sentence = sentence[:SENTENCE]
     yield from _comparisons(sentence, formula)
     yield from _directions(sentence, formula)
@@ -48,7 +47,7 @@ def differences(sentence: str, formula: t.Term, elements: Mapping[str, str]) -> 
 
 
 def elements_of(nodes: Iterable[Node]) -> dict[str, str]:
-    """The elements and constructors of the nodes' types, by their names in lower case."""
+    """The elements and constructors of the nodes' types, by their lower-case names."""
     sorts = components(*(port.sort for node in nodes for port in (*node.inputs, *node.outputs)))
     names: dict[str, str] = {}
     for sort in sorts:
@@ -66,7 +65,7 @@ _IN_WORDS = {"<": "less than", "<=": "less than or equal to", ">": "greater than
 _SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
     scale for k in (60, 3600) for scale in (Fraction(k), Fraction(1, k))
 )
-"""Between a unit of the sentence and that of the contract: powers of ten, minutes, hours."""
+"""Factors between a unit of the sentence and that of the contract: powers of ten, minutes, hours."""
 _EITHER = "make the two say the same, whichever is meant"
 
 
@@ -139,7 +138,7 @@ def _is_both_ways(term: t.Term) -> bool:
             | t.Quantified(quantifier=t.Quantifier.UNIQUE)
         ):
             return True
-        case t.Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another way to write `done`
+        case t.Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another form of `done`
             return left.sort == BOOL and not isinstance(left, t.Literal) and not isinstance(right, t.Literal)
     return False
 
@@ -201,7 +200,7 @@ _SPEED = re.compile(r"\b(?:faster|slower)\b", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """``less than 25 cm``: the signs that it may mean, and the number. A numeral may be a word (``zero``)."""
+    """``less than 25 cm``: the possible signs, and the number. A numeral may be a word (``zero``)."""
 
     text: str
     signs: frozenset[str]
@@ -227,8 +226,8 @@ def comparisons(sentence: str) -> Iterator[Comparison]:
 
 
 def _meant(signs: frozenset[str], before: str, text: str) -> frozenset[str]:
-    """What these signs may mean in a comparison with these words before it: near a negation, a permission or a speed
-    (``faster than 2 s`` is less than 2 s) the opposite as well."""
+    """The possible signs of a comparison, given the words before it: near a negation or permission also the opposite,
+    for a speed also the reverse (``faster than 2 s`` is less than 2 s)."""
     if _SPEED.search(text):
         signs |= {FLIPPED[sign] for sign in signs}
     unsure = _NEGATION.search(re.split(r"[.;:,]", before)[-1])
@@ -255,12 +254,12 @@ _PERHAPS_BOTH = re.compile(
 
 
 def is_one_way(sentence: str) -> bool:
-    """Whether it says `if …` (`when …`, `while …`), and nothing that could mean the converse too."""
+    """Whether the sentence has `if …` (`when …`, `while …`), and nothing that could express the converse too."""
     return bool(_CONDITION.search(sentence)) and not _PERHAPS_BOTH.search(sentence)
 
 
 def both_ways(sentence: str) -> str | None:
-    """The words with which it says that the converse holds too (``if and only if``, ``exactly when``), if it does."""
+    """The words that state the converse too (``if and only if``, ``exactly when``), if any."""
     match = _BOTH.search(sentence)
     return match[0] if match else None
 
@@ -270,7 +269,7 @@ def both_ways(sentence: str) -> str | None:
 _COMMON = frozenset(
     "all and any are can end for has its left may none not off one out say the two was yes".split()  # noqa: SIM905
 )
-"""English words that stand in sentences without naming anything."""
+"""English words that are common in sentences and do not name an element."""
 _EXCEPT = re.compile(
     r"\b(?:no|not|nothing|none|nobody|nowhere|neither|nor|never|other than|unless|except|without|instead|rather"
     r"|avoid\w*|prevent\w*|forbid\w*)\b|n't\b",
@@ -279,9 +278,9 @@ _EXCEPT = re.compile(
 
 
 def mentions(sentence: str, names: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """The words with which the sentence speaks of one of the names as of something that is, each with the name: of
-    ``stop`` speak ``stop``, ``stops``, ``stopped`` and ``stopping``, but not an exception (``neither low nor high`` is
-    normal). `names` are by their lower-case form; those of one or two letters say nothing."""
+    """The words by which the sentence mentions one of the names affirmatively, each with the name: ``stop`` is
+    mentioned by ``stop``, ``stops``, ``stopped`` and ``stopping``, but not in an exception (``neither low nor high`` is
+    normal). `names` maps lower-case forms to names; those of one or two letters are ignored."""
     for word in re.finditer(r"[A-Za-z_][\w']*", sentence):
         for stem in _stems(word[0].lower()):
             if stem in names and stem not in _COMMON and len(stem) > 2:
@@ -291,7 +290,7 @@ def mentions(sentence: str, names: Mapping[str, str]) -> Iterator[tuple[str, str
 
 
 def _stems(word: str) -> Iterator[str]:
-    """What the word may be a form of, itself first."""
+    """The words of which the word may be a form, itself first."""
     yield word
     for ending in ("s", "es", "d", "ed", "ing"):
         if word.endswith(ending):

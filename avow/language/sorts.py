@@ -1,6 +1,6 @@
 """Sorts: the types of many-sorted first-order logic that RCL's type declarations denote.
 
-A declared name is a name for a sort; sets of names become `EnumSort`, sets of constructors `DataSort`, and ``{}`` an
+A declared name denotes a sort; sets of names become `EnumSort`, sets of constructors `DataSort`, and ``{}`` an
 `OpaqueSort`: an unspecified sort, never an empty one.
 """
 
@@ -88,7 +88,7 @@ class TupleSort:
     items: tuple[Sort, ...]
     labels: tuple[str, ...] = ()
     name: str = field(default="", compare=False)
-    """Under which it is declared: for people."""
+    """The name under which it is declared: for people."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ Sort = (
 )
 
 NotScalar = StringSort | DataSort | OpaqueSort | FunctionSort | TupleSort | SequenceSort | SetSort
-"""Sorts whose values are no single truth value, number or element."""
+"""Sorts whose values are not a single truth value, number or element."""
 
 BOOL = BoolSort()
 REAL = RealSort()
@@ -129,11 +129,11 @@ INTEGER = IntegerSort()
 NATURAL = NaturalSort()
 STRING = StringSort()
 BUILTINS: Mapping[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
-"""The sorts that have names of their own."""
+"""The built-in sorts by name."""
 
 
 def components(*sorts: Sort) -> Iterator[Sort]:
-    """The sorts given and those that they are made of, each once."""
+    """The given sorts and their component sorts, each once."""
     stack, seen = list(sorts), set[Sort]()
     while stack:
         sort = stack.pop()
@@ -145,7 +145,7 @@ def components(*sorts: Sort) -> Iterator[Sort]:
 
 
 def rebuilt(sort: Sort, made_of: Iterable[Sort]) -> Sort:
-    """The sort, made of others in the place of its `parts`."""
+    """The sort with its `parts` replaced."""
     given = iter(made_of)
     match sort:
         case DataSort(name=name, constructors=constructors):
@@ -164,7 +164,7 @@ def rebuilt(sort: Sort, made_of: Iterable[Sort]) -> Sort:
 
 
 def parts(sort: Sort) -> tuple[Sort, ...]:
-    """The sorts that a sort is directly made of."""
+    """The direct component sorts of a sort."""
     match sort:
         case DataSort(constructors=constructors):
             return tuple(p for c in constructors for p in c.parameters)

@@ -1,4 +1,4 @@
-"""A text with its places: offsets to lines and columns, and the collecting of diagnostics about it."""
+"""A text with its positions: offsets to lines and columns, and the collection of diagnostics about it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")
 
 @dataclass(slots=True)
 class Source:
-    """A text and where it stands: lines and columns count from 1.
+    """A text and its place: lines and columns count from 1.
 
-    `line` and `column` say where the text begins, for a formula that stands inside another file.
+    `line` and `column` are those of the text's beginning, for a formula inside another file.
     """
 
     file: str
@@ -35,7 +35,7 @@ class Source:
         return self.line + row, column
 
     def offset(self, line: int, column: int) -> int:
-        """The offset of a place; the text's end for one behind it."""
+        """The offset of a place; the text's end for a place after it."""
         row = max(line - self.line, 0)
         if row >= len(self.starts):
             return len(self.text)
@@ -61,15 +61,15 @@ class Source:
 
 @dataclass(slots=True)
 class Reports:
-    """Diagnostics about one text, in the order found; identical ones are kept once. Of those that differ in their place
-    alone the first `ALIKE` are kept, and all are counted."""
+    """Diagnostics about one text, in the order found; identical ones are kept once. Of those that differ only in their
+    place the first `ALIKE` are kept, and all are counted."""
 
     source: Source
     found: list[Diagnostic] = field(default_factory=list)
     odd: set[int] = field(default_factory=set)
-    """Where a token of the lexer begins that stands for something that is not RCL, which has been reported."""
+    """The offsets of tokens that replace text that is not RCL, which has been reported."""
     torn: list[int] = field(default_factory=list)
-    """Where the lexer left something out, in ascending order: what is found near it is most likely a consequence."""
+    """The offsets where the lexer skipped text, in ascending order: an error near one is most likely a consequence."""
     _seen: set[tuple[str, str, Span | None]] = field(default_factory=set)
     alike: Counter[tuple[str, str]] = field(default_factory=Counter)
 
@@ -100,13 +100,13 @@ class Reports:
             self.add(Diagnostic(code, message, self.source.span(start, end), Severity.ERROR, hint, notes))
 
     def is_torn(self, start: int, end: int) -> bool:
-        """Whether something was left out of this part of the text, so that no more should be said of it."""
+        """Whether text was skipped in this part, so that no more should be reported about it."""
         at = bisect_left(self.torn, start)
         return at < len(self.torn) and self.torn[at] <= end
 
     @property
     def full(self) -> bool:
-        """Whether nothing more is kept, so that looking for more is in vain."""
+        """Whether no more diagnostics are kept, so that looking for more is useless."""
         return len(self.found) >= DIAGNOSTICS
 
     @property
@@ -115,7 +115,7 @@ class Reports:
 
 
 def in_order(reports: Reports) -> list[Diagnostic]:
-    """What was found, by its place; at the end, that there is more than is kept."""
+    """The diagnostics in order of place; at the end, a note if there are more than are kept."""
     found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
     for (code, message), count in reports.alike.items():
         if count > ALIKE:
@@ -129,5 +129,5 @@ def in_order(reports: Reports) -> list[Diagnostic]:
 
 
 def _short(message: str) -> str:
-    """The message with very long names in it cut: nobody reads a hundred thousand letters."""
+    """The message with very long names in it shortened."""
     return message if len(message) <= 300 else _LONG_NAME.sub(r"\1…`", message)

@@ -1,4 +1,4 @@
-"""How each notation writes what a term is made of: signs, words, names, and the escaping that LaTeX needs."""
+"""The notation of each style for the parts of a term: signs, words, names, and the escaping that LaTeX needs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ StyleName = OneOf["unicode", "rcl", "latex", "text"]
 class Style:
     words: dict[str, str]
     quantifiers: dict[Quantifier, tuple[str, str, str]]
-    """Before the variables, after them, and after the body."""
+    """The texts before the variables, after them, and after the body."""
     sorts: dict[str, str]
     times: str
     arrow: str
@@ -29,20 +29,20 @@ class Style:
     string: Callable[[str], str]
     braces: Callable[[str], str]
     tight_quantifier: bool
-    """Whether a quantifier closes itself, so that it never needs parentheses."""
+    """Whether a quantifier is self-delimiting, so that it never needs parentheses."""
     comma: str = ", "
-    """Between arguments and items; where lines are broken, a place to do so if there is no better one."""
+    """The separator of arguments and items; also a last-resort line break where lines are broken."""
     past: Callable[[Past], str] = str
-    """What an operator that speaks of other steps is called."""
+    """The name of an operator that refers to other steps."""
     limit: Callable[[str], str] = lambda text: f"[{text}]"
     phrases: Mapping[str, str] = field(default_factory=dict)
-    """How such operators are said in words; those with a limit under `once limited`."""
+    """Such operators in words; those with a limit under keys like `once limited`."""
     careful: bool = False
-    """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
+    """Whether `and` and `or` get parentheses beside `->` and `<=>`, though they need none."""
 
 
 def latex_escape(text: str) -> str:
-    """Any text as LaTeX text that every pdflatex can set; what it has no sign for is shown by its number."""
+    """Any text as LaTeX text that every pdflatex can set; a character without a sign is shown by its number."""
     return "".join(_LATEX_TEXT.get(c) or (c if " " <= c <= "ÿ" and c.isprintable() else _code_point(c)) for c in text)
 
 

@@ -1,4 +1,4 @@
-"""What stands in a term, in reading order, however deep it is; and how large a term or sort is."""
+"""The subterms of a term, in reading order and at any depth; and the size of a term or sort."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def subterms(term: Term) -> Iterator[Term]:
 
 @by_identity(50_000)
 def histories(term: Term) -> tuple[History, ...]:
-    """What in a term speaks of other steps than this one, in reading order; none in a term of one step."""
+    """The subterms that refer to other steps than this one, in reading order; empty for a term of one step."""
     return tuple(part for part in subterms(term) if isinstance(part, History))
 
 
 def timed(term: Term) -> History | None:
-    """What in a term has a limit in seconds, so that also the time between steps counts; None where nothing has."""
+    """A subterm with a limit in seconds, so that the time between steps matters; None if there is none."""
     return next((part for part in histories(term) if part.limit is not None and not part.limit.steps), None)
 
 
@@ -39,15 +39,15 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
 
 # --- how large it is --------------------------------------------------------------------------------------------------
 
-# Declarations share what they name (`A = B + B; B = C + C; …`), so a few lines can stand for a term that no later pass
-# could finish with. What is too large or too deep once every name in it is written out is therefore refused where it is
-# declared or used.
+# Declarations share the values that they name (`A = B + B; B = C + C; …`), so a few lines can denote a term too large
+# for any later pass. A term that is too large or too deep once every name in it is expanded is therefore refused where
+# it is declared or used.
 
 _Part = TypeVar("_Part")
 
 
 def _extent(root: _Part, parts: Callable[[_Part], tuple[_Part, ...]]) -> tuple[int, int]:
-    """How many parts there are, and how deep they go. Takes time for each shared part once, and never recurses."""
+    """The number of parts, and their depth. Visits each shared part once, and never recurses."""
     known: dict[int, tuple[int, int]] = {}
     stack: list[tuple[_Part, bool]] = [(root, False)]
     while stack:

@@ -1,7 +1,7 @@
-"""The surface syntax of files, declarations and formulas: what becomes of the tokens, before any name is resolved.
+"""The surface syntax of files, declarations and formulas: the trees made from the tokens, before any name is resolved.
 
 A frozen dataclass for each kind of node, its fields in reading order, so that `children` finds the trees in it. Names
-that are only compared are plain strings; those that a diagnostic may point at are tokens.
+that are only compared are plain strings; names that a diagnostic may point to are tokens.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class NodePort(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class FieldOf(_Placed):
-    """``p.x`` of a record; of one that has a bare name, `NodePort`."""
+    """``p.x`` of a record; if the record is a bare name, it is a `NodePort`."""
 
     body: TermSyntax
     name: Token
@@ -145,7 +145,7 @@ class FieldOf(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class Parentheses(_Placed):
-    """``(a)``; of ``((a))`` one is left, as deep as both."""
+    """``(a)``; ``((a))`` becomes one, with the depth of both."""
 
     body: TermSyntax
 
@@ -205,7 +205,7 @@ class Quantity(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class LimitSyntax(_Placed):
-    """``[<= 200 ms]``, ``[n steps]``; `relation` is empty where there is none."""
+    """``[<= 200 ms]``, ``[n steps]``; `relation` is empty if there is none."""
 
     relation: str
     amount: TermSyntax
@@ -223,7 +223,7 @@ class Limited(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class PaceSyntax(_Placed):
-    """``steps(every 20 ms)``, ``steps(at most 100 ms)``; `words` are what stands before the length."""
+    """``steps(every 20 ms)``, ``steps(at most 100 ms)``; `words` are those before the length."""
 
     head: TermSyntax
     words: tuple[Token, ...]
@@ -369,7 +369,7 @@ class PortList(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class Define(_Placed):
-    """``define hot(i : NATURAL) = in.temp(i) > 80``; `end` is where the body ends."""
+    """``define hot(i : NATURAL) = in.temp(i) > 80``; `end` is the end of the body."""
 
     name: Token
     parameters: tuple[PortDeclaration, ...]
@@ -385,7 +385,7 @@ class RosType(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class TopicDeclaration(_Placed):
-    """``package/Type name matches(in.port)``; `role` and `port` are None where it says so little."""
+    """``package/Type name matches(in.port)``; `role` and `port` are None if they are not given."""
 
     type: RosType
     name: Token
@@ -414,7 +414,7 @@ Syntax = (
 )
 
 
-# --- files: what their text is made of (`avow.language.outline` finds it) ---------------------------------------------
+# --- files: the parts of their text (`avow.language.outline` finds them) ----------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -423,16 +423,16 @@ class ClauseSyntax:
     name: Token | None
     sentence: Token | None
     formula: TermSyntax | None
-    """None: it was in error, which has been reported."""
+    """None: it had errors, which have been reported."""
     inside: tuple[int, int]
-    """Where the formula stands, between the parentheses."""
+    """The offsets of the formula, between the parentheses."""
     start: int
     end: int
 
 
 @dataclass(slots=True)
 class NodeSyntax:
-    """`broken` are names that a part in error seems to declare; nothing more should be said about them."""
+    """`broken` are names that a part in error seems to declare; nothing more should be reported about them."""
 
     name: Token
     start: int
@@ -451,14 +451,14 @@ class FileSyntax:
     nodes: list[NodeSyntax] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
     parts: list[tuple[int, int]] = field(default_factory=list)
-    """Where each declaration, node, and part of a node stands: what a comment before it is about."""
+    """The offsets of each declaration, node, and part of a node: the scope of a comment before it."""
 
 
 # --- what a tree is made of -------------------------------------------------------------------------------------------
 
 
 def children(tree: Syntax) -> tuple[Syntax, ...]:
-    """The direct parts that are trees themselves, in reading order, in which the fields of every kind stand."""
+    """The direct subtrees, in reading order, which is the order of every kind's fields."""
     found: list[Any] = []
     for name in type(tree).__match_args__[3:]:
         part = getattr(tree, name)
@@ -470,7 +470,7 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
 
 
 def walk(tree: Syntax) -> Iterator[Syntax]:
-    """The tree and everything in it, in reading order; however deep it is."""
+    """The tree and everything in it, in reading order, at any depth."""
     stack = [tree]
     while stack:
         current = stack.pop()
@@ -479,7 +479,7 @@ def walk(tree: Syntax) -> Iterator[Syntax]:
 
 
 def unparenthesised(tree: TermSyntax) -> TermSyntax:
-    """What stands within the parentheses, if it stands in some."""
+    """The tree without enclosing parentheses."""
     while isinstance(tree, Parentheses):
         tree = tree.body
     return tree

@@ -1,7 +1,7 @@
-"""Typed terms and formulas: what a checked contract means. A formula is a term of sort BOOL.
+"""Typed terms and formulas: the meaning of a checked contract. A formula is a term of sort BOOL.
 
 The checker makes these from the surface syntax: every name is resolved, every widening explicit, every sort known.
-All later stages (Z3, Dafny, monitors, printers, hashes) read this and nothing else. Spans do not count in equality.
+All later stages (Z3, Dafny, monitors, printers, hashes) read only these. Spans are ignored in equality.
 
 Every node names the fields that hold its subterms; `children` and `rebuild` follow from that. The bound variables of a
 quantifier are not subterms.
@@ -26,11 +26,11 @@ from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort,
 
 
 class _Node:
-    """What all terms have: `children` and `rebuild`, by the names of the fields that hold subterms."""
+    """The base of all terms: `children` and `rebuild`, by the names of the fields that hold subterms."""
 
     __slots__ = ()
     _subterms = ""
-    """These names, in reading order; one that is a tuple of subterms stands last, with a star."""
+    """These names, in reading order; a field with a tuple of subterms comes last, with a star."""
 
     @property
     def children(self) -> tuple[Term, ...]:
@@ -50,7 +50,7 @@ class _Node:
 
 
 def _listing(names: Sequence[str]) -> Callable[[Any], tuple[Term, ...]]:
-    """Reads the fields of these names."""
+    """A function that reads the fields of these names."""
     several = names[-1].startswith("*")
     if several and len(names) == 1:
         return attrgetter(names[0][1:])
@@ -61,7 +61,7 @@ def _listing(names: Sequence[str]) -> Callable[[Any], tuple[Term, ...]]:
 
 
 def _rebuilding(names: Sequence[str]) -> Callable[[Any, tuple[Term, ...]], Any]:
-    """Puts other values into these fields of a new term."""
+    """A function that makes a new term with other values in these fields."""
     at = {name.lstrip("*"): slice(k, None) if name.startswith("*") else k for k, name in enumerate(names)}
 
     def rebuild(self: Any, parts: tuple[Term, ...]) -> Any:
@@ -170,8 +170,8 @@ class Item(_Node):
 @dataclass(frozen=True, slots=True)
 class Argument(_Node):
     """The argument at `position` of the constructor that a value was made with: y of ``move(x, y)`` at 1; without a
-    value where it was made with another one. No contract says it: it is what `avow.formulas.one_point_rule` puts for a
-    variable, and only beside the condition that the value was made so (`made_with`)."""
+    value if it was made with another one. It does not occur in contracts: `avow.formulas.one_point_rule` substitutes it
+    for a variable, and only beside the condition that the value was made so (`made_with`)."""
 
     _subterms = "value"
 
@@ -190,7 +190,7 @@ class Argument(_Node):
 
 @dataclass(frozen=True, slots=True)
 class Widen(_Node):
-    """An INTEGER or NATURAL term used where a REAL is wanted; `sort` is REAL."""
+    """An INTEGER or NATURAL term used where a REAL is expected; `sort` is REAL."""
 
     _subterms = "term"
 
@@ -244,7 +244,7 @@ class SequenceTerm(_Node):
 
 @dataclass(frozen=True, slots=True)
 class SequenceRange(_Node):
-    """``<a upto b>``: the integers from a to b, both included; empty where b < a."""
+    """``<a upto b>``: the integers from a to b, both included; empty if b < a."""
 
     _subterms = "low high"
 
@@ -347,9 +347,9 @@ class Quantified(_Node):
 
 @dataclass(frozen=True, slots=True)
 class Operation(_Node):
-    """``min(a, b)``: a built-in operator applied to arguments that have been brought to the sorts it wants.
+    """``min(a, b)``: a built-in operator applied to arguments that have been converted to its sorts.
 
-    Of `mod` and `div` the second argument is a positive whole number that is written down, so that both are total."""
+    The second argument of `mod` and `div` is a positive whole literal, so that both are total."""
 
     _subterms = "*arguments"
 
@@ -374,9 +374,9 @@ class Conditional(_Node):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """``[5 steps]``, ``[< 200 ms]``: how old something may be, the limit itself included unless `relation` is strict.
-    `amount` is a number of steps (a whole number) or of seconds (REAL); `relation` is `<=` `<` `>=` `>`, empty where
-    the operator says which."""
+    """``[5 steps]``, ``[< 200 ms]``: a limit on age, inclusive unless `relation` is strict.
+    `amount` is a number of steps (a whole number) or of seconds (REAL); `relation` is `<=` `<` `>=` `>`, empty if the
+    operator determines it."""
 
     relation: str
     amount: Term
@@ -385,9 +385,9 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class History(_Node):
-    """``once[5 steps](F)``, ``F since G``: what a run was like up to now, or (a response) has to be like from now on.
+    """``once[5 steps](F)``, ``F since G``: a property of the run up to now, or (a response) a demand on it from now on.
 
-    The arguments are in the order in which they are written; of `counted(F since G)` they are F and G."""
+    The arguments are in the order in which they are written; those of `counted(F since G)` are F and G."""
 
     operator: Past
     arguments: tuple[Term, ...]

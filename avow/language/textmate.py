@@ -1,6 +1,6 @@
-"""RCL for editors that colour by TextMate grammars: made from the same tables as the language.
+"""RCL for editors that highlight by TextMate grammars: generated from the language's own tables.
 
-``python -m avow.language.textmate > rcl.tmLanguage.json`` prints it; the editor's package ships what it prints.
+``python -m avow.language.textmate > rcl.tmLanguage.json`` prints the grammar; the editor's package ships this output.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _longest(sign: str) -> tuple[int, str]:
 
 
 def text() -> str:
-    """The grammar as the file that ships."""
+    """The text of the shipped grammar file."""
     return document(grammar()) + "\n"
 
 

@@ -1,8 +1,8 @@
 """A contract in other notations: RCL again, plain words, Unicode mathematics, LaTeX, JSON.
 
-Further notations that need more than the language floor (SMT-LIB, a backend's own) are added by the caller:
-`avow.cli.translate` holds the whole table. The JSON is a notation too: each node's kind and sort as other programs name
-them, formulas as text besides. It is not read back.
+The caller adds further notations that need more than the language layer (SMT-LIB, a backend's own):
+`avow.cli.translate` holds the whole table. The JSON is a notation, too: the kind and sort of each node for other
+programs, and formulas also as text. It is not read back.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from avow.language.terms import Conditional, Literal, Term
 def to_rcl(contract: Contract) -> str:
     """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas.
 
-    Raises `Rejected` where that text could not be read: a formula is nested too deeply, or a constant stands for an
-    element whose name a port of the node has.
+    Raises `Rejected` if that text could not be read: a formula is nested too deeply, or a constant denotes an element
+    whose name a port of the node has.
     """
     out: list[str] = []
     declarations = list(_declarations(contract))
@@ -68,14 +68,14 @@ def _is_own_section(clause: Clause) -> bool:
 
 
 def _declarations(contract: Contract) -> Iterator[str]:
-    """The context's lines, in an order that keeps that of the types and that of the constants."""
+    """The context's lines, in an order that preserves those of the types and of the constants."""
     names, constants = dict(contract.types).keys(), dict(contract.constants)
     waiting = iter(contract.constants)
     for name, sort in contract.types:
         if name not in constants:
             yield f"  {name} : {show_sort(sort, named=names - {name})};"
             continue
-        for constant, term in waiting:  # an enumeration that is a constant: first the constants before it
+        for constant, term in waiting:  # an enumeration given as a constant: first the constants before it
             if constant == name:
                 break
             yield f"  {constant} = {_value(term)};"
@@ -85,7 +85,7 @@ def _declarations(contract: Contract) -> Iterator[str]:
 
 
 def _value(term: Term) -> str:
-    """A constant's value as a declaration takes it: a formula has parentheses."""
+    """A constant's value in the form of a declaration: a formula has parentheses."""
     shown = show_term(term, "rcl")
     bare = isinstance(term, Conditional) or (term.sort == BOOL and not isinstance(term, Literal))
     return f"({shown})" if bare else shown
@@ -182,7 +182,7 @@ def _clause(clause: Clause) -> dict[str, Any]:
 
 
 def _data(value: Any) -> Any:
-    """A term or a sort as plain data, with its kind. Of a term, the sort is given by name or as it is written."""
+    """A term or a sort as plain data, with its kind. The sort of a term is given by name or as written."""
     if isinstance(value, tuple):
         return [_data(item) for item in value]
     if not dataclasses.is_dataclass(value):
@@ -215,8 +215,8 @@ _CONTEXT = r"\begin{longtable}[l]{@{}l@{\;}>{\raggedright\arraybackslash}p{0.75\
 def _to_latex(contract: Contract) -> str:
     """A document: a table for each node as the paper prints them, with the English beside the formula.
 
-    It needs nothing but what Debian's texlive-latex-base and -recommended hold, and compiles whatever the names and
-    sentences are (tests compile hostile ones).
+    It needs only Debian's texlive-latex-base and -recommended, and compiles for all names and sentences (tests compile
+    hostile ones).
     """
     return _HEAD + "\n".join([*_context(contract), *(_node_table(n) for n in contract.nodes)]) + "\\end{document}\n"
 
@@ -273,7 +273,7 @@ def _clause_rows(word: str, node: Node, clauses: tuple[Clause, ...]) -> Iterable
 
 
 def _breakable(text: str) -> str:
-    """Text that may be broken after each underscore and slash."""
+    """Text with allowed line breaks after each underscore and slash."""
     return latex_escape(text).replace(r"\_", r"\_\allowbreak{}").replace("/", r"/\allowbreak{}")
 
 
@@ -284,4 +284,4 @@ FORMATS: dict[str, Callable[[Contract], str]] = {
     "latex": _to_latex,
     "json": to_json,
 }
-"""The notations of this floor."""
+"""The notations of this layer."""
