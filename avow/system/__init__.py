@@ -1,5 +1,5 @@
-"""A system: its contracts and its plan, read and held against each other.
+"""A system: its contracts and its plan, read and checked against each other.
 
-`load` is the front door; `plan` is the plan as data (`plan_file` reads it), `graph` the dataflow, `subsystems` and
-`folding` nodes taken together as one.
+Start reading at `load`; `plan` is the plan as data (`plan_file` reads it), `graph` the dataflow, `subsystems` and
+`folding` treat several nodes as one.
 """

@@ -1,8 +1,8 @@
 """Everything that is wrong with a system that cannot be loaded, in one round.
 
-`avow.system.load` stops where what follows would stand on sand. Here the rest is looked at all the same: a plan without
-the pieces whose shape is wrong, a contract as far as it can be read. What comes of it is told, and never verified.
-Whatever may only follow from a fault that is told already is left out.
+`avow.system.load` stops where later checks would rest on faulty input. Here the rest is examined all the same: a plan
+without the pieces whose shape is wrong, a contract as far as it can be read. The faults found are reported; the result
+is never verified. Faults that may merely follow from a reported one are left out.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ _QUOTED = re.compile(r"'([^']*)'")
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What is left of a system: never to be verified."""
+    """The rest of a system: never to be verified."""
 
     system: System
     is_sound: bool
-    """Whether the contract is: else it is only as much of it as can be read."""
+    """Whether the contract is free of faults; otherwise it is only as much of it as can be read."""
     root: Piece
     told: frozenset[str]
-    """Words of which a fault is told already, so that others may follow from it."""
+    """Words in faults that are already reported, so that other faults may follow from them."""
     found: tuple[Diagnostic, ...]
-    """What is wrong with the plan's own values, and with the contract."""
+    """The faults in the plan's own values, and in the contract."""
     doubtful: frozenset[str] = frozenset()
-    """Names of the contract that may be missing only for a fault in it."""
+    """Names of the contract that may be missing only because of a fault in it."""
 
     def may_follow(self, found: Diagnostic) -> bool:
-        """Whether what a method's tool says of its files may follow from a fault of the contract."""
+        """Whether a finding of a method's tool about its files may follow from a fault of the contract."""
         return not self.doubtful.isdisjoint(_WORD.findall(found.message))
 
 
 def rest_of(folder: Path) -> Rest | None:
-    """None where there is no plan that could be read in part."""
+    """None if no plan could be read, even in part."""
     from avow.language.load import check_paths, read_in_part
 
     try:
@@ -71,7 +71,7 @@ def rest_of(folder: Path) -> Rest | None:
 
 
 def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """`found` is what loading the system told."""
+    """`found` are the diagnostics of loading the system."""
     from avow.language.load import check_paths
 
     told = list(found)
@@ -92,7 +92,7 @@ def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 
 def _doubtful(plan: Plan, part: Contract, found: Iterable[Diagnostic]) -> frozenset[str]:
-    """The names in the lines that have a fault; where the syntax is wrong, what it swallows is anyone's guess: all."""
+    """The names in the lines that have a fault; after a syntax error, all names, since its extent is unknown."""
     nodes = {node.name for node in part.nodes}
     errors = [d for d in found if d.is_error]
     names: set[str] = set()
@@ -130,7 +130,7 @@ def _of_formulas(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
 
 
 def _syntax(plan: Plan) -> Iterator[Diagnostic]:
-    """Formulas of the plan that are none, whatever the names in them mean."""
+    """Formulas of the plan that have syntax errors, whatever the names in them mean."""
     from avow.language.load import syntax_faults
 
     texts = [(r.formula, r.formula_span) for r in plan.requirements if r.formula]
@@ -147,7 +147,7 @@ def _tried(look: Callable[[], Iterable[Diagnostic]]) -> Iterable[Diagnostic]:
 
 
 def _follows(found: Diagnostic, told: frozenset[str]) -> bool:
-    """Whether every name that it misses is a word of which something is told already."""
+    """Whether every name that it misses is a word that a reported fault concerns."""
     names = _QUOTED.findall(found.message)
     last = [_WORD.findall(name)[-1] for name in names if _WORD.search(name)]
     return found.code == "PLAN106" and bool(last) and set(last) <= told

@@ -1,8 +1,8 @@
-"""Subsystems: nodes of a plan taken together as one node, to any depth; and the dataflow graph seen that way.
+"""Subsystems: nodes of a plan combined into one node, to any depth; and the dataflow graph with them as nodes.
 
-A subsystem changes nothing of how values flow. Seen from outside, its inputs are the values that its nodes read from
-elsewhere (one port for each value, however many nodes read it) and, over a delayed edge, its own values of the step
-before; its outputs are all that its nodes put out. So a loop that only closes outside it is a loop of the graph.
+A subsystem does not change how values flow. From outside, its inputs are the values that its nodes read from elsewhere
+(one port for each value, however many nodes read it) and, over a delayed edge, its own values of the previous step; its
+outputs are all outputs of its nodes. A loop that only closes outside it is therefore a loop of the graph.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from avow.system.plan import Edge, Endpoint, EnvironmentInput, Plan, System
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A subsystem as a node without clauses. `ports`: each of its ports → a node's port that it stands for; `outlets`
-    and `inlets`: each port of the nodes inside that is seen from outside → the subsystem's port."""
+    """A subsystem as a node without clauses. `ports`: each of its ports → the node's port that it represents; `outlets`
+    and `inlets`: each port of the nodes inside that is visible from outside → the subsystem's port."""
 
     node: Node
     inside: frozenset[str]
@@ -41,7 +41,7 @@ class Folded:
 
 
 def inner_first(plan: Plan) -> tuple[str, ...]:
-    """The subsystems of a plan (whose names are sound), each after those inside it."""
+    """The subsystems of a plan (whose names are valid), each after those inside it."""
     names = [subsystem.name for subsystem in plan.subsystems]
     known = set(names)
     arcs = [(member, s.name) for s in plan.subsystems for member in s.members if member in known]
@@ -49,7 +49,7 @@ def inner_first(plan: Plan) -> tuple[str, ...]:
 
 
 def leaves(plan: Plan) -> dict[str, tuple[str, ...]]:
-    """For each subsystem the nodes inside it, at whatever depth."""
+    """For each subsystem the nodes inside it, at any depth."""
     members = {subsystem.name: subsystem.members for subsystem in plan.subsystems}
     found: dict[str, tuple[str, ...]] = {}
     for name in inner_first(plan):
@@ -75,8 +75,8 @@ def outermost(system: System) -> tuple[str, ...]:
 
 
 def apart(plan: Plan, nodes: Iterable[Node]) -> dict[str, str]:
-    """Inputs (``camera.raw``) that the plan sets apart from inputs of that name elsewhere, and as whose: the node's own
-    (``camera.raw``), or a subsystem's (``perception.raw``, one for all nodes inside)."""
+    """Inputs (``camera.raw``) that the plan separates from inputs of the same name elsewhere, and their owner: the node
+    (``camera.raw``), or a subsystem (``perception.raw``, one for all nodes inside)."""
     inside, joined = leaves(plan), _joined(plan)
     known = {node.name: node for node in nodes}
     found: dict[str, str] = {}
@@ -91,8 +91,8 @@ def apart(plan: Plan, nodes: Iterable[Node]) -> dict[str, str]:
 
 
 def own_inputs(system: System, graph: Graph) -> dict[str, str]:
-    """The same; and inputs from the environment that have one name, but different types, are different inputs: the
-    first node's type has the name, another is called after the first node that reads it."""
+    """The same; in addition, inputs from the environment with one name but different types are different inputs: the
+    first node's type keeps the name, another is named after the first node that reads it."""
     found = apart(system.plan, system.contract.nodes)
     sorts: dict[str, Sort] = {}
     others: dict[tuple[str, Sort], str] = {}
@@ -105,7 +105,7 @@ def own_inputs(system: System, graph: Graph) -> dict[str, str]:
 
 
 def holders(system: System, graph: Graph, entry: EnvironmentInput) -> tuple[Endpoint, ...]:
-    """The inputs that an entry of the plan's environment is about: those of its name that no other entry sets apart."""
+    """The inputs that an entry of the plan's environment is about: those of its name that no other entry separates."""
     owner, _, port = entry.port.partition(".")
     inside = leaves(system.plan).get(owner, (owner,))
     nodes = [node for node in system.contract.nodes if owner == "in" or node.name in inside]
@@ -118,15 +118,15 @@ def holders(system: System, graph: Graph, entry: EnvironmentInput) -> tuple[Endp
 
 
 def _joined(plan: Plan) -> frozenset[str]:
-    """Inputs of folders that were taken in (``left.raw``) that are, the plan says, what others read (``in.raw``).
-    What a folder's own plan sets apart for a node (``left_reader.raw``) stays apart."""
+    """Inputs of included folders (``left.raw``) that the plan declares to be the shared input (``in.raw``). An input
+    that a folder's own plan separates for a node (``left_reader.raw``) stays separate."""
     folders = [subsystem.name for subsystem in plan.subsystems if subsystem.folder is not None]
     shared = [entry.port.partition(".")[2] for entry in plan.environment if entry.port.startswith("in.")]
     return frozenset(f"{name}.{port}" for name in folders for port in shared)
 
 
 def _around(parents_of: Mapping[str, str], name: str) -> tuple[str, ...]:
-    """The subsystems around a node or subsystem, the nearest first."""
+    """The subsystems around a node or subsystem, innermost first."""
     found: list[str] = []
     while name in parents_of:
         name = parents_of[name]
@@ -178,7 +178,7 @@ def face(system: System, graph: Graph, name: str, inside: Iterable[str]) -> Face
 
 
 def fold(system: System, graph: Graph, faces: Iterable[Face]) -> Folded:
-    """The graph in which each of the faces (none inside another) stands for the nodes inside it."""
+    """The graph in which each of the faces (none inside another) represents the nodes inside it."""
     chosen = tuple(faces)
     home = {leaf: part for part in chosen for leaf in part.inside}
     outlets = {at: port for part in chosen for at, port in part.outlets.items()}
@@ -197,7 +197,7 @@ def fold(system: System, graph: Graph, faces: Iterable[Face]) -> Folded:
     folded = wired(tuple(nodes.values()), edges.values(), (), None)
     grouped = {part.node.name for part in chosen}
     meant = {port: at for part in chosen for port, at in part.ports.items()}
-    dangling = tuple(e for e in folded.dangling if meant.get(e, e) in graph.dangling)  # not what feeds a node inside
+    dangling = tuple(e for e in folded.dangling if meant.get(e, e) in graph.dangling)  # not if it feeds a node inside
     deadlocks = tuple(cycle for cycle in folded.deadlocks if len(cycle) > 1 or cycle[0] not in grouped)
     findings = tuple(_waiting(cycle, folded) for cycle in deadlocks if grouped & set(cycle))
     return Folded(
@@ -208,7 +208,7 @@ def fold(system: System, graph: Graph, faces: Iterable[Face]) -> Folded:
 
 def seen(system: System, graph: Graph) -> tuple[tuple[str, Graph], ...]:
     """The graph as it is drawn: the whole with its outermost subsystems as nodes (its name is empty), then the inside
-    of each subsystem with what is inside that as nodes, outer ones first."""
+    of each subsystem with its members as nodes, outer ones first."""
     plan, inside = system.plan, leaves(system.plan)
     if not plan.subsystems:
         return (("", graph),)
@@ -223,7 +223,7 @@ def seen(system: System, graph: Graph) -> tuple[tuple[str, Graph], ...]:
 
 def restricted(graph: Graph, names: Iterable[str]) -> Graph:
     """Some nodes with the edges between them. An input from elsewhere counts as one from outside, an output that leads
-    elsewhere as one that feeds something."""
+    elsewhere as not dangling."""
     kept = set(names)
     inside = [e for e in graph.edges if e.target.node in kept and e.source.node in kept]
     entering = {e.target: None for e in graph.edges if e.target.node in kept and e.source.node not in kept}

@@ -16,7 +16,7 @@ from avow.system.temporal import parse_property, parse_state
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """What the plan assumes of an environment input: `formula` is over the inputs of `node`."""
+    """The plan's assumption about an environment input: `formula` is over the inputs of `node`."""
 
     port: str
     node: str
@@ -26,10 +26,10 @@ class Assumed:
 
 
 def initial_condition(system: System, edge: Edge) -> Term | None:
-    """What holds of the source's ``out.<port>`` before the first step; None where nothing is said.
+    """The condition on the source's ``out.<port>`` before the first step; None if the plan gives none.
 
-    The text is a value of the port's type, or a formula about ``out.<port>`` (and inputs from the environment that the
-    plan says are constant: of one that changes, there is no value before the first step). Raises Rejected, located.
+    The text is a value of the port's type, or a formula over ``out.<port>`` (and over inputs from the environment that
+    the plan declares constant: a changing one has no value before the first step). Raises Rejected, located.
     """
     if edge.initial is None:
         return None
@@ -64,7 +64,7 @@ def _speaks_of(edge: Edge, variable: Variable) -> Diagnostic:
 
 
 def _changing(system: System, graph: Graph, edge: Edge, term: Term) -> Variable | None:
-    """An input of which an initial value speaks though it is no constant one of the environment."""
+    """An input that an initial value mentions though it is not a constant input from the environment."""
     constant = {
         each for entry in system.plan.environment if entry.constant for each in holders(system, graph, entry)
     } & set(graph.environment)
@@ -73,7 +73,7 @@ def _changing(system: System, graph: Graph, edge: Edge, term: Term) -> Variable 
 
 
 def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]:
-    """What the plan assumes of the inputs that no node provides. Raises Rejected, with every fault."""
+    """The plan's assumptions about the inputs that no node provides. Raises Rejected, with every fault."""
     found: list[Assumed] = []
     faults: list[Diagnostic] = []
     for entry in system.plan.environment:
@@ -96,7 +96,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
         inputs = {e.port for e in graph.environment if e.node == owner}
         foreign = [v for v in ports_of(term) if v.role is not Role.INPUT or v.name not in inputs]
         if foreign and entry.taken_in:
-            continue  # it speaks of an input that is provided here too
+            continue  # it also concerns an input that is provided here
         if foreign:
             message = f"environment: {entry.port}: {foreign[0].qualified} is not the environment's to assume"
             hint = "only inputs that no node provides may be spoken of"

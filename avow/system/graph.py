@@ -1,8 +1,8 @@
-"""The dataflow graph: which output feeds which input, by topics, by names and types, and by the plan where they do not
+"""The dataflow graph: which output feeds which input, by topics, by names and types, and by the plan where those do not
 suffice.
 
 Where both ends have a topic, the topic links them (`avow.system.topics`). Otherwise an output feeds the inputs of
-*other* nodes that bear its name and type. A connection of the plan renames, chooses among several providers, delays, or
+*other* nodes that have its name and type. A connection of the plan renames, chooses among several providers, delays, or
 lets a node feed itself; an input named by a connection takes that source and no other.
 """
 
@@ -25,7 +25,7 @@ from avow.system.topics import Carrier, Ends, contradicted, ends, unheard, unlin
 @dataclass(frozen=True, slots=True)
 class Graph:
     """`environment`: inputs that no node provides; `dangling`: outputs that feed nothing; `deadlocks`: cycles, each as
-    the nodes on it, that no delayed edge with an initial value starts."""
+    the nodes on it, that no delayed edge with an initial value breaks."""
 
     nodes: tuple[str, ...]
     edges: tuple[Edge, ...]
@@ -34,7 +34,7 @@ class Graph:
     deadlocks: tuple[tuple[str, ...], ...]
     findings: tuple[Diagnostic, ...]
     relays: frozenset[str]
-    """Nodes that stand for a topic of several publishers."""
+    """Nodes that represent a topic of several publishers."""
     by_target: Mapping[Endpoint, Edge] = field(compare=False, repr=False)
     by_consumer: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
     by_provider: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
@@ -48,7 +48,7 @@ class Graph:
         return self.by_provider.get(node, ())
 
     def upstream(self, node: str) -> frozenset[str]:
-        """The nodes from which data reaches a node, at once or with delay: itself only where it is on a cycle."""
+        """The nodes from which data reaches a node, at once or with delay; the node itself only if it is on a cycle."""
         return frozenset(reached(self.providers(node), self.providers))
 
     def ancestors(self, node: str, among: Collection[str]) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ class Graph:
         return tuple(reached(neighbours(node), neighbours))
 
     def providers(self, node: str, *, delayed: bool | None = None) -> tuple[str, ...]:
-        """The nodes that feed a node (with or without itself, as the edges have it), each once."""
+        """The nodes that feed a node (including itself only if the edges do), each once."""
         found = (e.source.node for e in self.feeding(node) if delayed is None or e.delayed is delayed)
         return tuple(dict.fromkeys(found))
 
@@ -80,7 +80,7 @@ class Graph:
 
 @by_identity(8)
 def dataflow(system: System) -> Graph:
-    """The graph of a system. Never raises: what is wrong with it stands in `findings`."""
+    """The graph of a system. Never raises: its faults are in `findings`."""
     nodes = system.contract.nodes
     found = ends(nodes, system.plan.ros.names)
     relays = {node.name for node in nodes if node.relay}
@@ -100,7 +100,7 @@ def dataflow(system: System) -> Graph:
 def wired(
     nodes: Sequence[Node], edges: Iterable[Edge], faults: Iterable[Diagnostic], spans: Mapping[str, Span | None] | None
 ) -> Graph:
-    """The graph of some nodes and edges. `spans`: where to tell of start-up deadlocks; None: not among the findings."""
+    """The graph of some nodes and edges. `spans`: where to report start-up deadlocks; None: they are not reported."""
     order = {node.name: k for k, node in enumerate(nodes)}
     edges = sorted(edges, key=lambda e: (order[e.target.node], order[e.source.node], e.target.port, e.source.port))
     fed = {edge.target for edge in edges}
@@ -167,7 +167,7 @@ def _ports(system: System, connection: Edge) -> tuple[Port, Port] | None:
         source = system.contract.node(connection.source.node).output(connection.source.port)
         return source, system.contract.node(connection.target.node).input(connection.target.port)
     except KeyError:
-        return None  # told, with its place, by avow.system.names
+        return None  # reported, with its place, by avow.system.names
 
 
 def _topic(edge: Edge, found: Ends) -> str:
@@ -177,8 +177,8 @@ def _topic(edge: Edge, found: Ends) -> str:
 
 
 def _by_topics(nodes: Sequence[Node], taken: Collection[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
-    """What one topic carries from a node that publishes it to one that listens to it. Of a topic that carries several
-    variables, those of one name belong together; otherwise there has to be one at either end."""
+    """The edge that one topic makes from a publishing node to a listening one. If a topic carries several variables,
+    those of one name belong together; otherwise there has to be one at either end."""
     listening: dict[tuple[str, str], int] = defaultdict(int)
     for at, carriers in found.inputs.items():
         for topic in {carrier.topic for carrier in carriers}:
@@ -247,7 +247,7 @@ def _by_names(
             others = [(name, output) for name, output in outputs[port.name] if name != node.name]
             if target in taken:
                 edge = taken[target]
-                if edge.implied or edge.source.node in relays:  # heard on a topic: no connection chose it
+                if edge.implied or edge.source.node in relays:  # received on a topic: no connection chose it
                     also = [Endpoint(name, o.name) for name, o in others if fits(o.sort, port.sort)]
                     faults += [_beside(edge, at, port) for at in also if at not in found.outputs]
                 continue

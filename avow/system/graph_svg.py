@@ -1,4 +1,4 @@
-"""The dataflow graph as a drawing: layers from left to right, no tool needed; and as text for a terminal."""
+"""The dataflow graph as a drawing, with layers from left to right, without any tool; and as text for a terminal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ARROWHEAD = (
 def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
     """Graphs below one another as SVG, as `avow.system.folding.seen` gives them: a system whose subsystems are nodes,
     and the inside of each, in a frame with its name. Delayed edges are dashed; inputs from the environment are in
-    italics, before who reads them; nodes that are composed of others have a double border."""
+    italics, before the nodes that read them; nodes that are composed of others have a double border."""
     names = {name for name, _ in parts if name}
     body: list[str] = []
     width = height = 0
@@ -97,7 +97,7 @@ _GAP = "\0"
 
 
 def _columns(graph: Graph) -> tuple[list[list[str]], list[_Link]]:
-    """What stands in each column, and the lines; a line over several columns keeps a gap free in each between."""
+    """The contents of each column, and the lines; a line over several columns keeps a gap free in each one between."""
     layers = _layers(graph)
     columns: list[list[str]] = [[], *(list(layer) for layer in layers)]
     level = {name: k + 1 for k, layer in enumerate(layers) for name in layer}
@@ -109,7 +109,7 @@ def _columns(graph: Graph) -> tuple[list[list[str]], list[_Link]]:
     for endpoint in graph.environment:
         inputs.setdefault(endpoint.node, []).append(endpoint.port)
     for node, ports in inputs.items():
-        # one word for all that a node reads from outside, beside it: a shared one would draw lines across everything
+        # one label for all that a node reads from outside, beside it: a shared one would draw lines across everything
         name = f"{_INPUT}{node}{_GAP}{', '.join(ports)}"
         level[name] = level[node] - 1
         columns[level[name]].append(name)
@@ -144,7 +144,7 @@ def _middle(rows: Sequence[float]) -> float:
 
 
 def text(graph: Graph, outside: str = "environment") -> str:
-    """The graph as lines of text: what each node gets from where, providers first; `outside`: what else there is."""
+    """The graph as lines of text: the inputs of each node and their sources, providers first; `outside`: the rest."""
     lines: list[str] = []
     for layer in _layers(graph):
         for node in layer:
@@ -158,7 +158,7 @@ def text(graph: Graph, outside: str = "environment") -> str:
 
 
 def texts(parts: Sequence[tuple[str, Graph]]) -> str:
-    """As `text`, of a system and of the inside of each of its subsystems (`avow.system.folding.seen`)."""
+    """As `text`, for a system and for the inside of each of its subsystems (`avow.system.folding.seen`)."""
     found = []
     for name, graph in parts:
         lines = text(graph, "from outside" if name else "environment")
@@ -174,7 +174,7 @@ def _edge_text(edge: Edge) -> str:
 
 
 def _layers(graph: Graph) -> list[list[str]]:
-    """Longest path from the sources, over edges of the same step; loops stay together."""
+    """The longest path from the sources, over edges of the same step; loops stay together."""
     arcs = [(e.source.node, e.target.node) for e in graph.edges if not e.delayed]
     level: dict[str, int] = {}
     for group in components(graph.nodes, arcs):
@@ -208,7 +208,7 @@ def _forward(link: _Link, place: Mapping[str, tuple[int, int]]) -> str:
         middle = (x1 + x2) // 2
         path += f" C{middle},{y1} {middle},{y2} {x2},{y2}"
     (x1, y1), (x2, y2) = points[0], points[1]
-    if link.through:  # a long line has room for its words above its level part
+    if link.through:  # a long line has room for its label above its level part
         (x1, y1), (x2, y2) = points[1], points[2]
     return _line(path, link, ((x1 + x2) // 2, (y1 + y2) // 2 - 5))
 

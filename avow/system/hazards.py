@@ -1,4 +1,4 @@
-"""Hazards of a system and what mitigates each: a YAML file of one entry per hazard, or a table of an STPA in CSV.
+"""Hazards of a system and the mitigations of each: a YAML file of one entry per hazard, or an STPA table in CSV.
 
 Severity and exposure have the levels of MIL-STD-882E, tables I and II. A mitigation is a requirement (``REQ1``), a node
 (``agent``: all of its guarantees), a guarantee (``agent.stop``), an input (``agent.command``: no message from outside
@@ -43,7 +43,7 @@ _LISTS = ("causes", "consequences", "mitigated_by")
 def read_hazards(
     plan: Path, pieces: Iterable[Piece]
 ) -> tuple[tuple[tuple[Hazard, ...], tuple[Path, ...]], tuple[Diagnostic, ...]]:
-    """The hazards in the files that a plan names under `hazards`, and those files; what is wrong with them."""
+    """The hazards in the files that a plan names under `hazards`, those files, and the faults in them."""
     found: list[Hazard] = []
     files: list[Path] = []
     faults: list[Diagnostic] = []
@@ -89,7 +89,7 @@ def _document(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnos
 
 
 def _table(data: bytes, file: str) -> tuple[tuple[Hazard, ...], tuple[Diagnostic, ...]]:
-    """Rows of a CSV file with a line of headings; several causes, consequences or mitigations are set apart by `;`."""
+    """Rows of a CSV file with a line of headings; several causes, consequences or mitigations are separated by `;`."""
     try:
         reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]

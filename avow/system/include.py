@@ -1,9 +1,9 @@
-"""Another system's folder as a subsystem: its nodes are taken in, wired among themselves as there.
+"""Another system's folder as a subsystem: its nodes are included, connected among themselves as there.
 
-They bear the subsystem's name before their own (`left_camera`), so that one folder may be taken in more than once.
-What its plan assumes of the environment is assumed here of inputs that stay open; an input that something here provides
-has to be shown to be as its nodes assume. Methods, scenario, requirements and policy are not taken over: they are the
-other system's.
+Their names are prefixed with the subsystem's name (`left_camera`), so that one folder may be included more than once.
+The assumptions of its plan about the environment are assumed here for inputs that stay open; for an input that is
+provided here, the assumptions of its nodes have to be shown. Methods, scenario, requirements and policy are not
+included: they belong to the other system.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Load = Callable[[Path], System]
 
 
 def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
-    """Plan and contract with the systems that the plan's subsystems name taken in; what is wrong with them."""
+    """Plan and contract with the systems included that the plan's subsystems name; the faults found."""
     faults: list[Diagnostic] = []
     groups: list[Subsystem] = []
     for subsystem in plan.subsystems:
@@ -50,7 +50,7 @@ def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract,
 
 
 def still_open(system: System, graph: Graph) -> System:
-    """Of inputs that something here provides, what was said of them where they were taken from is not assumed here."""
+    """For inputs that are provided here, the included plan's assumptions are dropped."""
     kept = tuple(
         entry
         for entry in system.plan.environment
@@ -101,7 +101,7 @@ def _taken_in(
     for at in graph.environment:
         name = f"{subsystem.name}.{at.port}"
         if name not in covered and f"{called(at.node)}.{at.port}" not in covered:
-            covered.add(name)  # another than what bears that name here: nothing says that they are one
+            covered.add(name)  # different from the input of that name here: nothing declares them to be one
             said.append(EnvironmentInput(name, None, None, subsystem.span, taken_in=True))
     inner = tuple(
         replace(group, name=called(group.name), members=tuple(map(called, group.members)), span=subsystem.span)
@@ -128,7 +128,7 @@ def _taken_in(
 
 
 def _names(plan: Plan, subsystem: Subsystem, part: System) -> Resolver:
-    """How the nodes taken in run: as there, within the subsystem's namespace, unless it is said here."""
+    """How the included nodes run: as there, within the subsystem's namespace, unless the plan here overrides it."""
     data = subsystem.options.data
     namespace = str(data.get("namespace", "")).strip("/") if isinstance(data, dict) else ""
     said = dict(plan.ros.names.nodes)
@@ -140,7 +140,7 @@ def _names(plan: Plan, subsystem: Subsystem, part: System) -> Resolver:
 
 
 def _statements(subsystem: str, plan: Plan) -> Iterator[Statement]:
-    """What the other system's plan says of its environment, under the names that its inputs have here."""
+    """The other plan's assumptions about its environment, under the names that its inputs have here."""
     for statement in plan.statements:
         place, _, port = statement.place.partition(".")
         if place == "environment":

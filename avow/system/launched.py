@@ -1,7 +1,7 @@
-"""Launch files of a plan: they say how the contract's nodes are called when they run, and what remaps their topics.
+"""Launch files of a plan: they give the run-time names of the contract's nodes and the remappings of their topics.
 
-A started node is the contract's node of the name that the plan gives it, else of its own last name. What the plan says
-beside has to agree: a topic that the two resolve otherwise is an error that names both.
+A started node is the contract's node to which the plan gives that name, otherwise the one called like its own last
+name. The plan has to agree: a topic that the two resolve differently is an error that names both.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from avow.system.strict_yaml import Piece
 
 
 def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None, tuple[Diagnostic, ...]]:
-    """What the plan's launch files start; None where it names none. They lie in the workspace, or in the system's
-    folder where that is in none."""
+    """What the plan's launch files start; None if it names none. They are in the workspace, or in the system's folder
+    if that is in no workspace."""
     folder = plan.resolve().parent
     place = find_workspace(folder)
     root = place.root if place is not None else folder
@@ -57,7 +57,7 @@ def _value(piece: Piece) -> str:
 
 
 def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...]]:
-    """The plan with the names and remappings of its launch files, and where it says otherwise."""
+    """The plan with the names and remappings of its launch files, and the disagreements between them."""
     if plan.launched is None:
         return plan, ()
     faults: list[Diagnostic] = []
@@ -75,13 +75,13 @@ def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...
 
 
 def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnostic]:
-    """Where a node is started with other parameters than the plan's, with which its class is examined."""
+    """Diagnostics where a node is started with other parameters than the plan's, with which its class is examined."""
     source = next((entry.source for entry in plan.nodes if entry.node == node.name), None)
     if source is None or not source.python:
         return
     mine, wrong = parameters(plan.root, source, launched.name)
     if wrong:
-        return  # told where the class is examined
+        return  # reported where the class is examined
     here = dict(flat(mine))
     there, unread = _started_with(launched)
     for name, (value, span) in there.items():
@@ -100,7 +100,7 @@ def _parameters(plan: Plan, node: Node, launched: Started) -> Iterator[Diagnosti
 
 
 def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple[Diagnostic, ...]]:
-    """What a launch file surely sets for a node, and what it sets that is not read."""
+    """The parameters that a launch file certainly sets for a node, and those that it sets but that are not read."""
     there: dict[str, tuple[Any, Span]] = {}
     unread: list[Diagnostic] = []
     for setting in launched.parameters:
@@ -120,8 +120,8 @@ def _started_with(launched: Started) -> tuple[dict[str, tuple[Any, Span]], tuple
 
 
 def _set(setting: Setting, node: str) -> Iterator[tuple[str, Any]]:
-    """What a launch file's parameter, or file of parameters, sets. Raises OSError, ValueError, YAMLError and
-    WrongParameters."""
+    """The parameters that a launch file's parameter, or file of parameters, sets. Raises OSError, ValueError, YAMLError
+    and WrongParameters."""
     if not setting.value:
         raise ValueError("its value is known only when it is launched")
     if setting.name:
@@ -134,7 +134,7 @@ def _set(setting: Setting, node: str) -> Iterator[tuple[str, Any]]:
 
 
 def told(system: System) -> Iterator[Diagnostic]:
-    """What `avow check` says of launch files: what cannot be read, how each node runs, and what is started beside."""
+    """`avow check`'s findings about launch files: what cannot be read, how each node runs, what else is started."""
     launched = system.plan.launched
     if launched is None:
         return
@@ -179,7 +179,7 @@ def _texts(members: object) -> list[str]:
 
 
 def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) -> Started | None:
-    """The started node that a node of the contract is; None where there is none, or it is not clear which."""
+    """The started node that is this node of the contract; None if no node is, or if it is ambiguous."""
     assert plan.launched is not None
     every = [s for s in plan.launched.nodes if s.name]
     if mine.named:
@@ -207,8 +207,8 @@ _NAME_IT = "ros: {nodes: {NODE: {name: /…}}}"
 
 
 def _doubted(plan: Plan, node: Node, mine: Placed, launched: Started | None) -> Iterator[Diagnostic]:
-    """An error where a node's topics hang on what cannot be read, and the plan does not say how it is called: no link
-    of them could be called agreed."""
+    """An error if a node's topics depend on something that cannot be read, and the plan does not give its name: none of
+    their links could be confirmed."""
     assert plan.launched is not None
     modelled = plan.model.data if isinstance(plan.model.data, dict) else {}
     elsewhere = node.relay or node.name in {**modelled.get("compound", {}), **modelled.get("external", {})}
@@ -226,9 +226,9 @@ def _doubted(plan: Plan, node: Node, mine: Placed, launched: Started | None) -> 
 
 
 def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diagnostic]:
-    """Topics that the plan's remappings name otherwise than the launch file's."""
+    """Topics that the plan's remappings resolve differently from the launch file's."""
     if launched.unread:
-        return  # what was not read may be what the plan says
+        return  # the part that was not read may agree with the plan
     there = Placed(launched.name, launched.remaps)
     here = Placed(launched.name, mine.remaps)
     for old, _ in mine.remaps:

@@ -1,5 +1,5 @@
-"""A plan with what it leaves to the contract: the guarantees of its methods, and what the names in a requirement mean
-there, which a validation covers."""
+"""A plan completed from the contract: the guarantees of its methods, and the meaning there of the names in a
+requirement, which a validation covers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _WORD = re.compile(r"\w+")
 
 
 def completed(plan: Plan, contract: Contract) -> System:
-    """The system of a plan and its contract: each method that names no guarantee takes on all of its node's, and each
-    requirement knows what its words rest on.
+    """The system of a plan and its contract: each method that names no guarantee is given all of its node's, and each
+    requirement gets a digest of what its words depend on.
 
     For each node under `supported_by` these are its guarantees (or the one named) and assumptions, for each node that
     the formula names its ports; for both the connections to the node and the types of ports; and the constants,
@@ -63,14 +63,14 @@ def completed(plan: Plan, contract: Contract) -> System:
 
 
 def _promised(node: Node, name: str | None = None) -> Iterator[str]:
-    """What a node guarantees, all of it or one clause, and under which assumptions."""
+    """The guarantees of a node, all of them or one clause, and its assumptions."""
     guarantees = [g for g in node.guarantees if name in (None, g.name)]
     for clause in (*guarantees, *(node.assumptions if guarantees else ())):
         yield repr((node.name, clause.name, " ".join((clause.sentence or "").split()), show_term(clause.formula)))
 
 
 def _placed(node: Node, plan: Plan) -> Iterator[str]:
-    """What a node's ports are, and what is connected to its inputs."""
+    """A node's ports, and what is connected to its inputs."""
     for port in (*node.inputs, *node.outputs):
         yield repr((node.name, port.role.name, port.name, show_sort(port.sort)))
     for topic in node.topics:

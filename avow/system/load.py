@@ -1,4 +1,4 @@
-"""From a folder (or bare .rcl files) to a checked `System`: the front door of everything that follows."""
+"""From a folder (or bare .rcl files) to a checked `System`: where every later stage starts."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ PLAN_FILE = "plan.yaml"
 
 def load_system(folder: Path, shelf: Shelf | None = None) -> System:
     """The system whose plan.yaml is in `folder`. A folder without a plan but with .rcl files is a bare system. `shelf`:
-    where it is kept what the nodes say.
+    the cache of what the nodes declare.
 
-    Raises Rejected with every fault found in the plan, in the contract, and in the systems that it takes in.
+    Raises Rejected with every fault found in the plan, in the contract, and in the systems that it includes.
     """
     try:
         return _load(folder, (), {}, shelf)
@@ -38,7 +38,7 @@ def load_system(folder: Path, shelf: Shelf | None = None) -> System:
 
 
 def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], shelf: Shelf | None) -> System:
-    """`within`: the folders of the systems that take this one in; `known`: those loaded already."""
+    """`within`: the folders of the systems that include this one; `known`: those already loaded."""
     path = folder / PLAN_FILE
     if not path.is_file():
         if path.is_symlink() and not path.exists():
@@ -59,10 +59,10 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System], she
 
 
 def load_texts(path: Path, text: str, contract: Contract | None = None) -> System:
-    """The system that a plan's file would be the plan of, if `text` were its text and its files declared `contract`;
-    without one, what they declare as they are.
+    """The system that a plan's file would describe if it had this `text` and its files declared `contract`; by default,
+    what they declare now.
 
-    Raises Rejected, with what stops the loading.
+    Raises Rejected, with the faults that stop the loading.
     """
     plan, root, faults = read_plan(path, text)
     if contract is None:

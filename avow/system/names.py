@@ -1,5 +1,5 @@
-"""The names in a plan, held against the contract: nodes, ports, guarantees, tables' arities, and whether a scenario's
-values are of the types that they are given for; all located."""
+"""The names in a plan, checked against the contract: nodes, ports, guarantees, tables' arities, and whether a
+scenario's values have the required types; all located."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _FORMER_NAME = re.compile(rf"((?:^|/)(?:sanity|[^/]*\*[^/]*)/)({'|'.join(_FORMER
 
 
 def renamed(obligation: str) -> str | None:
-    """Today's id of a sanity claim, or pattern of such ids, given the one that named the fault; None for any other."""
+    """The current id of a sanity claim, or pattern of such ids, given the old id with the fault; None for any other."""
     today = _FORMER_NAME.sub(lambda found: found[1] + _FORMER[found[2]], obligation)
     return today if today != obligation else None
 
 
 def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
-    """Everything that the plan names and the contract does not have."""
+    """A diagnostic for everything that the plan names and the contract does not have."""
     nodes = {node.name: node for node in contract.nodes}
     return (
         *_connections(plan, root, nodes),
@@ -57,7 +57,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
 
 
 def ports_named(name: str, nodes: Iterable[Node]) -> tuple[tuple[Node, Port], ...]:
-    """The ports that a plan means by ``in.p``, ``out.p`` (of every node) or ``node.p`` (either side of one node)."""
+    """The ports that a plan denotes by ``in.p``, ``out.p`` (of every node) or ``node.p`` (either side of one node)."""
     owner, _, port = name.partition(".")
     found: list[tuple[Node, Port]] = []
     for node in nodes:
@@ -80,7 +80,7 @@ def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Di
                 name, _, port = item.text.partition(".")
                 where = f"connections[{index}].{key}"
                 if name in subsystems:
-                    continue  # avow.system.subsystems finds out whose port it is
+                    continue  # avow.system.subsystems determines whose port it is
                 if name not in nodes:
                     yield _unknown(f"{where}: node", name, nodes, item.span)
                     continue
@@ -139,7 +139,7 @@ def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnost
 
 def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     piece = root.at("nodes")
-    own = [name for name, node in nodes.items() if not node.relay]  # of a topic's wiring there is nothing to show
+    own = [name for name, node in nodes.items() if not node.relay]  # a topic's wiring has nothing to show
     for entry in plan.nodes:
         node = nodes.get(entry.node)
         if node is None or node.relay:
@@ -154,7 +154,7 @@ def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnost
 
 
 def _running(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
-    """What the plan says of nodes as they run."""
+    """Checks what the plan says about nodes as they run."""
     for path in (("model", "compound"), ("model", "external"), ("ros", "nodes")):
         for name, span, _ in root.keyed(*path):
             if name not in nodes:
@@ -226,7 +226,7 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 
 
 def _unusable(where: str, texts: tuple[str, ...], sort: s.Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
-    """The first of the values that is none of the sort."""
+    """The first of the values that is not of the sort."""
     for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
         reason = _wrong(text, sort, contract)
         if reason is not None:
@@ -236,7 +236,7 @@ def _unusable(where: str, texts: tuple[str, ...], sort: s.Sort, contract: Contra
 
 
 def _domain_sort(sort: s.Sort) -> s.Sort:
-    """What the values under ``domains`` of a port are: a relation's are places, another function's its results."""
+    """The meaning of a port's values under ``domains``: places for a relation, results for another function."""
     if not isinstance(sort, s.FunctionSort):
         return sort
     if sort.result != s.BOOL:

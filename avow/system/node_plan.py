@@ -1,5 +1,5 @@
-"""What a plan says of a node: how its guarantees are to be verified (`methods`), and which program it is (`source`,
-`numbers`, `memory`), with the parameters that it is made with."""
+"""The plan's entry for a node: how its guarantees are to be verified (`methods`), and which program implements it
+(`source`, `numbers`, `memory`), with its parameters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
 
 
 def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Diagnostic, ...]]:
-    """The methods of a node, each with an id of its own; what is wrong with them."""
+    """The methods of a node, each with a unique id; and their faults."""
     found: list[Method] = []
     faults: list[Diagnostic] = []
     used: set[str] = set()
@@ -40,14 +40,14 @@ def read_methods(node: str, piece: Piece) -> tuple[tuple[Method, ...], tuple[Dia
 
 
 READ_MESSAGES = ("rosmonitoring", "hypothesis")
-"""The methods to which a node's own `mapping` is given: they read messages, and have an option of that name."""
+"""The methods that get a node's own `mapping`: they read messages, and have an option of that name."""
 
 
 def _with_mapping(options: Piece, shared: Piece) -> Piece:
-    """A method's options with the node's mapping; what the method says of a variable itself comes first."""
+    """A method's options with the node's mapping; the method's own entry for a variable takes precedence."""
     own = options.at("mapping") or Piece(shared.span, entries={})
     if own.entries is None or shared.entries is None:
-        return options  # told by the schemas
+        return options  # reported by the schemas
     both = replace(own, entries=shared.entries | own.entries, keys=shared.keys | own.keys)
     return replace(options, entries={**(options.entries or {}), "mapping": both})
 
@@ -60,7 +60,7 @@ def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], fault
         if options.value is None and options.entries is None and options.items is None and not options.text:
             options = Piece(options.span, entries={})
     if options.entries is None and (options.items is not None or not isinstance(options.value, str)):
-        # A bare text (`review: reviews/x.yaml`) is for the backend's own schema to take or refuse.
+        # A bare text (`review: reviews/x.yaml`) is accepted or rejected by the backend's own schema.
         faults.append(
             Diagnostic("PLAN105", f"nodes.{node}: the options of {backend!r} must be a mapping", options.span)
         )
@@ -84,7 +84,7 @@ def _method(node: str, item: Piece, mapping: Piece | None, used: set[str], fault
 
 
 def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnostic]) -> tuple[str, ...]:
-    """The clauses that a method names; none where the plan does not say, which stands for all of the node's."""
+    """The clauses that a method names; empty if the plan names none, which means all of the node's."""
     if piece is None:
         return ()
     where = f"nodes.{node}: {method}: guarantees"
@@ -103,11 +103,11 @@ def _taken_on(node: str, method: str, piece: Piece | None, faults: list[Diagnost
 # -- source ------------------------------------------------------------------------------------------------------------
 
 HELD = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort)
-"""What an attribute may hold between two steps."""
+"""The values that an attribute may hold between two steps."""
 
 
 def read_source(name: str, node: Piece) -> tuple[Source | None, tuple[Diagnostic, ...]]:
-    """What the plan says of a node's source; what in it does not go together."""
+    """The plan's entry for a node's source; and contradictions in it."""
     piece, numbers, memory = node.at("source"), node.at("numbers"), node.at("memory")
     if piece is None:
         alone = [(key, part) for key, part in (("numbers", numbers), ("memory", memory)) if part is not None]
@@ -153,7 +153,7 @@ def files_of(node: Piece) -> list[Piece]:
 
 
 def check_memory(plan: Plan, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
-    """The ports that a plan calls memory, held against the contract."""
+    """The ports that a plan declares as memory, checked against the contract."""
     for entry in plan.nodes:
         node = nodes.get(entry.node)
         if node is None or entry.source is None:
@@ -179,8 +179,8 @@ def check_memory(plan: Plan, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 
 
 def parameters(root: Path, source: Source, name: str) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
-    """What the class is made with; of a parameter file of ROS 2, what it sets for the node of this whole name. A YAML
-    that another reader may take otherwise is refused."""
+    """The parameters of the class; from a ROS 2 parameter file, those set for the node of this whole name. YAML that
+    another reader may interpret differently is rejected."""
     if not source.parameters:
         return {}, ()
     place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
@@ -228,7 +228,7 @@ def never_read(plan: Plan) -> Iterator[Diagnostic]:
 
 
 def _unclear(strict: Any, loaded: Any, where: str) -> Iterator[str]:
-    """Where YAML's own reader takes a text otherwise than it looks, or has what no parameter is."""
+    """Where YAML's own reader interprets a text differently from its appearance, or a value is no parameter's."""
     if isinstance(loaded, dict):
         if not isinstance(strict, dict) or set(strict) != set(loaded):
             yield f"{where or 'the mapping'} has keys that are no plain texts"

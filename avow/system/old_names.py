@@ -12,7 +12,7 @@ VALIDATION_BEFORE = {
     "confirmed": {"who": "who", "on": "date", "sentence": "sentence"},
     "amounts": {key: key for key in ("says", "because", "who", "date", "until")},
 }
-"""What became of the keys of the entries that are one now, `validation`."""
+"""For each old entry that `validation` replaces, the new name of each of its keys."""
 
 
 def rename_old_keys(root: Piece) -> tuple[Diagnostic, ...]:
@@ -29,7 +29,7 @@ def _renamed(root: Piece) -> Iterator[Diagnostic]:
 
 
 def _joined(requirement: Piece) -> Iterator[Diagnostic]:
-    """What `confirmed` and `amounts` say, as one `validation`."""
+    """The content of `confirmed` and `amounts`, as one `validation`."""
     entries = requirement.entries
     if not entries or "validation" in entries or not VALIDATION_BEFORE.keys() & entries.keys():
         return
@@ -37,7 +37,7 @@ def _joined(requirement: Piece) -> Iterator[Diagnostic]:
     for old, keys in VALIDATION_BEFORE.items():
         piece = entries.get(old)
         if piece is None or not set(piece.entries or ()) <= keys.keys():
-            continue  # its shape is wrong: that is reported of the old name
+            continue  # its shape is wrong: reported under the old name
         del entries[old]
         span = requirement.keys.pop(old, piece.span)
         validation = validation or Piece(piece.span, entries={})

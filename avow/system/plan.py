@@ -1,4 +1,4 @@
-"""plan.yaml as data: what a person decides about a system.
+"""plan.yaml as data: a person's decisions about a system.
 
 Reading, validation and located errors are in `avow.system.plan_file`; nothing here touches the disk.
 Every part that can be wrong keeps its place in the file, so that a later stage can point at it.
@@ -26,7 +26,7 @@ from avow.ros.names import Resolver
 class Located:
     """A piece of YAML as plain data, with the place of every key and item in it.
 
-    `spans` maps a path, such as ``("predicates", "in.r")`` or ``("select", 0)``, to where its value stands.
+    `spans` maps a path, such as ``("predicates", "in.r")`` or ``("select", 0)``, to the position of its value.
     """
 
     data: Any
@@ -43,7 +43,7 @@ class Located:
 
 
 NOWHERE = Located({}, Span("", 1, 1, 1, 1))
-"""What nobody has written."""
+"""Values that the plan's author did not write."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +67,9 @@ class Edge:
     initial: str | None = None
     """An RCL formula over ``out.<port>`` of the source or a value, as text; None: any value."""
     implied: bool = False
-    """By a topic, or by names and types: the plan has no connection there."""
+    """Made by a topic, or by names and types: the plan has no connection there."""
     topic: str = field(default="", compare=False)
-    """The topic that carries it, by its whole name; empty where an end has none."""
+    """The topic that carries it, by its whole name; empty if an end has none."""
     span: Span | None = field(default=None, compare=False, repr=False)
     initial_span: Span | None = field(default=None, compare=False, repr=False)
 
@@ -79,7 +79,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentInput:
-    """What is assumed of an input that no node provides, and why that may be believed."""
+    """The assumption about an input that no node provides, and the reason to believe it."""
 
     port: str
     """``in.wayP`` (every node's input of that name) or ``agent.wayP``."""
@@ -89,35 +89,35 @@ class EnvironmentInput:
     constant: bool = False
     """Whether its value is the same at every step (a map, a setting)."""
     stays: str = ""
-    """Why it may be believed to be."""
+    """The reason to believe it."""
     assume_span: Span | None = field(default=None, compare=False, repr=False)
     taken_in: bool = False
-    """Whether another system's plan says it, which is a subsystem here (`avow.system.include`)."""
+    """Whether it comes from another system's plan, which is a subsystem here (`avow.system.include`)."""
 
     @property
     def constancy(self) -> str:
-        """What the claim that it does not change is called, and the plan's place for its words."""
+        """The name of the claim that it does not change, and the plan's place for the statement about it."""
         return f"{self.port}.constant" if self.assume else self.port
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """What a person says of something that results rest on without its being shown, in words for any reader.
+    """A person's statement about something that results rely on without its being shown, in words for any reader.
 
-    `place` says of what: ``environment.in.r``, ``environment.in.r.constant``, ``D1.persistence``, ``D1.one-output``,
-    ``D1.entered``, ``assumptions.<method>.<word>`` or ``requirements.REQ1.validation``.
+    `place` says what it is about: ``environment.in.r``, ``environment.in.r.constant``, ``D1.persistence``,
+    ``D1.one-output``, ``D1.entered``, ``assumptions.<method>.<word>`` or ``requirements.REQ1.validation``.
     """
 
     place: str
     says: str = ""
-    """At most 14 words, none of them a name from a contract; empty where nobody has found any yet."""
+    """At most 14 words, none of them a name from a contract; empty if not yet written."""
     because: str = ""
     who: str = ""
-    """Who keeps it true; empty: nobody is named."""
+    """Who is responsible for keeping it true; empty: no one is named."""
     until: str = ""
-    """The last day (ISO 8601) on which it may be relied upon; empty: no day is named."""
+    """The last day (ISO 8601) on which it may be relied upon; empty: none is given."""
     date: str = field(default="", metadata=codec.LATER)
-    """The day (ISO 8601) on which it was supposed; empty: no day is named."""
+    """The day (ISO 8601) on which it was assumed; empty: none is given."""
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
@@ -142,9 +142,9 @@ STEP_LENGTH = "dt"
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A finite interpretation, used by every bounded check; a verdict from it says that it is bounded.
+    """A finite interpretation, used by every bounded check; a verdict based on it says that it is bounded.
 
-    `interpret` says of a relation- or function-typed port at which rows it holds (``in.wayP`` → table, columns);
+    `interpret` gives the rows at which a relation- or function-typed port holds (``in.wayP`` → table, columns);
     `domains` gives a quantified sort or an input its finite range (``NATURAL`` → ``places.id`` or a list of values).
     """
 
@@ -153,9 +153,9 @@ class Scenario:
     domains: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     steps: int | None = None
     digest: str = ""
-    """Of all of it."""
+    """Digest of all of it."""
     content: str = ""
-    """Digest of tables, interpretation and domains: for what does not ask how far a bounded check goes (`steps`)."""
+    """Digest of tables, interpretation and domains: for results independent of the bound of a check (`steps`)."""
 
     def table(self, name: str) -> Table:
         """Raises KeyError."""
@@ -165,16 +165,16 @@ class Scenario:
         raise KeyError(name)
 
     def interpreted(self, node: str, port: Port) -> tuple[str, tuple[str, ...]] | None:
-        """Table and columns of a node's port: what is said of this node's comes before what is said of every node's."""
+        """Table and columns of a node's port: an entry for this node takes precedence over one for every node."""
         return self.interpret.get(f"{node}.{port.name}") or self.interpret.get(port.variable.qualified)
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way in which a node's guarantees are settled: a backend and its options, as the plan gives them.
+    """One way to discharge a node's guarantees: a backend and its options, as the plan gives them.
 
-    `id` tells several methods of one node apart (``hoare``, ``dafny``, ``ajpf-edge``); `guarantees` and
-    `assumptions` are clause names that it takes on (by default every guarantee).
+    `id` distinguishes several methods of one node (``hoare``, ``dafny``, ``ajpf-edge``); `guarantees` and `assumptions`
+    are the names of the clauses that it covers (by default every guarantee).
     """
 
     id: str
@@ -184,33 +184,33 @@ class Method:
 
 
 class Numbers(StrEnum):
-    """What a REAL is where a node's source runs."""
+    """The meaning of REAL where a node's source runs."""
 
     EXACT = "exact"
-    """A number as in the contract: nothing is rounded."""
+    """An exact number as in the contract: nothing is rounded."""
     FLOAT64 = "float64"
     """An IEEE 754 double, rounded to nearest, ties to even."""
     FLOAT32 = "float32"
-    """Likewise, of 32 bits."""
+    """An IEEE 754 float of 32 bits, rounded likewise."""
 
 
 class Driving(StrEnum):
     """How a node's class is driven."""
 
     STEP = "step"
-    """By its method `step`, which is given inputs and returns outputs."""
+    """By its method `step`, which takes inputs and returns outputs."""
     ROSPY = "rospy"
-    """By its callbacks: subscribers and timers of ROS 1."""
+    """By its ROS 1 callbacks: subscribers and timers."""
     RCLPY = "rclpy"
-    """By its callbacks: subscriptions and timers of ROS 2."""
+    """By its ROS 2 callbacks: subscriptions and timers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The program that is the node, declared once for every method that looks at it.
+    """The program that implements the node, declared once for every method that uses it.
 
-    Paths are relative to the system's folder; empty: there is none. `memory` maps an input of the node (and the output
-    of its name, if there is one) to the attribute that holds it between two steps: its value before, and after.
+    Paths are relative to the system's folder; empty: none. `memory` maps an input of the node (and the output of its
+    name, if it exists) to the attribute that holds it between two steps: its value before, and after.
     """
 
     python: str = ""
@@ -218,7 +218,7 @@ class Source:
     cpp: str = ""
     """The adapter header of the C++ source."""
     parameters: str = ""
-    """A YAML file: one mapping, which the class is made with."""
+    """A YAML file with one mapping: the parameters with which the class is constructed."""
     numbers: Numbers = Numbers.FLOAT64
     memory: Mapping[str, str] = field(default_factory=dict)
     """Port → attribute, without ``self.``."""
@@ -233,14 +233,14 @@ class NodePlan:
     methods: tuple[Method, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     title: str = ""
-    """What people call it, in a report's first screen; empty: its name, taken apart into words."""
+    """Its name in a report's first screen; empty: its name in the contract, split into words."""
     source: Source | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """A named person's word that a requirement's formula, or the guarantees named under a sentence without one, say
-    what its sentence asks for. Why, and until when, stands in the `Statement` of its place."""
+    """A named person's confirmation that a requirement's formula, or the guarantees named under a sentence without one,
+    express its sentence. The reason, and the date until which it is valid, are in the `Statement` of its place."""
 
     who: str
     date: str
@@ -254,7 +254,7 @@ class Validation:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A system requirement in a person's words; a formula or a temporal property where there is one.
+    """A system requirement in a person's words, with a formula or a temporal property if it has one.
 
     `supported_by` names guarantees (``agent.next_place``), derivations (``D1``) or whole nodes (``agent``).
     """
@@ -266,26 +266,26 @@ class Requirement:
     supported_by: tuple[str, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     formula_span: Span | None = field(default=None, compare=False, repr=False)
-    """Where the formula or the temporal property stands."""
+    """The position of the formula or the temporal property."""
     validation: Validation | None = None
     linked: str = ""
-    """Digest of what the names under `supported_by` say in the contract: see `avow.system.links`."""
+    """Digest of what the contract says about the names under `supported_by`: see `avow.system.links`."""
     source: str = ""
     """The document that it comes from, and the place in it."""
 
     @property
     def sentence_digest(self) -> str:
-        """Of the sentence, without regard to white space."""
+        """Digest of the sentence, ignoring white space."""
         return sha256(" ".join(self.text.split()))[:16]
 
     @property
     def formula_digest(self) -> str:
-        """Of formula or temporal property, and of what is linked to it: names, and what they say."""
+        """Digest of the formula or temporal property, and of what is linked to it: names, and their meaning."""
         return sha256(repr((self.formula or "", self.temporal or "", *sorted(self.supported_by), self.linked)))[:16]
 
     @property
     def validated(self) -> bool:
-        """Whether a person has read sentence and formula as they stand."""
+        """Whether a person has read the current sentence and formula."""
         if self.validation is None:
             return False
         said = self.validation.sentence, self.validation.formula
@@ -293,12 +293,12 @@ class Requirement:
 
     @property
     def outdated(self) -> bool:
-        """Whether a person has read another sentence or formula."""
+        """Whether a person has read an earlier sentence or formula."""
         return self.validation is not None and bool(self.validation.sentence) and not self.validated
 
     @property
     def _digest_of_both(self) -> str:
-        """As the last release had it."""
+        """The digest as the last release computed it."""
         names = sorted(self.supported_by)
         parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *names, self.linked)
         return sha256(repr(parts))[:16]
@@ -306,7 +306,7 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class Hazard:
-    """A hazard or a security goal, and what the plan says mitigates it (see `avow.system.hazards`)."""
+    """A hazard or a security goal, and its mitigations according to the plan (see `avow.system.hazards`)."""
 
     id: str
     text: str
@@ -338,10 +338,10 @@ class ComposeGoal:
 
 @dataclass(frozen=True, slots=True)
 class Subsystem:
-    """Nodes (or other subsystems) taken together as one node, whose contract is derived from theirs.
+    """Nodes (or other subsystems) combined into one node, whose contract is derived from theirs.
 
-    `options` holds the place of every member, and the reasons that a derivation may want (`ComposeGoal`). `folder` is
-    that of another system where its nodes were taken from there.
+    `options` holds the place of every member, and the reasons that a derivation may need (`ComposeGoal`). `folder` is
+    that of another system if its nodes are included from there.
     """
 
     name: str
@@ -365,13 +365,13 @@ class Finding:
     method: str | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
     matched: tuple[str, ...] = ()
-    """Where `obligation` has wildcards: what it stood for when it was written, and stands for now."""
+    """If `obligation` has wildcards: what it matched when it was written, and matches now."""
     found: str = ""
-    """The mark of what was found when it was written: it stands for that, and for no other finding of the claim."""
+    """The mark of the finding when it was written: the entry accepts that finding, and no other of the claim."""
 
 
 def is_wild(pattern: str) -> bool:
-    """Whether a finding's `obligation` may stand for several."""
+    """Whether a finding's `obligation` may match several obligations."""
     return "*" in pattern or "?" in pattern
 
 
@@ -392,13 +392,13 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Ros:
-    """What the plan says of ROS: the distribution whose message types hold, and how the nodes and topics are called."""
+    """The plan's entry for ROS: the distribution whose message types apply, and the names of nodes and topics."""
 
     distro: str | None = None
     names: Resolver = field(default_factory=Resolver)
     shared: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    """The topics that several nodes publish, and those nodes, by their whole names: a message need not say whose it
-    is."""
+    """The topics that several nodes publish, and those nodes, by their whole names: a message need not identify its
+    publisher."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -422,19 +422,19 @@ class Plan:
     """None: no reproduction of known-bad material; a tuple (even empty): strict both ways."""
     accepted: tuple[Finding, ...] = ()
     plugins: tuple[str, ...] = ()
-    """Modules that hold further backends."""
+    """Modules with further backends."""
     lints_off: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     subsystems: tuple[Subsystem, ...] = ()
     statements: tuple[Statement, ...] = ()
     ros: Ros = Ros()
     launched: Launched | None = None
-    """What the launch files start; None where the plan names none."""
+    """What the launch files start; None if the plan names none."""
     included: tuple[Path, ...] = ()
-    """Files of hazards, launch files, and files of other systems that were taken in as subsystems: what is said here
-    depends on them too."""
+    """Files of hazards, launch files, and files of other systems that are included as subsystems: this plan depends on
+    them too."""
     old_names: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
-    """A warning for each key that has its old name."""
+    """A warning for each key with its old name."""
     hazards: tuple[Hazard, ...] = ()
 
     @property
@@ -444,7 +444,7 @@ class Plan:
 
     @property
     def off(self) -> frozenset[str]:
-        """The lints that are switched off: codes, and what would be said of topics of an input that is memory."""
+        """The lints that are switched off: codes, and lints about topics of an input that is memory."""
         memory = ((entry.node, port) for entry in self.nodes if entry.source for port in entry.source.memory)
         return frozenset((*self.lints_off, *(uncarried(node, f"in.{port}") for node, port in memory)))
 
@@ -458,7 +458,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """A checked contract and the plan for it: what every later stage works on."""
+    """A checked contract and the plan for it: the input of every later stage."""
 
     plan: Plan
     contract: Contract

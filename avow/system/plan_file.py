@@ -1,6 +1,6 @@
-"""Reads plan.yaml: from text to `Plan`, with every fault located and all of them told in one go.
+"""Reads plan.yaml: from text to `Plan`, with every fault located and all of them reported at once.
 
-It needs no contract, whose files the plan names: `avow.system.names` then holds the plan's names against that, and
+It needs no contract, whose files the plan names: `avow.system.names` then checks the plan's names against that, and
 `avow.system.links` adds what a plan leaves to it.
 """
 
@@ -54,11 +54,10 @@ RESERVED = ("interpret", "domains", "steps")
 def read_plan(
     path: Path, text: str | None = None, shelf: Shelf | None = None
 ) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
-    """The plan in a file (or in a `text` that is to be the file's), its names not yet held against a contract; the
-    document; what is wrong with its values. `shelf`: where it is kept that a document has the
-    right shape.
+    """The plan in a file (or in a `text` that the file is to have), its names not yet checked against a contract; the
+    document; the faults in its values. `shelf`: the cache of documents that have the right shape.
 
-    Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
+    Raises Rejected if the file cannot be read or its shape is wrong; then no other fault is reported.
     """
     root, faults = _document(path) if text is None else read_yaml(text.encode("utf-8", "replace"), str(path))
     old_names = rename_old_keys(root)
@@ -71,8 +70,8 @@ def read_plan(
 
 
 def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozenset[str]]:
-    """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: to look for what else is
-    wrong, never to verify. Raises Rejected where there is no document, or nothing of it is left."""
+    """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: for finding further faults,
+    never for verifying. Raises Rejected if the file is no document, or nothing of it is left."""
     root, faults = _document(path)
     faults += rename_old_keys(root)
     faults += check_shape(root)
@@ -93,7 +92,7 @@ def _document(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
 
 
 def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
-    """The plan of a system for which nobody wrote one: names link, nothing else is decided."""
+    """The plan of a system that has no plan file: names link, nothing else is decided."""
     root = files[0].parent if files else Path()
     nowhere = Located({}, Span(str(files[0]) if files else "", 1, 1, 1, 1))
     return Plan(name, name, root / "plan.yaml", files, model=nowhere, policy=nowhere)
@@ -150,7 +149,7 @@ class _PlanReader:
         )
 
     def noted(self, read: tuple[T, Sequence[Diagnostic]]) -> T:
-        """What was read; what was wrong with it is noted."""
+        """The plan as read; its faults are noted."""
         found, faults = read
         self.faults += faults
         return found
@@ -388,7 +387,7 @@ def _value(piece: Piece) -> str:
 
 
 def _ros(root: Piece) -> tuple[Ros, list[Diagnostic]]:
-    """What a well-shaped plan says of ROS, and what is wrong with the names in it."""
+    """The entry for ROS in a well-shaped plan, and the faults in its names."""
     faults: list[Diagnostic] = []
     piece = root.at("ros")
     if piece is None:

@@ -1,8 +1,8 @@
-"""The paper's step 1 as data: a ROS graph, and how the system model was made of it.
+"""Step 1 of the paper as data: a ROS graph, and how the system model was made from it.
 
 A graph is read from DOT as rqt_graph writes it, from the output of ``rosnode info`` or ``ros2 node info``, or from
 plain lines ``a -> b : topic``. The plan says which of its nodes were dropped, which make up a compound node, and which
-nodes of the model are on no ROS graph; `account` holds the two against each other: nothing goes missing in between.
+nodes of the model are on no ROS graph; `account` compares the two, so that no node is lost in between.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Account:
 
 
 def read_ros_graph(path: Path) -> RosGraph:
-    """Raises Rejected, located, for a file that is none of the known forms."""
+    """Raises Rejected, located, for a file in none of the known forms."""
     try:
         data = read_regular(path)[: ROS_GRAPH_BYTES + 1]
         text = data.decode("utf-8-sig")
@@ -66,7 +66,7 @@ def read_ros_graph(path: Path) -> RosGraph:
 
 
 def account(system: System, dataflow: Graph) -> Account | None:
-    """The plan's `model` held against its ROS graph; None without a graph. Raises Rejected for an unreadable one."""
+    """The plan's `model` checked against its ROS graph; None without a graph. Raises Rejected for an unreadable one."""
     model = system.plan.model.data
     if not isinstance(model, dict) or "graph" not in model:
         return None
@@ -115,7 +115,7 @@ def account(system: System, dataflow: Graph) -> Account | None:
 
 
 def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -> Iterator[Diagnostic]:
-    """Data that flows between two nodes of the model according to ROS alone."""
+    """Data that flows between two nodes of the model according to ROS only."""
     linked = {(edge.source.node, edge.target.node) for edge in dataflow.edges}
     linked |= {(one, end) for one, middle in linked for start, end in linked if start == middle in dataflow.relays}
     found: dict[tuple[str, str], dict[str, None]] = {}
@@ -132,7 +132,7 @@ def _flows(graph: RosGraph, home: dict[str, str], dataflow: Graph, span: Span) -
 
 
 def _from_dot(text: str, path: Path) -> RosGraph:
-    """Boxes, and nodes that are called as rqt_graph calls topics, are topics."""
+    """Boxes, and nodes named as rqt_graph names topics, are topics."""
     try:
         graph = parse_dot(text)
     except Malformed as error:
@@ -155,7 +155,7 @@ def _from_dot(text: str, path: Path) -> RosGraph:
 
 
 def _shown(label: str, name: str) -> str:
-    """A label with its escapes, of which `\\N` is the node's name."""
+    """A label with its escapes; `\\N` is the node's name."""
     return re.sub(r"\\(.)", lambda found: name if found[1] == "N" else found[1], label)
 
 
@@ -198,7 +198,7 @@ def _fault(path: Path, line: int, message: str, column: int = 1) -> Diagnostic:
 
 
 class Malformed(Exception):  # noqa: N818 - it names what the text is
-    """No graph in DOT, or one beyond all measure; line and column count from 1."""
+    """Not a graph in DOT, or one beyond all limits; line and column count from 1."""
 
     def __init__(self, message: str, line: int = 1, column: int = 1) -> None:
         super().__init__(message)
@@ -207,7 +207,7 @@ class Malformed(Exception):  # noqa: N818 - it names what the text is
 
 @dataclass(frozen=True, slots=True)
 class DotGraph:
-    """Nodes by their names, each with its attributes; arcs as (tail, head, label)."""
+    """Nodes by name, each with its attributes; arcs as (tail, head, label)."""
 
     nodes: dict[str, dict[str, str]]
     arcs: list[tuple[str, str, str]]
@@ -232,7 +232,7 @@ def parse_dot(text: str) -> DotGraph:
 
 
 def _inside(tree: Any, found: DotGraph, nodes: Mapping[str, str], arcs: Mapping[str, str]) -> dict[str, None]:
-    """The names of the nodes of a graph or subgraph; `nodes` and `arcs`: attributes that all there have so far."""
+    """The names of the nodes of a graph or subgraph; `nodes` and `arcs`: the attributes common to all so far."""
     here: dict[str, None] = {}
     for statement in tree.children:
         match getattr(statement, "data", ""):
@@ -256,7 +256,7 @@ def _inside(tree: Any, found: DotGraph, nodes: Mapping[str, str], arcs: Mapping[
 
 
 def _end(part: Any, found: DotGraph, nodes: Mapping[str, str], arcs: Mapping[str, str]) -> dict[str, None]:
-    """What an arc begins or ends with: a node, whatever the port, or all nodes of a subgraph."""
+    """An end of an arc: a node, whatever the port, or all nodes of a subgraph."""
     if part.data == "subgraph":
         return _inside(part, found, nodes, arcs)
     name = _text(part.children[0])
@@ -270,13 +270,13 @@ def _attributes(parts: Iterable[Any]) -> dict[str, str]:
 
 
 def _seen(value: Any) -> str:
-    """Of HTML what a reader sees."""
+    """The text of HTML that a reader sees."""
     text = _text(value)
     return html.unescape(re.sub(r"<[^<>]*>", "", text)) if value.children[0].type == "HTML" else text
 
 
 def _text(word: Any) -> str:
-    """In a string only `\\"` and a line that goes on are escapes; the others are the label's."""
+    """In a string only `\\"` and a continued line are escapes; the others belong to the label."""
     first = word.children[0]
     if first.type != "STRING":
         return first[1:-1] if first.type == "HTML" else str(first)

@@ -1,4 +1,4 @@
-"""A plan held against its JSON schema, every fault told in words and at its place."""
+"""Checks a plan against its JSON schema; every fault is reported in words and with its place."""
 
 from __future__ import annotations
 
@@ -26,16 +26,15 @@ def plan_schema() -> dict[str, Any]:
 
 
 def check_shape(piece: Piece, shelf: Shelf | None = None) -> tuple[Diagnostic, ...]:
-    """Everything in which the plan departs from the schema, in the order of the file. `shelf`: where it is kept that a
-    document departs in nothing."""
+    """Every violation of the schema, in the order of the file. `shelf`: the cache of documents without violations."""
     return _faults(piece, plan_schema(), "the plan", shelf)
 
 
 def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
-    """What is left of a document without the pieces that depart from the schema, and the words of those: for looking
-    at the rest of it, never for verifying. None where nothing is left."""
+    """The rest of a document without the pieces that violate the schema, and the words of those: for checking the rest,
+    never for verifying. None if nothing is left."""
     dropped: set[str] = set()
-    for _ in range(REPAIR_ROUNDS):  # to drop a piece may leave another without what it needs
+    for _ in range(REPAIR_ROUNDS):  # dropping a piece may leave another without what it needs
         wrong = set(_wrong_places(root))
         if not wrong:
             return root, frozenset(dropped)
@@ -77,13 +76,13 @@ def _without(piece: Piece, path: tuple[str | int, ...], dropped: set[str]) -> Pi
 def violations(
     options: Located, schema: Mapping[str, Any], whole: str = "the plan", shelf: Shelf | None = None
 ) -> tuple[Diagnostic, ...]:
-    """Everything in which a part of a plan departs from a schema of its own, such as a backend's for its options.
-    `whole` is what that part is called; `shelf`: as for `check_shape`."""
+    """Every violation, in a part of a plan, of a schema of its own, such as a backend's for its options. `whole` is the
+    name of that part; `shelf`: as for `check_shape`."""
     return _faults(_piece(options, ()), schema, whole, shelf)
 
 
 def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | None) -> tuple[Diagnostic, ...]:
-    # what is said of a value is decided by its type, too, which JSON would not show
+    # the diagnostics of a value depend on its type, too, which JSON would not show
     if shelf is None:
         return _departures(piece, schema, whole)
     told = (package_version("jsonschema"), json.dumps(schema, default=repr), repr(piece.data))
@@ -98,7 +97,7 @@ def _faults(piece: Piece, schema: Mapping[str, Any], whole: str, shelf: Shelf | 
 
 def _departures(piece: Piece, schema: Mapping[str, Any], whole: str) -> tuple[Diagnostic, ...]:
     found = [d for error in _validator()(schema).iter_errors(piece.data) for d in _explain(error, piece, whole)]
-    # of what YAML repeats (`*name`) the faults stand at one place, and the validator goes by sets
+    # the faults of what YAML repeats (`*name`) have one place, and the validator uses sets
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column, d.message) if d.span else (0, 0, d.message)))
 
 
@@ -119,7 +118,7 @@ def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
 
 
 def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
-    """``connections[0].to``, for messages; `whole` where the path is empty."""
+    """``connections[0].to``, for messages; `whole` if the path is empty."""
     text = ""
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else step)
@@ -128,7 +127,7 @@ def _key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
 
 @cache
 def _validator() -> Any:
-    """The class of validators: to make one costs more than to check a plan."""
+    """The class of validators: creating one costs more than checking a plan."""
     from jsonschema import Draft202012Validator, validators  # slow to import
 
     return validators.extend(Draft202012Validator, {"pattern": _pattern})  # type: ignore[no-untyped-call]
@@ -208,12 +207,12 @@ def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
                     yield from _explain(inner, root, whole)
         case "maxProperties":
             yield Diagnostic("PLAN105", f"{where}: exactly one key is wanted{wanted}", piece.span)
-        case _:  # said in the validator's words
+        case _:  # in the validator's words
             yield Diagnostic("PLAN105", f"{where}: {str(error.message)[:300]}{wanted}", piece.span)
 
 
 def _another_kind(inner: Any, outer: Any) -> bool:
-    """Whether an alternative is out of the question: it is for a list, say, and a text stands there."""
+    """Whether an alternative is out of the question: it requires a list, say, and the value is a text."""
     at = list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
     alternative = outer.validator_value[at]
     kinds = alternative.get("type", []) if isinstance(alternative, dict) else []
@@ -221,7 +220,7 @@ def _another_kind(inner: Any, outer: Any) -> bool:
 
 
 def _nearest(errors: list[Any], outer: Any) -> list[Any]:
-    """What is wrong with the alternative that all the keys fit which are written, where there is just one."""
+    """The faults under the only alternative that all the keys present fit, if exactly one does."""
 
     def at(inner: Any) -> Any:
         return list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
@@ -233,7 +232,7 @@ def _nearest(errors: list[Any], outer: Any) -> list[Any]:
 
 
 def _alternatives(schemas: Iterable[Any]) -> str:
-    """What they are for: kinds of values, or keys that go together."""
+    """What the alternatives accept: kinds of values, or keys that go together."""
     said: list[str] = []
     for schema in schemas:
         kinds = schema.get("type", [])

@@ -1,5 +1,5 @@
-"""What the plan says, in plain words, of all that is supposed without being shown: read, and what is missing told; and
-requirements whose sentence says otherwise than their formula: the sentence is what an assessor reads."""
+"""The plan's statements, in plain words, about everything assumed without being shown: reading, and reporting missing
+ones; and requirements whose sentence contradicts their formula: the sentence is what an assessor reads."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ GENERAL = {
     "assumptions.platform.start": "Each delayed input begins with the first value that the plan gives",
     "assumptions.tools.trusted": "The tools that answered, and the trusted base, answer rightly",
 }
-"""What any evidence of a kind rests on: the place of the plan where a person answers for it, and its words."""
+"""The basis of any evidence of a kind: the place of the plan where a person answers for it, and its words."""
 _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
 
 
 def read_statements(root: Piece) -> tuple[tuple[Statement, ...], list[Diagnostic]]:
-    """Every statement of a well-shaped plan, and what is wrong with their words and dates."""
+    """Every statement of a well-shaped plan, and the faults in their words and dates."""
     faults: list[Diagnostic] = []
     return tuple(_statement(place, piece, faults) for place, piece in _places(root)), faults
 
@@ -47,7 +47,7 @@ def without_words(system: System) -> Iterator[Diagnostic]:
 
 
 def not_validated(system: System) -> Iterator[Diagnostic]:
-    """A warning for each requirement whose sentence nobody has read against its formula, as both are now."""
+    """A warning for each requirement whose current sentence has not been read against its current formula."""
     for requirement in system.plan.requirements:
         if not requirement.validated:
             read = requirement.validation
@@ -66,8 +66,8 @@ def not_validated(system: System) -> Iterator[Diagnostic]:
 
 
 def requirement_sentences(system: System) -> Iterator[Diagnostic]:
-    """The lints RCL413 to RCL415 of the plan's requirements that have a formula."""
-    from avow.language.sentences import elements_of  # not what loading a plan needs
+    """The lints RCL413 to RCL415 for the plan's requirements that have a formula."""
+    from avow.language.sentences import elements_of  # not needed to load a plan
 
     elements = elements_of(system.contract.nodes)
     for requirement in system.plan.requirements:
@@ -80,8 +80,8 @@ def requirement_sentences(system: System) -> Iterator[Diagnostic]:
 def said_otherwise(
     text: str, formula: str, contract: Contract, elements: Mapping[str, str], span: Span | None
 ) -> Iterator[Diagnostic]:
-    """What a requirement's sentence says otherwise than its formula; `elements` are the contract's (`elements_of`).
-    Raises Rejected where that is no formula."""
+    """The contradictions between a requirement's sentence and its formula; `elements` are the contract's
+    (`elements_of`). Raises Rejected if that is not a formula."""
     from avow.language.sentences import differences
 
     for found in differences(text, written_state(formula, contract, span, clause=True), elements):
@@ -89,7 +89,7 @@ def said_otherwise(
 
 
 def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> Iterator[Diagnostic]:
-    """What is wrong with the persons, reasons and days of an entry; `done` are the days on which something was."""
+    """The faults in the persons, reasons and days of an entry; `done` are the days on which something was done."""
     for key in ("who", "says", "because", "reason", *done, "until", "expires"):
         part = piece.at(key)
         if part is None:
@@ -108,7 +108,7 @@ def wrong_words(place: str, piece: Piece, done: tuple[str, ...] = ("date",)) -> 
 
 
 def _has_fixed_words(place: str) -> bool:
-    """Whether what is said at a place has words that are the same in every plan."""
+    """Whether the statement at a place has the same words in every plan."""
     return place.startswith("requirements.") or place in GENERAL
 
 
@@ -123,7 +123,7 @@ def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
         if piece.at("assume") is not None or holds:
             yield f"environment.{port}", piece
         if piece.at("assume") is not None and constant is not None and holds:
-            yield f"environment.{port}.constant", constant  # that it does not change is another matter
+            yield f"environment.{port}.constant", constant  # constancy is a separate statement
     for section in ("compose", "subsystems"):
         for goal, _, piece in root.keyed(section):
             for key, name in _ARGUMENTS.items():

@@ -1,8 +1,8 @@
-"""YAML as configuration should be: every piece keeps its place, nothing is guessed.
+"""Strict YAML for configuration: every piece keeps its place, nothing is guessed.
 
-`yaml.safe_load` takes duplicate keys in silence, reads ``off`` as False, ``1:30`` as 90 and ``010`` as 8, expands
-aliases without bound, and forgets where things stood. This reader works on PyYAML's parse events: scalars are null,
-true, false, JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used, within bounds.
+`yaml.safe_load` accepts duplicate keys silently, reads ``off`` as False, ``1:30`` as 90 and ``010`` as 8, expands
+aliases without bound, and loses positions. This reader works on PyYAML's parse events: scalars are null, true, false,
+JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used, within bounds.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Piece:
     entries: dict[str, Piece] | None = None
     keys: dict[str, Span] = field(default_factory=dict)
     size: int = 1
-    """Pieces in it, itself included, aliases expanded."""
+    """The number of pieces in it, itself included, aliases expanded."""
     depth: int = 0
 
     @property
@@ -53,7 +53,7 @@ class Piece:
         return self.value
 
     def located(self) -> Located:
-        """The same as plain data with a map of places."""
+        """The same as plain data with a map of positions."""
         return Located(self.data, self.span, dict(_places(self, ())))
 
     def at(self, *path: str | int) -> Piece | None:
@@ -70,7 +70,7 @@ class Piece:
         return piece
 
     def each(self, *path: str | int) -> list[Piece]:
-        """The pieces of the list at a path; a piece that is none stands for a list of it alone."""
+        """The pieces of the list at a path; a piece that is not a list counts as a list of one."""
         piece = self.at(*path)
         return [] if piece is None else [piece] if piece.items is None else piece.items
 
@@ -79,7 +79,7 @@ class Piece:
         return tuple(item.text for item in self.each(*path))
 
     def said(self, *path: str | int) -> str | None:
-        """The text at a path; None where there is nothing."""
+        """The text at a path; None if it is missing."""
         piece = self.at(*path)
         return None if piece is None else piece.text
 
@@ -88,7 +88,7 @@ class Piece:
         return {key: " ".join(part.text.split()) for key, part in (self.entries or {}).items() if part.items is None}
 
     def keyed(self, *path: str | int) -> Iterator[tuple[str, Span, Piece]]:
-        """Each key of the mapping at a path, with its place and what stands under it."""
+        """Each key of the mapping at a path, with its position and its value."""
         piece = self.at(*path)
         if piece is not None and piece.entries is not None:
             for name, inner in piece.entries.items():
@@ -100,7 +100,7 @@ class Piece:
 
 
 def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
-    """The document in `data`, and what is wrong in it without hindering its reading (duplicate keys, tags).
+    """The document in `data`, and its faults that do not prevent reading it (duplicate keys, tags).
 
     Raises Rejected, with the place, for anything that is not one YAML document.
     """
@@ -155,7 +155,7 @@ _PROBLEMS = (
         None,
     ),
 )
-"""What PyYAML says, as a pattern, and the same for people, with a hint."""
+"""PyYAML's message, as a pattern, and the same for people, with a hint."""
 
 
 def _in_words(problem: str) -> tuple[str, str | None]:
@@ -167,7 +167,7 @@ def _in_words(problem: str) -> tuple[str, str | None]:
 
 
 def scalar(text: str) -> Any:
-    """What a plain (unquoted) scalar means: null, a truth value, a JSON number, else text."""
+    """The meaning of a plain (unquoted) scalar: null, a truth value, a JSON number, else text."""
     if text in _WORDS:
         return _WORDS[text]
     if len(text) <= 300:
@@ -187,7 +187,7 @@ class _Frame:
 
 
 class _Builder:
-    """Builds pieces from events with a stack of its own: no nesting is too deep for Python, only for us."""
+    """Builds pieces from events with a stack of its own: Python's recursion limit does not apply, only our own."""
 
     def __init__(self, file: str) -> None:
         self.file = file

@@ -1,4 +1,4 @@
-"""What a plan says of subsystems, held against its nodes; and ports of subsystems, as connections may name them."""
+"""The plan's subsystems, checked against its nodes; and ports of subsystems, as connections may name them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _circles(groups: dict[str, Subsystem]) -> Iterator[Diagnostic]:
 
 
 def resolved(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...]]:
-    """The plan with connections between ports of nodes where it names ports of subsystems.
+    """The plan with connections between ports of nodes in place of those that name ports of subsystems.
 
     A subsystem's output is that of the one node inside that has it; its input is that of every node inside that has it
     and gets it from no other node inside.
@@ -139,7 +139,7 @@ def _targets(
     found = [
         e
         for e in _having(inside[owner], port, contract, "inputs")
-        if e not in taken and not own - {e.node}  # what another node inside gives it, it does not get from outside
+        if e not in taken and not own - {e.node}  # not an input that another node inside provides
     ]
     if not found:
         message = f"connections: {connection.target}: no node of {owner!r} reads {port!r} from outside"

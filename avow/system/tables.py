@@ -80,7 +80,7 @@ def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, 
 
 
 def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]] | str:
-    """``places(x, y, id)`` → table and columns, or what is wrong with it."""
+    """``places(x, y, id)`` → table and columns, or the fault in it."""
     found = _COLUMNS_OF.match(text)
     if not found:
         return f"{text!r} has not the form table(column, …)"
@@ -96,7 +96,7 @@ def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str,
 
 
 def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
-    """``table.column``, ``low..high``, a value or a list of values → the values as text, or what is wrong."""
+    """``table.column``, ``low..high``, a value or a list of values → the values as text, or the fault in it."""
     if piece.items is not None:
         found: dict[str, None] = {}
         for item in piece.items:
@@ -118,7 +118,7 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
 
 
 def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:
-    """``places.id`` or ``move(places.x, places.y)`` with every row's cells; other text as it stands."""
+    """``places.id`` or ``move(places.x, places.y)`` with every row's cells; other text unchanged."""
     places = [found for found in _CELL.finditer(text) if found[1] in tables]
     if not places:
         return (text,)

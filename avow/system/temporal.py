@@ -2,7 +2,7 @@
 
 `always`, `eventually`, `next` and `until` over state formulas (RCL formulas whose ports are written ``node.port``).
 From loosest to tightest: ``<=>``, ``->``, ``or``, ``and``, ``until``, then `not`, `always`, `eventually`, `next`. A
-part without temporal operators is one state formula; operators cannot stand inside a quantifier.
+part without temporal operators is one state formula; operators cannot occur inside a quantifier.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Operator(StrEnum):
-    """Temporal and propositional operators; `RELEASE` is the dual of `UNTIL` and only arises from negation."""
+    """Temporal and propositional operators; `RELEASE` is the dual of `UNTIL` and arises only from negation."""
 
     NOT = "not"
     AND = "and"
@@ -41,7 +41,7 @@ class Operator(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What one step shows."""
+    """A property of one step."""
 
     term: Term
     text: str = field(default="", compare=False)
@@ -92,21 +92,21 @@ def states_of(formula: Property) -> tuple[State, ...]:
 
 
 def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term:
-    """A claim over a system's ports, written ``node.port``: the formula, and that it has a value. Where a node has an
-    input and an output of one name, the output is meant, unless the text says ``node.in.port`` somewhere. It may speak
-    of other steps. Raises Rejected."""
+    """A claim over a system's ports, written ``node.port``: the formula, and that it has a value. If a node has an
+    input and an output of one name, the output is meant, unless the text contains ``node.in.port``. It may refer to
+    other steps. Raises Rejected."""
     return with_value(written_state(text, contract, span, clause=True))
 
 
 def written_state(text: str, contract: Contract, span: Span | None = None, *, clause: bool = False) -> Term:
-    """As `parse_state`, of the formula alone; one that is no `clause` is of one step."""
+    """As `parse_state`, for the formula only; one that is not a `clause` refers to one step."""
     from avow.language.load import parse_formula  # the grammar is slow to import
 
     return parse_formula(text, None, _heard(text, contract), span, clause=clause)
 
 
 def _heard(text: str, contract: Contract) -> Contract:
-    """Without the inputs that have the name of an output of their node, unless the text says ``node.in.port``."""
+    """Without the inputs that have the name of an output of their node, unless the text contains ``node.in.port``."""
 
     def kept(node: Node) -> tuple[Port, ...]:
         outputs = {port.name for port in node.outputs}
@@ -116,7 +116,7 @@ def _heard(text: str, contract: Contract) -> Contract:
 
 
 def _claimed(formula: Property, span: Span | None, positive: bool = True) -> Property:
-    """What a property says as a claim: a state that has no value counts against it, also under a `not`."""
+    """A property as a claim: a state without a value counts against it, also under a `not`."""
     match formula:
         case State(term=term, text=text):
             return State(with_value(term) if positive else unless_without_value(term), text)
@@ -138,8 +138,8 @@ def _mixed(part: Property) -> bool:
 
 
 def _marked(found: list[Token]) -> list[Token]:
-    """RCL's tokens. `always`, `eventually` and `next` are operators, and no names, where a formula begins and before
-    one; `until` is one everywhere."""
+    """RCL's tokens. `always`, `eventually` and `next` are operators, not names, where a formula begins and before one;
+    `until` is one everywhere."""
     for at, token in enumerate(found):
         before = found[at - 1].type if at else "LPAR"
         after = found[at + 1].type if at + 1 < len(found) else "LPAR"
@@ -184,7 +184,7 @@ def _property(tree: TermSyntax, reports: Reports, contract: Contract, depth: int
             return made("->", left, replace(tree, start=rest[0].start, items=tuple(rest)))
         case Connective():
             message = "put parentheses: <=> is given more than once"
-        case _:  # what is of one step
+        case _:  # a formula about one step
             message = "a temporal operator cannot stand inside a state formula or a quantifier"
     reports.error("PLAN114", f"temporal property: {message}", tree.start, tree.end)
     return State(TRUE)

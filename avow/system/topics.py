@@ -1,9 +1,9 @@
-"""Topics are the wiring: what is published under a name reaches whoever listens to it, however the ports are called.
+"""Topics are the wiring: messages published under a name reach every listener to it, whatever the ports are called.
 
-Names are resolved by ROS's rules (`avow.ros.names`) with what the plan's `ros` says of the nodes. Where both ends of a
-link have a topic, the resolved name alone links them. Several publishers of one topic are what ROS makes of them: the
-listener hears any of them, at any step. That is a node of its own here, whose only guarantee says so; what the listener
-assumes has then to follow from each publisher's contract.
+Names are resolved by ROS's rules (`avow.ros.names`) with the plan's `ros` entries for the nodes. If both ends of a link
+have a topic, the resolved name alone links them. Several publishers of one topic are treated as in ROS: the listener
+receives from any of them, at any step. This is modelled by a node of its own, whose only guarantee says so; the
+listener's assumptions then have to follow from each publisher's contract.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Carrier:
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """Who publishes and who listens, by topic. `outputs` and `inputs`: each port's topics, where it has any."""
+    """The publishers and listeners, by topic. `outputs` and `inputs`: each port's topics, if it has any."""
 
     outputs: Mapping[Endpoint, tuple[Carrier, ...]]
     inputs: Mapping[Endpoint, tuple[Carrier, ...]]
@@ -55,7 +55,7 @@ class Ends:
 
 
 def whole_name(names: Resolver, node: Node, topic: Topic) -> str:
-    """The topic's name when the robot runs; a part of a call has one of its own."""
+    """The topic's name at run time; a part of a call has one of its own."""
     return part_topic(names.topic(node.name, topic.name), topic.ros_type)
 
 
@@ -79,7 +79,7 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
 
 
 def wrong_types(found: Ends) -> Iterator[Diagnostic]:
-    """Topics whose ends are of different message types: in ROS they never meet."""
+    """Topics whose ends have different message types: ROS does not connect them."""
     first: dict[str, tuple[Endpoint, Carrier]] = {}
     every = (*found.outputs.items(), *found.inputs.items())
     for at, carrier in ((at, carrier) for at, carriers in every for carrier in carriers):
@@ -92,8 +92,8 @@ def wrong_types(found: Ends) -> Iterator[Diagnostic]:
 
 
 def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
-    """Topics whose messages' type nothing defines, though the plan says where types are defined: a slip in the name, or
-    a service or an action without the part of a call that is meant. What is wrong with the definitions, too."""
+    """Topics whose messages' type is not defined, though the plan says where types are defined: a typing error in the
+    name, or a service or an action without the part of a call that is meant. Faults in the definitions, too."""
     if plan.ros.distro is None and not plan.messages:
         return
     known, wrong = definitions(plan.messages, plan.ros.distro)
@@ -113,11 +113,11 @@ def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
 
 
 def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
-    """Remappings of a topic that the node does not have to one that it has: it seems the other way round."""
+    """Remappings of a topic that the node does not have to one that it has: probably written the wrong way round."""
     for node in contract.nodes:
         placed = plan.ros.names.placed(node.name)
         if placed.launched:
-            continue  # a contract drafted of what runs has the names that topics have then
+            continue  # a contract drafted from a running system has the names that topics have then
         own = {placed.expanded(topic.name): topic.name for topic in node.topics}
         for old, new in placed.remaps:
             meant = own.get(placed.expanded(new))
@@ -128,7 +128,7 @@ def turned(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
 
 
 def contradicted(connections: Sequence[Edge], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:
-    """Connections whose ends have topics of different names, and those beside which an input hears its topic."""
+    """Connections whose ends have topics of different names, and those to an input that also receives on its topic."""
     for connection in connections:
         source, target = connection.source, connection.target
         if source.node in relays:
@@ -153,9 +153,9 @@ def contradicted(connections: Sequence[Edge], found: Ends, relays: Collection[st
 
 
 def unheard(source: Endpoint, target: Endpoint, found: Ends, span: Span | None) -> Iterator[Diagnostic]:
-    """A link to an input of which no topic is told, from an output whose topic others publish too."""
+    """A link to an input whose topic is not given, from an output whose topic others publish too."""
     if source.node == target.node:
-        return  # its own memory, said by a connection
+        return  # its own memory, declared by a connection
     if source in found.outputs and target not in found.inputs and (others := found.beside(source)):
         topic = next(c for c in found.outputs[source] if any(at == others[0] for at, _ in found.published[c.topic]))
         message = f"{target} has several providers: {source}, and {others[0]} on the same topic {topic.topic}"
@@ -164,7 +164,7 @@ def unheard(source: Endpoint, target: Endpoint, found: Ends, span: Span | None) 
 
 
 def _remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
-    """What the plan may write so that a node listens to the topic that is meant."""
+    """The entry that the plan may have so that a node listens to the intended topic."""
     remap = f"ros: {{nodes: {{{node}: {{remap: {{{carrier.topic}: {meant.topic}}}}}}}}}"
     return f"if they are one topic when the robot runs:  {remap}"
 
@@ -182,8 +182,8 @@ def unlinked(target: Endpoint, carrier: Carrier, source: Endpoint, other: Carrie
 
 
 def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
-    """The system with a node for each input whose topic several nodes publish; and who else publishes a topic without
-    its being said what the input hears of it. None is left out: what it says would be heard all the same."""
+    """The system with a node for each input whose topic several nodes publish; and publishers of a topic for which the
+    plan does not say what the input receives. No publisher is left out: its messages would still be received."""
     found = ends(contract.nodes, plan.ros.names)
     published = ((topic, sorted({at.node for at, _ in outputs})) for topic, outputs in sorted(found.published.items()))
     called = plan.ros.names.placed
@@ -219,7 +219,7 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
             known = {source for source, _ in sources}
             connections = [
                 c for c in connections if c.target != target or not (c.source in known or c.source.node in relays)
-            ]  # another source contradicts the topics, which `contradicted` tells
+            ]  # another source contradicts the topics, which `contradicted` reports
             for (source, _), inner in zip(sources, relay.inputs, strict=True):
                 given = next((c for c in mine if c.source == source), Edge(source, target, span=carrier.span))
                 connections.append(replace(given, target=Endpoint(name, inner.name)))
@@ -233,8 +233,8 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
 def _sources(
     target: Endpoint, port: Port, found: Ends, connections: Sequence[Edge]
 ) -> tuple[tuple[tuple[Endpoint, Port], ...], tuple[tuple[str, str], ...]]:
-    """Every output that reaches an input by one of its topics: of each node on each topic the one that carries the
-    input's value; and the nodes, with the topic, of which that cannot be told."""
+    """Every output that reaches an input by one of its topics: for each node on each topic the one that carries the
+    input's value; and the nodes, with the topic, for which that cannot be determined."""
     by_node: dict[tuple[str, str], list[tuple[Endpoint, Port]]] = defaultdict(list)
     for topic in dict.fromkeys(carrier.topic for carrier in found.inputs[target]):
         for at, output in found.published.get(topic, ()):
@@ -284,7 +284,7 @@ def _relay(name: str, listener: str, port: Port, carrier: Carrier, sources: Sequ
 
 
 def _same(one: Variable, other: Variable) -> Term:
-    """That two variables of one sort have one value: of functions, everywhere."""
+    """The claim that two variables of one sort have one value; for functions, everywhere."""
     if not isinstance(one.sort, FunctionSort):
         return Compare("==", one, other)
     names = [f"a{k}" for k in range(1, len(one.sort.parameters) + 1)]

@@ -11,8 +11,8 @@ from avow.system.strict_yaml import Piece, read_yaml
 
 
 def with_validation(text: str, requirement: Requirement, who: str, date: str) -> str:
-    """A plan's text in which a person has validated a requirement of it, as the requirement is now. What the entry says
-    besides (`says`, `because`, `until`) is kept; entries of the last release become part of it."""
+    """A plan's text in which a person has validated one of its requirements, as the requirement is now. The other keys
+    of the entry (`says`, `because`, `until`) are kept; entries of the last release become part of it."""
     words = {
         "who": json.dumps(who, ensure_ascii=False),
         "date": date,
@@ -59,7 +59,7 @@ def _replaced(lines: list[str], entry: Piece, words: Mapping[str, str]) -> str:
 
 
 def _added(lines: list[str], piece: Piece, words: Mapping[str, str]) -> str:
-    """At the end of a requirement in block style, in the place of entries of the last release."""
+    """At the end of a requirement in block style, or replacing entries of the last release."""
     starts = sorted((span.line, key) for key, span in piece.keys.items())
     column = min(span.column for span in piece.keys.values()) - 1
     end = starts[-1][0]

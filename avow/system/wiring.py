@@ -1,5 +1,5 @@
-"""How a system is wired, for people and for machines: what each node runs as, what each topic carries and between whom,
-what comes from the environment, and what is linked by name since an end has no topic.
+"""How a system is wired, for people and for machines: the run-time name of each node, what each topic carries and
+between which nodes, the inputs from the environment, and the links by name, made because an end has no topic.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from avow.system.topics import ends, whole_name
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """An end of a topic: a port, the name that its node has for the topic, and how it gets there late."""
+    """An end of a topic: a port, the name that its node uses for the topic, and how it arrives late."""
 
     port: str
     called: str
@@ -25,7 +25,7 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class TopicView:
-    """`publishers`: several are heard each, at any step. `environment`: whether some listener hears none of them."""
+    """`publishers`: if several, each is received, at any step. `environment`: whether a listener hears none of them."""
 
     name: str
     kind: str
@@ -36,7 +36,7 @@ class TopicView:
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """`nodes`: (node, its whole name, remappings, where that is said). `topics` by name. `links`: what no topic
+    """`nodes`: (node, its whole name, remappings, where they are given). `topics` by name. `links`: those that no topic
     carries; `environment`: inputs without a topic that nothing provides."""
 
     nodes: tuple[tuple[str, str, tuple[tuple[str, str], ...], str], ...]
@@ -46,7 +46,7 @@ class Wiring:
     deadlocks: tuple[tuple[str, ...], ...] = ()
 
     def json(self) -> dict[str, Any]:
-        """As ``avow graph --json`` gives it."""
+        """As printed by ``avow graph --json``."""
         return {
             "nodes": [
                 {"node": node, "name": name, "remap": dict(remaps), "said": said}
@@ -146,7 +146,7 @@ def _said(placed: Mapping[str, Any], node: str, system: System) -> str:
 
 
 def _late_of(graph: Graph, edge: Edge | None) -> str:
-    """As `_late`; of what several publish, from whom it comes late."""
+    """As `_late`; for several publishers, those whose messages come late."""
     if edge is None or edge.source.node not in graph.relays:
         return _late(edge) if edge is not None else ""
     late = [str(e.source) for e in graph.feeding(edge.source.node) if e.delayed]
