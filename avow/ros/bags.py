@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags through the package rosbags: who published what, what it is made of, and the messages."""
+"""ROS 1 and ROS 2 bags through the package rosbags: the publishers, the types, and the messages."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
 Event = Mapping[str, Any]
 
 ENVELOPE = ("topic", "time")
-"""What an event says beside its message's fields."""
+"""The keys of an event besides its message's fields."""
 
 PUBLISHER = "_publisher"
-"""Where an event has the whole name of the node that published it, if it is known."""
+"""The key of the whole name of the node that published an event, if it is known."""
 
 LIVE = "_live"
-"""Marks an event that was heard on a running graph, where each topic has its own connection: the order in which such
-events came is not the order of cause."""
+"""Marks an event that was received on a running graph, where each topic has its own connection: the order in which such
+events arrived is not the causal order."""
 
 WHOLE = "_message"
-"""Where an event has its whole message, if that has fields of those names."""
+"""The key of an event's whole message, if the message has fields with the names in `ENVELOPE`."""
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 
@@ -44,7 +44,7 @@ class NoBag(Exception):  # noqa: N818 - it is what was found wrong
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What a plan says of message types, for bags that say nothing themselves."""
+    """The plan's sources of message types, for bags without definitions."""
 
     distro: str | None = None
     messages: tuple[Path, ...] = ()
@@ -55,20 +55,20 @@ NOWHERE = Origin()
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a bag says of its topics: the type of each, and how the types are made."""
+    """A bag's topics: the type of each, and the definitions of the types."""
 
     types: Mapping[str, str]
     known: Mapping[str, Message]
     publishers: Mapping[str, tuple[str, ...]]
     """Topic → the nodes that published it, by their whole names: a ROS 1 bag knows them, a ROS 2 bag does not."""
     counts: Mapping[str, int]
-    """Topic → how many messages."""
+    """Topic → the number of messages."""
     ros2: bool = False
 
 
 def enveloped(message: Mapping[str, Any], topic: str, time: float | bytes, by: str = "") -> Event:
-    """A message as an event: its fields, its topic, when it came (seconds, or their digits), and, if it is known, who
-    published it. Fields that bear those two names are not lost."""
+    """A message as an event: its fields, its topic, when it arrived (seconds, or their digits), and, if it is known,
+    the publisher. Fields with those two names are not lost."""
     event = {**message, "topic": topic, "time": time}
     if "topic" in message or "time" in message:
         event[WHOLE] = message
@@ -86,20 +86,20 @@ def fields_of(event: Event) -> dict[str, Any]:
 
 
 def publisher(event: Event) -> str:
-    """Who published an event's message; empty where that is not known."""
+    """The publisher of an event's message; empty if it is not known."""
     said = event.get(PUBLISHER, "")
     return said if isinstance(said, str) else ""
 
 
 def message_of(event: Event, field: str) -> Any:
-    """Where an event has a field of its message: not what it says itself, though that bears the same name."""
+    """The part of an event that contains a field of its message: never the event's own entry of the same name."""
     if field not in ENVELOPE:
         return event
     return event.get(WHOLE, event.get("data"))
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a trace is a bag: by its name, or since it is a folder."""
+    """Whether a trace is a bag: by its name, or because it is a folder."""
     return path.is_dir() or path.suffix in SUFFIXES
 
 
@@ -118,7 +118,7 @@ def digest_trace(path: Path) -> str:
 
 
 def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
-    """Raises NoBag, also for a bag whose types nothing defines."""
+    """Raises NoBag, also for a bag whose types are not defined."""
     with _opened(path, origin) as reader:
         types: dict[str, str] = {}
         publishers: dict[str, dict[str, None]] = {}
@@ -164,9 +164,9 @@ def messages(
 def recorded(
     path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
 ) -> Iterator[tuple[Channel, int, bytes]]:
-    """The messages, with the times in nanoseconds at which they were recorded, in this order; of topics that are not
-    wanted, only that there was one. Of a topic whose parts are wanted (a call's request and response), the part. Raises
-    NoBag."""
+    """The messages, with the times in nanoseconds at which they were recorded, in this order; for topics that are not
+    wanted, only that there was one. For a topic whose parts are wanted (a call's request and response), the part.
+    Raises NoBag."""
     calls = Calls()
     with _opened(path, origin) as reader:
         store = reader.typestore
@@ -174,7 +174,7 @@ def recorded(
         deserialize = store.deserialize_cdr if ros2 else store.deserialize_ros1
 
         def channel(connection: Any) -> tuple[Channel, bool, bool]:
-            """What is the same for all messages of a connection: whether it is wanted, and whether a part of it is."""
+            """A connection's channel, whether its topic is wanted, and whether a part of it is."""
             topic, kind = connection.topic, as_message(connection.msgtype, "")[0]
             by = getattr(connection.ext, "callerid", None) or ""
             parts = not wanted(topic) and any(map(wanted, parts_of(topic, canonical(connection.msgtype))))
@@ -255,7 +255,7 @@ def _plain(connection: Any) -> Any:
 
 
 def _types(origin: Origin) -> Any:
-    """What the plan says of types, for a bag that holds no definitions; None where it says nothing."""
+    """The plan's types, for a bag that holds no definitions; None if the plan gives none."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     if origin.distro is None:
@@ -272,8 +272,8 @@ _SCALARS = frozenset((float, int, str, bool))
 
 
 def plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
-    """Deserialised messages as the JSON that ROSMonitoring would write of them; floats as they are. Fields have their
-    own names, also those that are words of Python's, to which rosbags puts an underscore."""
+    """Deserialised messages as the JSON that ROSMonitoring would write for them; floats unchanged. Fields have their
+    own names, including Python keywords, to which rosbags appends an underscore."""
     names: dict[type, tuple[tuple[str, str], ...]] = {}
 
     def plain(message: Any) -> Any:

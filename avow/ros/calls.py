@@ -1,9 +1,9 @@
 """Services and actions: a call's request and response, a goal, its result and its feedback, as topics of their own.
 
-In a contract the part is named by its type: ``std_srvs/SetBool_Request /go matches(in.data)``. What carries it is known
-here as ``/go/_request``, ``/go/_response``, ``/spin/_goal``, ``/spin/_result`` and ``/spin/_feedback``. A ROS 2 bag
-holds calls as service events, where introspection is on (REP 2012), and actions' feedback; a ROS 1 bag holds actions,
-and no service.
+In a contract the part is named by its type: ``std_srvs/SetBool_Request /go matches(in.data)``. The topic that carries
+it is called here ``/go/_request``, ``/go/_response``, ``/spin/_goal``, ``/spin/_result`` and ``/spin/_feedback``. A ROS
+2 bag holds calls as service events, if introspection is on (REP 2012), and actions' feedback; a ROS 1 bag holds
+actions, and no service.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from avow.ros.listing import Listed, Listing
 CALL_PARTS = ("Request", "Response", "Goal", "Result", "Feedback")
 _PARTS = {part: f"_{part.lower()}" for part in CALL_PARTS}
 CALL = "_call"
-"""The field that says to which call a part belongs, in every part of it."""
+"""The field, in every part of a call, that identifies the call."""
 _SERVICE_EVENT = "/_service_event"
 _KINDS = ("_request_sent", "_request", "_response", "_response_received")
-"""What an event tells of, by service_msgs/ServiceEventInfo's `event_type`: the server's view has the short names."""
+"""The part that an event records, by service_msgs/ServiceEventInfo's `event_type`: the server's has the short names."""
 _ACTION1 = re.compile(r"(?P<name>.*)Action(?P<part>Goal|Result|Feedback)\Z")
 
 
 def part_topic(name: str, kind: str) -> str:
-    """The topic that carries messages of a type under a name: a part of a call has one of its own."""
+    """The topic that carries messages of a type under a name: a part of a call has its own topic."""
     part = kind.rpartition("_")[2] if "_" in kind.rpartition("/")[2] else ""
     return f"{name}/{_PARTS[part]}" if part in _PARTS else name
 
@@ -39,13 +39,13 @@ def is_part(topic: str) -> bool:
 
 
 def named(topic: str) -> str:
-    """What a contract calls the topic of a part of calls: the service or the action."""
+    """The contract's name for the topic of a part of calls: the service or the action."""
     return topic.rpartition("/")[0] if is_part(topic) else topic
 
 
 def with_calls(listing: Listing) -> Listing:
-    """A graph with the parts of its services' and actions' calls as topics, as far as their types are said; without the
-    topics by which an action works."""
+    """A graph with the parts of its services' and actions' calls as topics, as far as their types are given; without
+    the topics that implement an action."""
     types = {t: kind for t, kind in listing.types.items() if kind.partition("/")[0] not in _OWN_CALLS}
     raw = {topic for topic, kind in types.items() if parts_of(topic, kind)}
     parts: dict[str, str] = {}
@@ -65,7 +65,7 @@ def with_calls(listing: Listing) -> Listing:
         (goals, results), (sends, awaits) = sides(node.does, *_ACTION), sides(node.orders, *_ACTION)
         said = [t for t in node.publishes if t not in raw]
         heard = [t for t in node.subscribes if t not in raw]
-        # who is known by what a bag holds alone
+        # nodes that are known only from a bag
         ends = {(named(t), t.rpartition("/")[2]) for t in said if is_part(t)}
         for whole, part in ends:
             others = (
@@ -84,7 +84,7 @@ def _once(names: Iterable[str]) -> tuple[str, ...]:
 _SERVICE = (("Request",), ("Response",))
 _ACTION = (("Goal",), ("Result", "Feedback"))
 _OWN_CALLS = ("rcl_interfaces", "type_description_interfaces", "lifecycle_msgs", "roscpp", "nodelet")
-"""Packages of the services that every node of ROS, or every lifecycle node, has."""
+"""Packages of the services that every ROS node, or every lifecycle node, has."""
 
 
 def is_service_part(topic: str) -> bool:
@@ -115,7 +115,7 @@ def parts_of(topic: str, kind: str) -> dict[str, str]:
 
 
 def with_parts(known: Mapping[str, Message]) -> dict[str, Message]:
-    """Definitions, with ROS 1's parts of actions (``SpinGoal``) under the names that they have here (``Spin_Goal``)."""
+    """Definitions, with ROS 1's parts of actions (``SpinGoal``) under the names used here (``Spin_Goal``)."""
     found = dict(known)
     for name in known:
         wrapped = _ACTION1.match(name)
@@ -128,13 +128,13 @@ def with_parts(known: Mapping[str, Message]) -> dict[str, Message]:
 
 @dataclass(slots=True)
 class Calls:
-    """Takes recorded messages apart, in their order."""
+    """Splits recorded messages into parts, in their order."""
 
     goals: dict[str, str] = field(default_factory=dict)
-    """A call for a result → the goal whose result it wants."""
+    """A call for a result → the goal whose result it requests."""
 
     def part(self, topic: str, message: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
-        """The part of a call that a recorded message is, with its topic; the message itself where it is none."""
+        """The part of a call that a recorded message is, with its topic; the message itself if it is no part."""
         if topic.endswith(_SERVICE_EVENT):
             return self._event(topic.removesuffix(_SERVICE_EVENT), message) or (topic, message)
         if topic.endswith("/_action/feedback"):
@@ -167,7 +167,7 @@ def _uuid(raw: Any) -> str:
 
 
 def _content(raw: Any, call: str) -> Mapping[str, Any]:
-    """A part's own fields, and its call; of one that was recorded without content, the call alone."""
+    """A part's own fields, and its call; for one that was recorded without content, the call only."""
     return {**(raw if isinstance(raw, Mapping) else {}), **({CALL: call} if call else {})}
 
 
@@ -200,7 +200,7 @@ MSG: {0}_Response
 
 def as_message(kind: str, text: str) -> tuple[str, str]:
     """A type of a service or an action as a bag names it (``package/srv/Go_Event``), and its definition, as those of a
-    message: what reads bags knows no other. A service's own text (with ``---``) becomes that of its event."""
+    message: bag readers know no other form. A service's own text (with ``---``) becomes that of its event."""
     plain = _OTHER.sub(r"\1/msg/\2", kind)
     first, *others = re.split(rf"^{_RULE}\n", text, flags=re.M)
     if not first.strip() and others:

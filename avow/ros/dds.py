@@ -1,4 +1,4 @@
-"""A running ROS 2 graph as DDS's discovery shows it: what topics and types are called there, and whose they are.
+"""A running ROS 2 graph as DDS discovery shows it: the names of topics and types there, and their nodes.
 
 Needs the package cyclonedds, and no ROS. Sources: https://design.ros2.org/articles/topic_and_service_names.html
 (``rt/`` before a topic's name, ``rq/`` and ``rr/`` before a service's), https://github.com/ros2/rosidl_dds
@@ -36,7 +36,7 @@ def dds_type(kind: str) -> str:
 
 
 def settings(host: str) -> str:
-    """Cyclone DDS's configuration: this network alone; on loopback no multicast, and peers are asked one by one."""
+    """Cyclone DDS's configuration: this network only; on loopback no multicast, and peers are queried one by one."""
     interface = (
         f"<Interfaces><NetworkInterface address={quoteattr(host.replace('localhost', LOOPBACK[0]))}/></Interfaces>"
     )
@@ -62,8 +62,8 @@ def domain_of(text: str) -> int:
 
 
 def ask_domain(domain: int, host: str = LOOPBACK[0], seconds: float = DDS_SECONDS) -> Listing:
-    """Who publishes and who listens in a domain, as far as discovery says it within some seconds: nodes by their names
-    where ROS 2's own announcement gives them, other participants by a number. Raises NoListing."""
+    """The publishers and listeners in a domain, as far as discovery finds them within some seconds: nodes by name if
+    ROS 2's own announcement gives it, other participants by a number. Raises NoListing."""
     try:
         from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
         from cyclonedds.core import DDSException
@@ -74,7 +74,7 @@ def ask_domain(domain: int, host: str = LOOPBACK[0], seconds: float = DDS_SECOND
     names: dict[bytes, str] = {}
     try:
         entity = None if "CYCLONEDDS_URI" in os.environ else Domain(domain, settings(host))
-        # each layout by a participant of its own: a topic has one type for a participant
+        # each layout by its own participant: a topic has one type for a participant
         listeners = [(size, *_listener(DomainParticipant(domain), size)) for size in DDS_NAMES]
         own = {participant.guid for _, participant, _ in listeners}
         publications, subscriptions = (
@@ -101,7 +101,7 @@ End = tuple[bytes, bytes, str, str, bool]
 
 
 def listing_of(ends: list[End], names: Mapping[bytes, str]) -> Listing:
-    """The ROS graph that these endpoints are; `names`: endpoint → its node."""
+    """The ROS graph of these endpoints; `names`: endpoint → its node."""
     nodes: dict[str, dict[str, dict[str, None]]] = {}
     types: dict[str, str] = {}
     strangers: dict[bytes, str] = {}
@@ -109,7 +109,7 @@ def listing_of(ends: list[End], names: Mapping[bytes, str]) -> Listing:
         said = _TYPE.match(kind)
         part = _side(topic, writes)
         if said is None or part is None:
-            continue  # no ROS topic
+            continue  # not a ROS topic
         side, name = part
         node = names.get(key) or strangers.setdefault(participant, f"/participant_{len(strangers) + 1}")
         nodes.setdefault(node, {}).setdefault(side, {})[name] = None
@@ -119,7 +119,7 @@ def listing_of(ends: list[End], names: Mapping[bytes, str]) -> Listing:
 
 
 def _side(topic: str, writes: bool) -> tuple[str, str] | None:
-    """What a node with this endpoint does, and of what; None of what is no ROS topic."""
+    """The relation of a node with this endpoint to a topic, and the topic; None if it is no ROS topic."""
     if topic.startswith("rt/"):
         name = topic.removeprefix("rt")
         return None if "/_action/" in name else ("publishes" if writes else "subscribes", name)
@@ -133,7 +133,7 @@ def _side(topic: str, writes: bool) -> tuple[str, str] | None:
 
 
 def _listener(participant: Any, size: int) -> tuple[Any, Any]:
-    """A participant, and what it hears of nodes' names, as bytes."""
+    """A participant, and the reader of nodes' names, as bytes."""
     from cyclonedds.core import Qos
     from cyclonedds.idl import make_idl_struct, types
     from cyclonedds.qos import Policy
@@ -159,7 +159,7 @@ def _listener(participant: Any, size: int) -> tuple[Any, Any]:
 
 
 class _Bytes:
-    """A sample as it came; cyclonedds sets `sample_info`."""
+    """A raw sample; cyclonedds sets `sample_info`."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -172,7 +172,7 @@ def _all(reader: Any) -> Iterator[Any]:
 
 
 def _announced(data: bytes, size: int) -> list[tuple[bytes, str]] | None:
-    """Endpoint → node, of one participant's announcement; None of what is none with names of that size."""
+    """Endpoint → node, from one participant's announcement; None if it is not one with names of that size."""
     order = "<" if data[1:2] == b"\x01" else ">"
     at = 4 + size
 

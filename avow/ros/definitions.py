@@ -1,6 +1,6 @@
-"""Message definitions: what fields a message has, of which types. `.msg`, `.srv` and `.action` texts are read here.
+"""Message definitions: the fields of a message, and their types. `.msg`, `.srv` and `.action` texts are read here.
 
-A type is called ``package/Type``, in ROS 1 and ROS 2 alike. Source of the form: http://wiki.ros.org/msg and
+A type is called ``package/Type``, in ROS 1 and ROS 2 alike. Source of the format: http://wiki.ros.org/msg and
 https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html.
 """
 
@@ -16,7 +16,7 @@ INTEGERS: Mapping[str, tuple[int, int]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
 }
-"""The whole numbers of the wire: the least and the greatest value of each."""
+"""The integer types on the wire: the least and the greatest value of each."""
 FLOATS = ("float32", "float64")
 SCALARS = frozenset((*INTEGERS, *FLOATS, "bool", "string", "wstring", "time", "duration"))
 
@@ -72,7 +72,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message type. `source` says where its definition was found."""
+    """A message type. `source`: where its definition was found."""
 
     name: str
     fields: tuple[Field, ...]
@@ -90,7 +90,7 @@ class Message:
 
 
 class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
-    """A text that defines no message; `line` counts from 1."""
+    """A text that does not define a message; `line` counts from 1."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -98,12 +98,12 @@ class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
 
 
 class NoField(Exception):  # noqa: N818 - it is what was found wrong
-    """A path that leads nowhere in a definition; the text says why."""
+    """A path that does not exist in a definition; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Definitions:
-    """The message types that are known, by name."""
+    """The known message types, by name."""
 
     messages: Mapping[str, Message]
 
@@ -112,7 +112,7 @@ class Definitions:
         return self.messages.get(canonical(name))
 
     def missing(self, message: Message) -> tuple[str, ...]:
-        """The types that a message is made of and that nothing defines."""
+        """The undefined types among those that a message is made of."""
         return tuple(name for name in self.within(message) if name not in self.messages)
 
     def within(self, message: Message) -> tuple[str, ...]:
@@ -131,7 +131,7 @@ class Definitions:
 
     def leaves(self, message: Message) -> Iterator[tuple[tuple[str, ...], Wire, Message]]:
         """The fields that may carry a value, by their paths, in the message's order: numbers, words, times and arrays.
-        Headers are left out: they say when and where, never what. With each the message that it stands in."""
+        Headers are left out: they give time and frame, not content. Each with the message that contains it."""
         for inner in message.fields:
             wire = inner.wire
             if not isinstance(wire, Nested):
@@ -141,7 +141,7 @@ class Definitions:
                     yield (inner.name, *path), leaf, holder
 
     def at(self, message: Message, path: tuple[str | int, ...]) -> tuple[Wire, Message]:
-        """The type of what a path leads to, and the message that it stands in. Raises NoField."""
+        """The type of the field at a path, and the message that contains it. Raises NoField."""
         wire: Wire = Nested(message.name)
         holder = message
         for depth, step in enumerate(path):
@@ -190,7 +190,7 @@ STANDARD: dict[str, Message] = {
     )
     for base, name in _STANDARD_NAMES.items()
 }
-"""What carries one built-in value, and the calls of std_srvs: the same in every ROS there has been."""
+"""The messages that carry one built-in value, and the calls of std_srvs: the same in every ROS distribution."""
 
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<size>(?:<=)?\d*)\])?\s+"
@@ -215,7 +215,7 @@ def parse_message(text: str, name: str, source: str = "") -> Message:
         if rest.startswith("="):
             if not isinstance(scalar, Scalar) or found["array"]:
                 raise WrongDefinition(f"the constant {found['name']} has no built-in type", number)
-            # a string's value is the rest of the line, with what looks like a comment (ROS 1)
+            # a string's value is the rest of the line, including what looks like a comment (ROS 1)
             value = raw.split("=", 1)[1].strip() if scalar.name == "string" else rest[1:].strip()
             constants.append((found["name"], scalar.name, value.strip("\"'") if scalar.name == "string" else value))
             continue

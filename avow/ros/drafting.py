@@ -1,5 +1,5 @@
-"""A first contract and plan of what runs or was recorded: nodes, ports, topics, types and the mapping, for a person to
-correct. What is drafted says what is there; what a node promises it does not guess.
+"""A first contract and plan from a running graph or a recording: nodes, ports, topics, types and the mapping, for a
+person to correct. The draft states what exists; it does not guess what a node guarantees.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _TOOLS = {
     r"/(rosout|record_\d+|rosbag2?_.*|play_\d+)": "records, plays or logs",
     r"/(rqt_.*|rviz2?(_.*)?|_ros2cli.*|rostopic_.*|foxglove_bridge.*)": "shows what others publish",
 }
-"""Nodes that are tools, and what they do."""
+"""Nodes that are tools, and their purpose."""
 _PLUMBING = re.compile(r"/(rosout|rosout_agg|parameter_events|clock)\Z|.*/_|.*/parameter_(descriptions|updates)\Z")
-"""Topics that carry ROS's own business."""
+"""Topics for ROS's internal use."""
 
 
 @dataclass(slots=True)
 class Seen:
-    """What a record holds of one field: for comments, never for a contract."""
+    """The values in a record of one field: for comments, never for a contract."""
 
     count: int = 0
     least: float = math.inf
@@ -54,7 +54,7 @@ class Seen:
             self.least, self.greatest = min(self.least, value), max(self.greatest, value)
 
     def says_nothing(self) -> bool:
-        """Whether there was never a reading."""
+        """Whether there was no reading at all."""
         return self.count > 0 and self.odd.total() == self.count
 
     def __str__(self) -> str:
@@ -78,8 +78,8 @@ class Drafted:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a draft is made of. `origin`: in words; `traces`: paths in the folder, each with its digest; `graph`:
-    that of the graph's text, where there is one."""
+    """The input of a draft. `origin`: in words; `traces`: paths in the folder, each with its digest; `graph`: the
+    digest of the graph's text, if there is one."""
 
     name: str
     origin: str
@@ -91,10 +91,10 @@ class Given:
     traces: Mapping[str, str] = field(default_factory=dict)
     graph: str | None = None
     messages: Mapping[str, str] = field(default_factory=dict)
-    """Type → its definition, of those for which the draft has a file."""
+    """Type → its definition, for those that the draft has a file for."""
     seen: Mapping[tuple[str, Path], Seen] = field(default_factory=dict)
     unsaid: frozenset[str] = frozenset()
-    """Nodes of which the record does not say that they publish what they are drafted with."""
+    """Nodes that are drafted as publishers without the record's confirmation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,12 +108,12 @@ class _Port:
 
 
 UNNAMED = "/robot"
-"""The node that is drafted with what no name tells apart."""
+"""The node that is drafted with the topics whose names identify no node."""
 
 
 def by_names(topics: Iterable[str], heard: Iterable[str]) -> dict[str, list[str]]:
-    """The nodes that a record suggests which does not say who publishes, each with its topics: the node (of those that
-    the record names in its log) under whose name a topic stands, else what comes before the topic's last part."""
+    """The nodes that a record without publishers suggests, each with its topics: the node (of those that the record
+    names in its log) whose name is a prefix of the topic's, otherwise the part before the topic's last."""
     nodes = sorted(heard, key=len, reverse=True)
     found: dict[str, list[str]] = {}
     for topic in topics:
@@ -128,7 +128,7 @@ def draft(given: Given) -> Drafted:
 
 
 def is_plumbing(topic: str) -> bool:
-    """Whether a topic carries ROS's own business, or what a client saw of a call whose server's view is drafted."""
+    """Whether a topic is for ROS's internal use, or holds a client's view of a call whose server's view is drafted."""
     if is_part(topic):
         return topic.endswith(("/_request_sent", "/_response_received"))
     return _PLUMBING.match(topic) is not None
@@ -139,14 +139,14 @@ class _Draft:
     given: Given
     taken: set[str] = field(default_factory=set)
     types: dict[str, str] = field(default_factory=dict)
-    """Declared types: name → what they are."""
+    """Declared types: name → definition."""
     elements: set[str] = field(default_factory=set)
     ports: dict[str, tuple[_Port, ...]] = field(default_factory=dict)
-    """Topic → what it carries."""
+    """Topic → the values that it carries."""
     silent: dict[str, list[str]] = field(default_factory=dict)
-    """Topic → the fields that were never a reading, and what they were: they become no ports."""
+    """Topic → the fields that never had a reading, and their values: they become no ports."""
     told: bool = False
-    """Whether the traces have been written out."""
+    """Whether the traces have been written in full."""
 
     def made(self) -> Drafted:
         nodes, dropped = self.nodes()
@@ -211,7 +211,7 @@ class _Draft:
         return _Port(name, self.sort(wire) or "", mapping, said)
 
     def enumeration(self, name: str, dotted: str, constants: Mapping[str, str], said: str) -> _Port:
-        """A number of which the definition says what it means."""
+        """A number whose meaning the definition gives."""
         elements: dict[str, str] = {}
         for constant, word in constants.items():
             element = word.lower()
@@ -225,7 +225,7 @@ class _Draft:
         return _Port(name, type_name, f"{{field: {dotted}, values: {{{values}}}}}", said)
 
     def sort(self, wire: Wire) -> str | None:
-        """The type in the contract; None of what is not drafted."""
+        """The type in the contract; None if it is not drafted."""
         match wire:
             case Array(item=Scalar(name=name)) if name in FLOATS:
                 return "REAL"
@@ -349,7 +349,7 @@ class _Draft:
         return lines
 
     def recordings(self) -> str:
-        """The traces: in full the first time, then by reference."""
+        """The traces: in full the first time, later by reference."""
         if self.told:
             return "*recordings"
         self.told = True
@@ -357,7 +357,7 @@ class _Draft:
         return f"&recordings [{', '.join(told)}]"
 
     def answers(self, node: Listed) -> str:
-        """By stamp where all that it hears and says is stamped."""
+        """By stamp if all that it receives and publishes is stamped."""
         topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
         if all(map(is_part, topics)):
             return "{by: call}"
@@ -367,8 +367,8 @@ class _Draft:
 
 
 def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:
-    """The constants that say what a whole number means, and the word that each is: those whose names begin with the
-    field's, else all, where the message has one such number."""
+    """The constants that give the meaning of an integer, each with its word: those whose names begin with the field's;
+    otherwise all, if the message has only one such number."""
     if not isinstance(wire, Scalar) or wire.name not in INTEGERS:
         return {}
     kinds = [(constant, value) for constant, kind, value in holder.constants if kind == wire.name]
@@ -381,8 +381,8 @@ def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:
 
 
 def _short(names: Iterable[str], keywords: frozenset[str]) -> dict[str, str]:
-    """For each of ROS's names one that the contract may use: its last part, with those before it where it takes them to
-    tell two apart."""
+    """For each ROS name one that the contract may use: its last part, with the parts before it if they are needed to
+    distinguish two."""
     every = list(names)
     parts = {name: re.sub(r"[^A-Za-z0-9_/]", "_", name).strip("/").split("/") for name in every}
     found: dict[str, str] = {}
@@ -407,7 +407,7 @@ def _line(text: str) -> str:
 
 
 def watch(known: Definitions, types: Mapping[str, str]) -> tuple[dict[tuple[str, Path], Seen], Callable[[Any], None]]:
-    """What a record holds of each field that may be drafted, and what to call with each message of it."""
+    """The values in a record of each field that may be drafted, and a function to call with each of its messages."""
     seen: dict[tuple[str, Path], Seen] = {}
     paths: dict[str, list[Path]] = {}
     for topic, kind in types.items():

@@ -1,7 +1,7 @@
 """Where the fields of raw messages are: messages of one layout become arrays, without reading each of them.
 
-A message with strings or arrays of any length has the layout of another one in which they are as long. ROS 2 writes
-CDR, little-endian, with each number aligned to its size (OMG DDSI-RTPS, 10.2). ROS 1 writes no gaps and no CDR header.
+A message with strings or arrays of any length has the layout of another one with the same lengths. ROS 2 writes CDR,
+little-endian, with each number aligned to its size (OMG DDSI-RTPS, 10.2). ROS 1 writes no gaps and no CDR header.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Nested, S
 
 FieldPath = tuple[str | int, ...]
 Columns = Callable[[FieldPath], npt.NDArray[np.generic] | None]
-"""The numbers that a path leads to, one a message; None if it leads to no number."""
+"""The numbers at a path, one for each message; None if it leads to no number."""
 
 _FORMS = {
     "bool": "?",
@@ -26,7 +26,7 @@ _FORMS = {
     **{name: f"<f{int(name.lstrip('float')) // 8}" for name in FLOATS},
 }
 _CDR = b"\0\1"
-"""How a message of ROS 2 begins that is written in CDR, little-endian."""
+"""The header of a ROS 2 message that is written in CDR, little-endian."""
 
 
 class _Unknown(Exception):  # noqa: N818 - it is what was found
@@ -35,15 +35,15 @@ class _Unknown(Exception):  # noqa: N818 - it is what was found
 
 @dataclass(slots=True)
 class Layout:
-    """The layout of one message of a type; `columns` tells whether others have it."""
+    """The layout of one message of a type; `columns` checks whether others have it."""
 
     known: Definitions
     raw: bytes
     ros2: bool
     places: dict[FieldPath, tuple[int, str]] = field(default_factory=dict)
-    """Where each number is, and its form."""
+    """The position of each number, and its form."""
     lengths: list[tuple[int, int]] = field(default_factory=list)
-    """Where the length of a string or an array is, and what it is."""
+    """The position and value of the length of each string or array."""
     _at: int = 0
 
     @classmethod

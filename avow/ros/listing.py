@@ -1,4 +1,4 @@
-"""Who publishes and who listens: from ``rosnode info`` or ``ros2 node info``, from JSON (from a ROS 1 master:
+"""Publishers and listeners: from ``rosnode info`` or ``ros2 node info``, from JSON (from a ROS 1 master:
 `avow.ros.master`)."""
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from avow.ros.names import is_name
 
 
 class NoListing(Exception):  # noqa: N818 - it is what was found wrong
-    """What is no listing of a ROS graph, or a master that does not answer; the text says how."""
+    """A text that is no listing of a ROS graph, or a master that does not answer; the text says how."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +35,13 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """A ROS graph. `types`: topic or service → type (``package/Type``), as far as it is said."""
+    """A ROS graph. `types`: topic or service → type (``package/Type``), as far as it is given."""
 
     nodes: tuple[Listed, ...]
     types: Mapping[str, str] = field(default_factory=dict)
 
     def text(self) -> str:
-        """As ``rosnode info`` writes it."""
+        """In the format of ``rosnode info``."""
         lines: list[str] = []
         for node in self.nodes:
             lines.append(f"Node [{node.name}]")
@@ -88,7 +88,7 @@ def parse_listing(text: str) -> Listing:
 
 
 def parse_info(text: str) -> Listing:
-    """What ``rosnode info`` or ``ros2 node info`` say of each node, one after another."""
+    """The sections for each node in ``rosnode info`` or ``ros2 node info``, in order."""
     found: dict[str, dict[str, dict[str, None]]] = {}
     types: dict[str, str] = {}
     sides: dict[str, dict[str, None]] = {}
@@ -108,7 +108,7 @@ def parse_info(text: str) -> Listing:
 
 
 def listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
-    """A node by its name, and by side the topics that it has there."""
+    """A node by its name, and for each side the topics that it has there."""
     return Listed(name, **{side: tuple(sides.get(side, ())) for side in EVERY_SIDE})
 
 
@@ -121,7 +121,7 @@ def _side(word: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class _Sides:
-    """Of a node; each by names alone, or with their types."""
+    """The topics of a node; each by name only, or with their types."""
 
     publishes: _Names = _side("publishers")
     subscribes: _Names = _side("subscribers")

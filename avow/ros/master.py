@@ -1,4 +1,4 @@
-"""Who publishes and who listens, from a ROS 1 master, which is asked by its XML-RPC interface alone
+"""Publishers and listeners, from a ROS 1 master, which is queried by its XML-RPC interface
 (http://wiki.ros.org/ROS/Master_API): no ROS has to be installed."""
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from avow.ros.listing import Listing, NoListing, listed
 
 
 class _Bounded(xmlrpc.client.Transport):
-    """Waits `MASTER_SECONDS` for an answer, not for ever."""
+    """Waits at most `MASTER_SECONDS` for an answer."""
 
     def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)
@@ -23,7 +23,7 @@ class _Bounded(xmlrpc.client.Transport):
 
 
 FAILURES = (OSError, HTTPException, ExpatError, xmlrpc.client.Error, ValueError, TypeError)
-"""What a call of `interface` raises where nobody answers, or not as ROS does."""
+"""The exceptions that a call of `interface` raises if there is no answer, or one that is not ROS's."""
 
 
 def interface(uri: str) -> Any:
@@ -32,7 +32,7 @@ def interface(uri: str) -> Any:
 
 
 def ask_master(uri: str) -> Listing:
-    """The graph that a running ROS 1 master knows. Raises NoListing where none answers."""
+    """The graph that a running ROS 1 master knows. Raises NoListing if none answers."""
     try:
         with interface(uri) as master:
             graph = master.getSystemState("/avow")

@@ -16,7 +16,7 @@ _NAME = re.compile(r"(?:/|~/?)?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*\Z", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A running node: its whole name, and the names that it was started with others for."""
+    """A running node: its whole name, and the remappings with which it was started."""
 
     name: str
     """``/robot1/sensor``."""
@@ -24,9 +24,9 @@ class Placed:
     """(from, to), as written: either may be absolute, relative or private."""
     span: Span | None = field(default=None, compare=False, repr=False)
     named: bool = field(default=False, compare=False, repr=False)
-    """Whether somebody has said its name; else it is supposed."""
+    """Whether its name is given explicitly; otherwise it is assumed."""
     launched: bool = field(default=False, compare=False, repr=False)
-    """Whether a launch file says so."""
+    """Whether a launch file gives it."""
 
     @property
     def namespace(self) -> str:
@@ -34,7 +34,7 @@ class Placed:
         return self.name.rpartition("/")[0]
 
     def expanded(self, name: str) -> str:
-        """The whole name of what the node calls so, before any remapping."""
+        """The whole name of what the node refers to by this name, before any remapping."""
         if name.startswith("/"):
             return name
         if name.startswith("~"):
@@ -42,7 +42,7 @@ class Placed:
         return f"{self.namespace}/{name}"
 
     def resolved(self, name: str) -> str:
-        """The whole name of the topic that the node means."""
+        """The whole name of the topic that the node refers to."""
         whole = self.expanded(name)
         for old, new in self.remaps:
             if self.expanded(old) == whole:
@@ -51,13 +51,13 @@ class Placed:
 
 
 def is_name(text: str) -> bool:
-    """Whether ROS would take it for the name of a topic or a node."""
+    """Whether ROS would accept it as the name of a topic or a node."""
     return len(text) <= 255 and _NAME.match(text) is not None
 
 
 @dataclass(frozen=True, slots=True)
 class Resolver:
-    """Where each node of a system runs; one of which nothing is said runs at the root under its own name."""
+    """Where each node of a system runs; a node without an entry runs at the root under its own name."""
 
     nodes: tuple[tuple[str, Placed], ...] = ()
 

@@ -1,8 +1,8 @@
-"""ROS 2 parameter files: what they set for a node.
+"""ROS 2 parameter files: the parameters that they set for a node.
 
-Entries are named by nodes, in full (``/ns/node``), without the first slash, or within their namespaces. ``*`` stands
-for one part of a name, ``**`` for any number of them. Source:
-https://docs.ros.org/en/rolling/p/rcl_yaml_param_parser and rclcpp's ``parameter_map_from``.
+Entries are named by nodes, in full (``/ns/node``), without the first slash, or within their namespaces. ``*`` matches
+one part of a name, ``**`` any number of them. Source: https://docs.ros.org/en/rolling/p/rcl_yaml_param_parser and
+rclcpp's ``parameter_map_from``.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ SECTION = "ros__parameters"
 
 
 class WrongParameters(Exception):  # noqa: N818 - it is what was found wrong
-    """A file of which it cannot be said what it sets for a node."""
+    """A file whose parameters for a node cannot be determined."""
 
 
 def is_sectioned(data: object) -> bool:
-    """Whether it is a parameter file of ROS 2, and no plain mapping."""
+    """Whether it is a parameter file of ROS 2, not a plain mapping."""
     return isinstance(data, Mapping) and (SECTION in data or any(map(is_sectioned, data.values())))
 
 
 def of_node(data: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """What a file sets for the node of a whole name, by the parameters' dotted names; a later entry counts before an
-    earlier one. Raises WrongParameters."""
+    """The parameters that a file sets for the node of a whole name, by their dotted names; a later entry takes
+    precedence over an earlier one. Raises WrongParameters."""
     found: dict[str, Any] = {}
     own: dict[str, str] = {}
     entries = list(_entries(data, ""))

@@ -36,7 +36,7 @@ DISTRIBUTIONS = {
         for name in ("dashing", "eloquent", "foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical")
     },
 }
-"""ROS distributions whose common packages are known, as plans name them; and as `rosbags` does."""
+"""ROS distributions whose common packages are known: their names in plans → their names in `rosbags`."""
 
 
 def message_files(paths: Iterable[Path]) -> tuple[Path, ...]:
@@ -49,8 +49,8 @@ def message_files(paths: Iterable[Path]) -> tuple[Path, ...]:
 
 
 def definitions(paths: Iterable[Path], distro: str | None) -> tuple[Definitions, tuple[Diagnostic, ...]]:
-    """All that is known: the files first, then the distribution's packages, then what is the same everywhere. What is
-    wrong with the files, each fault with its place; two files that disagree are a fault naming both."""
+    """All known types: the files first, then the distribution's packages, then those that are the same everywhere.
+    Faults in the files, each with its place; two files that disagree are a fault naming both."""
     faults: list[Diagnostic] = []
     found: dict[str, Message] = {}
     for path in message_files(paths):
@@ -91,7 +91,7 @@ def _message(name: str, constants: Iterable[Any], fields: Iterable[Any], source:
 
 
 _EMPTY = "structure_needs_at_least_one_member"
-"""What ROS 2 puts into a message without fields."""
+"""The field that ROS 2 adds to a message without fields."""
 
 
 def _wire(kind: Any) -> Wire:
@@ -142,7 +142,7 @@ def _at(path: Path, line: int) -> Span:
 
 
 def require(found: tuple[Definitions, tuple[Diagnostic, ...]]) -> Definitions:
-    """The definitions. Raises Rejected with what is wrong with them."""
+    """The definitions. Raises Rejected with their faults."""
     known, faults = found
     if faults:
         raise Rejected(*faults)

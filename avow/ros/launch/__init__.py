@@ -1,7 +1,7 @@
-"""Launch files, read and never run: which nodes they start, under which names, with which remappings.
+"""Launch files, read and never run: the nodes that they start, with names and remappings.
 
-`elements` is the one form that XML and YAML (`markup`) and Python (`python`, by its syntax alone) are brought into;
-`reading` gives it its meaning. What cannot be read without running something is told with its place. Sources:
+`elements` is the common form of XML and YAML (`markup`) and Python (`python`, by its syntax only); `reading` interprets
+it. Anything that cannot be read without running it is reported with its place. Sources:
 http://wiki.ros.org/roslaunch/XML, https://design.ros2.org/articles/roslaunch_xml.html and
 https://docs.ros.org/en/rolling/How-To-Guides/Launch-file-different-formats.html.
 """

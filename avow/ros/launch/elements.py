@@ -1,4 +1,4 @@
-"""What a launch file says, whatever it is written in: elements with attributes, as in ROS's XML."""
+"""The content of a launch file in any format: elements with attributes, as in ROS's XML."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from avow.base.records import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """What cannot be known without running the file, and why."""
+    """A value that cannot be known without running the file, and why."""
 
     why: str
 
 
 Text = str | Unread
-"""A text with substitutions (``$(var x)``), or why there is none."""
+"""A text with substitutions (``$(var x)``), or why it is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """``<node name="a">``: its tag with ``_`` for ``-``, its attributes, what stands in it, and its place."""
+    """``<node name="a">``: its tag with ``_`` for ``-``, its attributes, its children, and its place."""
 
     tag: str
     attributes: Mapping[str, Text]
@@ -31,20 +31,20 @@ class Element:
     span: Span
 
     def get(self, *names: str) -> Text | None:
-        """The first attribute that is there."""
+        """The first attribute that is present."""
         return next((self.attributes[name] for name in names if name in self.attributes), None)
 
 
 @dataclass(slots=True)
 class Parsed:
-    """A file's elements, and what in it is no element that can be read."""
+    """A file's elements, and its parts that cannot be read as elements."""
 
     elements: tuple[Element, ...] = ()
     unread: list[Diagnostic] = field(default_factory=list)
 
 
 class WrongLaunch(Exception):  # noqa: N818 - it is what was found wrong
-    """A text that is no launch file; `line` counts from 1."""
+    """A text that is not a launch file; `line` counts from 1."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -56,7 +56,7 @@ def place(file: str, line: int, column: int = 1) -> Span:
 
 
 def unread(span: Span, message: str) -> Diagnostic:
-    """What is not read, told with its place."""
+    """A diagnostic for a part that is not read, with its place."""
     return Diagnostic("ROS121", message, span, Severity.WARNING, HINT)
 
 
@@ -69,7 +69,7 @@ def literal(text: str) -> Text:
 
 
 def joined(parts: list[Text]) -> Text:
-    """Texts one after another; unread where one of them is."""
+    """Concatenated texts; unread if one of them is."""
     whole = ""
     for part in parts:
         if isinstance(part, Unread):
@@ -79,4 +79,4 @@ def joined(parts: list[Text]) -> Text:
 
 
 VARIABLE = re.compile(r"[A-Za-z_][\w.-]*\Z", re.ASCII)
-"""A name that may stand in ``$(var …)``."""
+"""A name that may be used in ``$(var …)``."""

@@ -1,4 +1,4 @@
-"""Launch files in XML and YAML as elements. Neither is given a chance to load or to run anything."""
+"""Launch files in XML and YAML as elements. Nothing is loaded or run."""
 
 from __future__ import annotations
 

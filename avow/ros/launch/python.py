@@ -1,7 +1,7 @@
 """Launch files in Python as elements: read by their syntax, never imported, never run.
 
-What is written out in ``generate_launch_description`` is read: actions in lists, names that are bound once, texts put
-together of constants and substitutions. What stands in a loop, behind a condition or in another function is told.
+The literal content of ``generate_launch_description`` is read: actions in lists, names that are bound once, texts
+composed of constants and substitutions. The content of a loop, a conditional or another function is reported.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _RENAMED = {
     "node_namespace": "namespace",
     "plugin": "plugin",
 }
-"""Keywords of nodes, and what XML calls them."""
+"""Keywords of nodes, and their names in XML."""
 _SILENT = frozenset(
     [
         "LogInfo",
@@ -49,7 +49,7 @@ _SILENT = frozenset(
 _ACTIONS = frozenset(
     (*_NODES, *["IncludeLaunchDescription", "GroupAction", "PushRosNamespace", "SetRemap", "LoadComposableNodes"])
 )
-"""What must not go missing without a word."""
+"""Actions that must not be skipped without a report."""
 
 
 _MADE: Mapping[str, tuple[str, Mapping[str, str]]] = {
@@ -62,8 +62,8 @@ _MADE: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "DeclareLaunchArgument": ("arg", {"name": "name", "default_value": "default"}),
     "SetLaunchConfiguration": ("let", {"name": "name", "value": "value"}),
 }
-"""Action → the tag of its element, and its arguments in their order: what XML calls each; ``*``: it holds actions;
-empty: it is not read."""
+"""Action → the tag of its element, and its arguments in their order, with the XML name of each; ``*``: it holds
+actions; empty: it is not read."""
 
 
 def from_python(text: str, file: str) -> Parsed:
@@ -84,7 +84,7 @@ class _Python:
     found: Parsed = field(default_factory=Parsed)
     bound: dict[str, ast.expr] = field(default_factory=dict)
     added: dict[str, list[ast.expr]] = field(default_factory=dict)
-    """What was appended to a list or a launch description of that name."""
+    """The values appended to a list or a launch description of that name."""
     seen: set[int] = field(default_factory=set)
     steps: int = 0
 
@@ -124,7 +124,7 @@ class _Python:
                     self.added.setdefault(name, []).append(item)
                 elif method == "extend":
                     self.added.setdefault(name, []).append(ast.Starred(item, ast.Load()))
-            case _:  # what it holds is looked for at the end
+            case _:  # actions in it are searched for at the end
                 pass
 
     # -- actions -------------------------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ class _Python:
                 return [e for part in (self.bound[name], *added) for e in self.actions(part)]
             case ast.Call():
                 return self.action(node)
-            case _:  # told: what it would give is known only when it runs
+            case _:  # reported: its value is known only at run time
                 self.tell(node, f"`{_shown(node)}` is not evaluated")
                 return []
 
@@ -170,7 +170,7 @@ class _Python:
         return []
 
     def given(self, call: ast.Call, names: Sequence[str]) -> dict[str, ast.expr]:
-        """The arguments by their names, of which `names` are those that may be given by place."""
+        """The arguments by name; those in `names` may be positional."""
         return dict(zip(names, call.args, strict=False)) | {k.arg: k.value for k in call.keywords if k.arg is not None}
 
     def node(self, call: ast.Call, tag: str) -> Element:
@@ -208,7 +208,7 @@ class _Python:
         return found
 
     def parameters(self, node: ast.expr) -> list[Element]:
-        """Files and mappings; what cannot be read is left out."""
+        """Files and mappings; those that cannot be read are left out."""
         found: list[Element] = []
         for item in self.items(node) or [node]:
             value = self.value(item)
@@ -270,7 +270,7 @@ class _Python:
     # -- values --------------------------------------------------------------------------------------------------------
 
     def value(self, node: ast.expr) -> ast.expr:
-        """What a name stands for."""
+        """The value of a name."""
         self.step(node)
         self.seen.add(id(node))
         if isinstance(node, ast.Name) and node.id in self.bound and node.id not in self.added:
@@ -278,7 +278,7 @@ class _Python:
         return node
 
     def items(self, node: ast.expr) -> list[ast.expr] | None:
-        """The items of a list that is written out; None of anything else."""
+        """The items of a literal list; None for anything else."""
         self.step(node)
         match node:
             case ast.List(elts=items) | ast.Tuple(elts=items):
@@ -297,7 +297,7 @@ class _Python:
                 if known is None or any(isinstance(a, ast.Starred) for a in self.added.get(name, ())):
                     return None
                 return known + self.added.get(name, [])
-            case _:  # no list that is written out
+            case _:  # not a literal list
                 return None
 
     def text(self, node: ast.expr) -> Text:
@@ -318,11 +318,11 @@ class _Python:
                 return joined([self.text(part) for part in parts]) if parts is not None else self.unknown(node)
             case ast.Call():
                 return self.called(node)
-            case _:  # told where it matters
+            case _:  # reported where it matters
                 return self.unknown(node)
 
     def called(self, call: ast.Call) -> Text:
-        """A substitution, or a function of which it is known what it gives."""
+        """A substitution, or a function whose result is known."""
         one = self.text(call.args[0]) if len(call.args) == 1 and not call.keywords else None
         match _called(call):
             case "LaunchConfiguration" if (name := self.word(call, "variable_name")) is not None:
@@ -345,11 +345,11 @@ class _Python:
                 return self.path(self.items(call.args[0]), call)
             case "join" if isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value).endswith("path"):
                 return self.path(call.args, call)
-            case _:  # told where it matters
+            case _:  # reported where it matters
                 return self.unknown(call)
 
     def word(self, call: ast.Call, *keywords: str) -> str | None:
-        """The one constant that is given."""
+        """The only constant that is given."""
         given = [*call.args, *(k.value for k in call.keywords if k.arg in keywords)]
         text = self.text(given[0]) if given else None
         return text if isinstance(text, str) and VARIABLE.match(text) else None
@@ -384,7 +384,7 @@ def _called(call: ast.Call) -> str:
     match call.func:
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name
-        case _:  # what is called has no name
+        case _:  # the function called has no name
             return "a call"
 
 
@@ -394,8 +394,7 @@ def _shown(node: ast.expr) -> str:
 
 
 def _bindings(module: ast.Module) -> Counter[str]:
-    """How often each name is bound, anywhere in the file: of one that is bound again it cannot be told which is
-    meant."""
+    """How often each name is bound, anywhere in the file: for one that is bound again, the value is ambiguous."""
     found: Counter[str] = Counter()
     for node in ast.walk(module):
         match node:

@@ -1,8 +1,8 @@
-"""What launch files start: nodes by their whole names, with their remappings.
+"""The nodes that launch files start, by their whole names, with their remappings.
 
-Scopes, arguments and remappings are as roslaunch (ROS 1) and launch_ros (ROS 2) have them: in ROS 1 an included file
-sees only the arguments that it is given, and a node's own remapping goes before its group's; in ROS 2 arguments and
-pushed namespaces hold until their group ends, and a group's remapping goes first.
+Scopes, arguments and remappings follow roslaunch (ROS 1) and launch_ros (ROS 2): in ROS 1 an included file sees only
+the arguments that it is given, and a node's own remapping takes precedence over its group's; in ROS 2 arguments and
+pushed namespaces hold until their group ends, and a group's remapping takes precedence.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from avow.ros.names import is_name
 
 @dataclass(frozen=True, slots=True)
 class Started:
-    """A node that a launch file starts. `unread`: what of its names cannot be told without running the file."""
+    """A node that a launch file starts. `unread`: the parts of its names that are unknown without running the file."""
 
     name: str
-    """``/robot1/sensor``; empty where it is not known."""
+    """``/robot1/sensor``; empty if it is not known."""
     kind: str
-    """``package/executable``, as far as it is said."""
+    """``package/executable``, as far as it is given."""
     remaps: tuple[tuple[str, str], ...] = ()
     unread: tuple[str, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
@@ -40,7 +40,7 @@ class Started:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A parameter's name and value as text; a file's path, where the name is empty. The value is empty where it is not
+    """A parameter's name and value as text; a file's path, if the name is empty. The value is empty if it is not
     known."""
 
     name: str
@@ -50,8 +50,8 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Launched:
-    """What some launch files start. `unread`: the places that cannot be read statically; `files`: all that were
-    read."""
+    """The nodes that some launch files start. `unread`: the places that cannot be read statically; `files`: all files
+    that were read."""
 
     nodes: tuple[Started, ...] = ()
     unread: tuple[Diagnostic, ...] = ()
@@ -59,8 +59,8 @@ class Launched:
 
 
 def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> Launched:
-    """The nodes that launch files start, each file with the values of its arguments; what they include is read where
-    it lies below `root`. What cannot be read stands in `unread`; an error there is a file that is none."""
+    """The nodes that launch files start, each file with the values of its arguments; included files are read if they
+    are below `root`. The parts that cannot be read are in `unread`; an error there is a file that is no launch file."""
     work = _Reading(root.resolve())
     for path, given in files:
         work.file(path.resolve(), dict(given), None)
@@ -68,7 +68,7 @@ def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> 
 
 
 class _Unknown(Exception):  # noqa: N818 - it says what was found
-    """A text that cannot be known."""
+    """A text that cannot be determined."""
 
 
 @dataclass(slots=True)
@@ -79,19 +79,19 @@ class _Scope:
     namespace: str = ""
     args: dict[str, Text] = field(default_factory=dict)
     given: dict[str, Text] = field(default_factory=dict)
-    """ROS 1: what the file was given from outside."""
+    """ROS 1: the arguments that the includer gave the file."""
     remaps: list[tuple[str, str]] = field(default_factory=list)
     doubt: tuple[str, ...] = ()
-    """Why what stands here may not be started, or be called otherwise."""
+    """Why nodes here may not be started, or may have other names."""
     lost: bool = False
-    """Its namespace is not known."""
+    """Whether its namespace is unknown."""
 
     def inner(self) -> _Scope:
         return replace(self, args=dict(self.args), remaps=list(self.remaps))
 
     def take(self, inner: _Scope, doubt: tuple[str, ...]) -> None:
-        """What stands in a scope that does not end holds from here on: its namespace, arguments and remappings.
-        `doubt`: that of the scope when it began; more than this one's where it may not be there at all."""
+        """The content of a scope that does not end holds from here on: its namespace, arguments and remappings.
+        `doubt`: that of the scope when it began; it exceeds this one's if the scope may not be executed at all."""
         sure = doubt == self.doubt
         changed = {name: value for name, value in inner.args.items() if self.args.get(name) != value}
         self.args.update(changed if sure else dict.fromkeys(changed, Unread("; ".join(doubt))))
@@ -147,7 +147,7 @@ class _Reading:
             scope = _Scope(path, ros1, 0, args={} if ros1 else dict(given), given=given)
         elif ros1:
             scope = replace(outer.inner(), path=path, ros1=True, depth=outer.depth + 1, args={}, given=given)
-        else:  # what is included shares its includer's scope
+        else:  # an included file shares its includer's scope
             scope = replace(outer, path=path, ros1=False, depth=outer.depth + 1)
             scope.args.update(given)
         self.each(parsed.elements, scope)
@@ -199,7 +199,7 @@ class _Reading:
                 self.tell(element, f"<{tag}> is not read")
 
     def condition(self, element: Element, scope: _Scope) -> bool | str:
-        """Whether it counts; a text where that depends on what is not known."""
+        """Whether the element applies; a text (the reason) if that depends on an unknown value."""
         for name, wanted in (("if", True), ("unless", False)):
             text = element.get(name)
             if text is None:
@@ -229,7 +229,7 @@ class _Reading:
 
     def remap(self, element: Element, scope: _Scope, started: bool | str) -> None:
         if element.children:
-            self.each(element.children, scope)  # ROS 1 nests what it remaps for
+            self.each(element.children, scope)  # in ROS 1 the elements that it remaps for are nested in it
         try:
             if isinstance(started, str):
                 raise _Unknown(started)
@@ -238,7 +238,7 @@ class _Reading:
             self.tell(element, f"the remapping is not known: {why}")
             scope.doubt = (*scope.doubt, f"a remapping is not known ({why})")
             return
-        if scope.ros1:  # the later one counts
+        if scope.ros1:  # the later one takes precedence
             scope.remaps = [pair for pair in scope.remaps if pair[0] != old]
         scope.remaps = [*scope.remaps, (old, new)]
 
@@ -272,13 +272,13 @@ class _Reading:
         path, why = self.included(element, scope)
         if path is None:
             self.tell(element, why)
-            if not scope.ros1:  # what it names or remaps holds from here on
+            if not scope.ros1:  # its names and remappings hold from here on
                 scope.doubt += (f"it comes after what is not read: {why}",)
         elif self.file(path, given, inner):
             scope.take(inner, doubt)
 
     def included(self, element: Element, scope: _Scope) -> tuple[Path | None, str]:
-        """The file that is included; else why it is not read."""
+        """The included file; otherwise the reason why it is not read."""
         try:
             text = self.expanded(_wanted(element, "file"), scope)
         except _Unknown as why:
@@ -388,7 +388,7 @@ class _Reading:
             return Unread(str(why))
 
     def expanded(self, text: Text, scope: _Scope) -> str:
-        """With every substitution in place. Raises _Unknown."""
+        """The text with every substitution expanded. Raises _Unknown."""
         if isinstance(text, Unread):
             raise _Unknown(text.why)
         whole = text
@@ -446,7 +446,7 @@ def _wanted(element: Element, key: str) -> Text:
 
 
 def _within(namespace: str, name: str) -> str:
-    """A name in a namespace; an absolute one as it is. Neither ends in a slash."""
+    """A name in a namespace; an absolute one unchanged. Neither ends in a slash."""
     if name.startswith("/"):
         return name.rstrip("/")
     return f"{namespace}/{name}".rstrip("/")
@@ -459,7 +459,7 @@ def _parsed(path: Path) -> Parsed:
         text = read_text(path, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise WrongLaunch(f"it cannot be read: {error}", 1) from None
-    from avow.ros.launch.markup import from_xml, from_yaml  # PyYAML is not light
+    from avow.ros.launch.markup import from_xml, from_yaml  # PyYAML is slow to import
 
     match path.suffix:
         case ".py":
