@@ -1,6 +1,6 @@
-"""Certificates as data. An entry's place is its rank; its hypotheses are computed (`avow.kernel.check`).
+"""Certificates as data. An entry's index is its rank; its hypotheses are computed (`avow.kernel.check`).
 
-Claims are named by digest, and looked up in the system as it is now and among the lemmas: any formulas, to be shown.
+Claims are named by digest, and looked up in the current system and among the lemmas: any formulas, to be shown.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ Format = StrEnum("Format", {"NOW": "avow/certificate/2"})
 
 
 class How(StrEnum):
-    """How an entry is known: by its questions; by a node's own evidence, while all its assumptions (`conds`) have held;
-    by a person, of values that no node provides; not at all (open: assumed by the derived contract, never under a
-    requirement); by an example (possible: never a premise); by definition (a memory: whatever the ports are, there is
-    one such). Together is no entry, but a hypothesis that the kernel adds (`avow.kernel.check.Needed`)."""
+    """How an entry is established: by its questions; by a node's own evidence, while all its assumptions (`conds`) have
+    held; by a person, for values that no node provides; not at all (open: assumed by the derived contract, never under
+    a requirement); by an example (possible: never a premise); by definition (a memory: such a value exists for any
+    ports). Together is not an entry, but a hypothesis that the kernel adds (`avow.kernel.check.Needed`)."""
 
     SHOWN = "shown"
     GUARANTEE = "guarantee"
@@ -32,7 +32,7 @@ class How(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """An entry used as a premise: of the step in question, or `back` steps earlier."""
+    """An entry used as a premise: at the step in question, or `back` steps earlier."""
 
     entry: int
     back: int = field(default=0, metadata=codec.LATER)
@@ -41,7 +41,7 @@ class Use:
 @dataclass(frozen=True, slots=True)
 class Question:
     """Premises from which an entry's claim has to follow: entries, and (in a base question) initial conditions.
-    `witness`: the premise of all these, and the part of its conjunction, that names what the claim says exists."""
+    `witness`: the premise, and the part of its conjunction, whose existential gives witnesses for the claim's."""
 
     uses: tuple[Use, ...] = ()
     initials: tuple[str, ...] = field(default=(), metadata=codec.LATER)
@@ -50,7 +50,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A claim by its digest, and how it is known: `base` asks of each of the first steps, `step` of every later one."""
+    """A claim by its digest, and how it is established: `base`: a question for each first step; `step`: for later."""
 
     how: How
     node: str
@@ -64,7 +64,7 @@ class Entry:
         return (*self.base, *((self.step,) if self.step is not None else ()))
 
     def named(self) -> Iterator[int]:
-        """`Named`: the entries that it names, in its conditions and in all of its questions."""
+        """`Named`: the entries named in its conditions and in all of its questions."""
         yield from self.conds
         yield from (use.entry for question in self.questions for use in question.uses)
 

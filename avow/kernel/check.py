@@ -1,8 +1,8 @@
-"""The kernel proper: `SoundFromAnyBeginning` (avow/calculus/proofs/kernel.dfy), held against a certificate.
+"""The kernel proper: `SoundFromAnyBeginning` (avow/calculus/proofs/kernel.dfy), applied to a certificate.
 
-Entries that are well formed (`Formed`) and valid (`Valid`, `Begins`: each question is written from the claims as they
-are now), and that rest on no others, are a closed part (`Closed`). Of a claim in it, the given entries that it names,
-directly or through others, are all its hypotheses. Of a certificate nothing is believed but indices and digests.
+Entries that are well formed (`Formed`) and valid (`Valid`, `Begins`: each question is written from the current claims),
+and that depend on no others, are a closed part (`Closed`). The hypotheses of a claim in it are the given entries that
+it names, directly or through others. Only a certificate's indices and digests are trusted.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Refused(Exception):  # noqa: N818 - it says what came of it
 
 @dataclass(frozen=True, slots=True, order=True)
 class Needed:
-    """A hypothesis. `conds`: assumptions that a guarantee's evidence may use; nodes whose values are as of one step."""
+    """A hypothesis. `conds`: assumptions that a guarantee's evidence may use; nodes whose values belong to one step."""
 
     kind: How
     node: str
@@ -39,7 +39,7 @@ class Needed:
 @dataclass(frozen=True, slots=True)
 class Established:
     """A claim established, up to its hypotheses. `goal`: its digest; `shown`: (node, digest) of those shown on the way;
-    `key`: of what it was established from; `vacuous`: its premises contradict; `solvers`: how many answered each;
+    `key`: the digest of its basis; `vacuous`: its premises are contradictory; `solvers`: how many answered each;
     `at_once`: at each step from what holds at that step."""
 
     goal: str
@@ -52,7 +52,7 @@ class Established:
 
 
 class Answered(NamedTuple):
-    """A question (its digest), answered as wanted by `solvers` of them; `together`: nodes whose steps it makes one."""
+    """A question (its digest), answered as wanted by `solvers` of them; `together`: nodes whose steps it merges."""
 
     digest: str
     solvers: int
@@ -74,12 +74,12 @@ class Kernel:
     solvers: Solvers
 
     def establish(self, goal: int, *, alone: bool = False) -> Established:
-        """The claim of an entry, on all that it rests on; `alone`: on its own questions and lemmas. Raises Refused."""
+        """The claim of an entry, on all its dependencies; `alone`: on its own questions and lemmas. Raises Refused."""
         entries, (answers, refused) = self.certificate.entries, self.checked
         if goal in refused or goal not in answers:
             raise refused.get(goal, Refused("there is no such entry"))
         part, own = {goal}, [goal]
-        for i in own:  # which grows
+        for i in own:  # which grows in the loop
             new = set(entries[i].named()) - part
             part |= new
             own += [j for j in new if not alone or self._claim(entries[j]).kind is Claimed.REQUIREMENT]
@@ -104,7 +104,7 @@ class Kernel:
 
     @cached_property
     def checked(self) -> tuple[dict[int, tuple[Answered, ...]], dict[int, Refused]]:
-        """For each entry the answers to its questions, or why it is not valid, or rests on one that is not."""
+        """For each entry the answers to its questions, or why it is not valid, or depends on one that is not."""
         answers, refused = dict[int, tuple[Answered, ...]](), dict[int, Refused]()
         users: dict[int, list[int]] = {}
         for i, entry in enumerate(self.certificate.entries):
@@ -114,7 +114,7 @@ class Kernel:
                 answers[i] = tuple(self._entry(i, entry))
             except (Refused, Untranslatable) as why:
                 refused[i] = why if isinstance(why, Refused) else Refused(f"no text: {why}")
-        for i in (stack := list(refused)):  # which grows meanwhile
+        for i in (stack := list(refused)):  # which grows in the loop
             for user in users.get(i, ()):
                 if user not in refused:
                     refused[user] = refused[i]
@@ -128,7 +128,7 @@ class Kernel:
             raise Refused("it names an entry that is not there, or that is no premise")
         match entry.how:
             case How.GUARANTEE:
-                # it holds while *all* its node's assumptions have held so far: none may be left out
+                # it holds while *all* its node's assumptions have held so far: none may be omitted
                 conds = frozenset(entries[c].digest for c in entry.conds)
                 late = any(c >= i or entries[c].node != entry.node for c in entry.conds)
                 if late or conds != self.known.assumptions.get(entry.node):
@@ -146,12 +146,12 @@ class Kernel:
             case How.POSSIBLE:
                 body = (text := Text()).formula(claim.term, claim.symbols())
                 yield self._asked(text.script([body]), Said.SAT, f"{claim.called}: no values are shown to be so")
-                if claim.kind is Claimed.START:  # an example is not enough where the environment has a say: all of it
+                if claim.kind is Claimed.START:  # one example is not enough if the environment matters: all of it
                     firsts = [s.digest for s in self.known.every if s.kind is Claimed.INITIAL and s.node in claim.nodes]
                     yield from self.begins([use for question in entry.base for use in question.uses], firsts)
 
     def _claim(self, entry: Entry) -> Statement:
-        """The claim of an entry as it is now. Raises Refused."""
+        """The claim of an entry, looked up in the current system. Raises Refused."""
         found = (self.known.find(entry.digest, kind, entry.node) for kind in KINDS.get(entry.how, ()))
         if (claim := next(filter(None, found), None)) is None:
             raise Refused(f"stale: {entry.node or 'the system'} has no such {entry.how} claim")
@@ -159,7 +159,7 @@ class Kernel:
 
     def _asked(self, script: str, wanted: Said, otherwise: str) -> Answered:
         if wanted is Said.SAT and (types := re.findall(r"^\(declare-sort (.*) 0\)$", script, re.MULTILINE)):
-            if re.search(r"\((forall|exists) \(", script):  # else what is so in one element is so in any number
+            if re.search(r"\((forall|exists) \(", script):  # without quantifiers, one element represents any number
                 raise Refused(f"{otherwise}, however many elements {' and '.join(types)} may have")
             script += "".join(f"(assert (forall ((x {name}) (y {name})) (= x y)))\n" for name in types)
         said, count = self.solvers.ask(script, wanted)
@@ -176,20 +176,20 @@ class Kernel:
         return Answered(found.digest, found.solvers, self._together(claim, question), vacuous)
 
     def _question(self, text: Text, claim: Statement, question: Question, step: int) -> tuple[list[str], str]:
-        """Premises and conclusion. A witness is what a premise says exists, by name: it serves for what the claim says
-        exists, which is thereby shown, and more."""
+        """Premises and conclusion. A witness names the values that a premise says exist: the claim's existential is
+        shown for these values, which is stronger."""
         used = [*self._used(question.uses), *((self._initial(mark), step) for mark in question.initials)]
         premises = [text.formula(each.term, each.symbols(back)) for each, back in used]
         if question.witness is None:
             return premises, text.formula(claim.term, claim.symbols())
         at, which = question.witness
-        for source, back in used[at : at + 1]:  # that premise, if it is there
+        for source, back in used[at : at + 1]:  # that premise, if it exists
             parts: Sequence[object] = source.term.items if isinstance(source.term, And) else (source.term,)
             match claim.term, parts[which] if which < len(parts) else None:
                 case Quantified(Quantifier.EXISTS, wanted, body), Quantified(Quantifier.EXISTS, given, such):
                     names = [symbol(f"witness {k}") for k in range(len(given))]
                     for name, variable in zip(names, given, strict=True):
-                        text.declare(name, variable.sort)  # and with that, that it is of its sort
+                        text.declare(name, variable.sort)  # this also asserts that it is of its sort
                     if [v.sort for v in wanted] == [v.sort for v in given]:
                         premises.append(text.formula(such, source.symbols(back), dict(zip(given, names, strict=True))))
                         return premises, text.formula(body, claim.symbols(), dict(zip(wanted, names, strict=True)))
@@ -204,8 +204,8 @@ class Kernel:
         return found
 
     def begins(self, uses: Sequence[Use], marks: Sequence[str]) -> Iterator[Answered]:
-        """`Begins`: initials say nothing of the environment: whatever constants the environment entries used allow,
-        there is a first value of each output, its conditions taken together (`Apart`). Raises Refused."""
+        """`Begins`: initials do not constrain the environment: for all constants that the environment entries used
+        allow, each output has a first value that satisfies all its conditions together (`Apart`). Raises Refused."""
         initials = [each for each in self.known.every if each.kind is Claimed.INITIAL]
         given = [use for use in uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
         for mark in dict.fromkeys(marks):
@@ -229,10 +229,10 @@ class Kernel:
             yield self._asked(asked, Said.UNSAT, f"{called}: no first value for every constant input that is allowed")
 
     def _together(self, claim: Statement, question: Question) -> tuple[str, ...]:
-        """The nodes of whose steps a question makes one, where that is more than the wires say. Along a chain, where
-        each value is read by one node, it follows one message on its way, whatever else happens meanwhile. It does not
-        where a claim speaks of values of two nodes, a value is read in two places, a value of the step before is, or a
-        node off the chain says something of its own steps: its pace, or what it remembers of the environment."""
+        """The nodes whose steps a question treats as one, if the wires do not imply that. Along a chain, where each
+        value is read by one node, it follows one message on its way, whatever else happens meanwhile. This fails if a
+        claim refers to values of two nodes, a value is read in two places, a value of the previous step is read, or a
+        node off the chain constrains its own steps: its pace, or what it remembers of the environment."""
         used = [(claim, 0), *self._used(question.uses)]
         before = question.initials or any(back or any(p.back for p in each.sources) for each, back in used)
         reads = {(node, each.node) for each, _ in used for node in each.nodes - {each.node}}

@@ -1,12 +1,12 @@
-"""How often a claim may fail that rests on samples: each bound is checked against its sample, then bounds are added.
+"""How often a claim that depends on samples may fail: each bound is checked against its sample, then bounds are added.
 
 A sample has one or more strata (conditions under which trials were made). In a stratum with `failures` in `trials`,
 "the probability of failure is at most p" holds at confidence c if so few failures have probability 1 - c or less where
-the true probability is p (C. J. Clopper and E. S. Pearson, 1934). Of several strata the greatest bound counts. A claim
-that rests on several sampled claims fails at most as often as these together (the union bound, whatever depends on
-what), and the doubts 1 - c add up as well (Bonferroni). A trial is a step, or a whole run of any number of steps:
-neither rate bounds the other, so all trials have to be of one kind. A claim that may fail for what failed at an earlier
-step has a rate of whole runs only.
+the true probability is p (C. J. Clopper and E. S. Pearson, 1934). For several strata the greatest bound counts. A claim
+that depends on several sampled claims fails at most as often as these together (the union bound, for any dependence),
+and the doubts 1 - c add up as well (Bonferroni). A trial is a step, or a whole run of any number of steps: neither rate
+bounds the other, so all trials have to be of one kind. A claim that may fail because of a failure at an earlier step
+has a rate of whole runs only.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from avow.kernel.check import Refused
 
 Trial = StrEnum("Trial", {"STEP": "step", "RUN": "run"})
 _UP = Context(prec=50, rounding=ROUND_CEILING, Emin=-(10**15), Emax=10**15)
-"""All numbers of `tail` are positive and rounded up, so its result is never too small."""
+"""All numbers of `tail` are positive and rounded up, so that its result is never too small."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stratum:
-    """Trials under one condition. `bound` and `confidence` are decimals, and exact."""
+    """Trials under one condition. `bound` and `confidence` are exact decimals."""
 
     name: str
     trials: int
@@ -81,9 +81,9 @@ def shows(failures: int, trials: int, bound: Fraction, confidence: Fraction) -> 
 
 
 def composed(leaves: Sequence[Leaf], *, at_once: bool) -> Rate:
-    """The rate of a claim that fails in a run only where a leaf does (`at_once`: at a step only where one does then).
-    Raises Refused where a sample does not show its bound, or where trials do not add up. Where the doubts add up to 1
-    or more, nothing is known: the bound is 1."""
+    """The rate of a claim that fails in a run only if a leaf does (`at_once`: at a step only if one does then). Raises
+    Refused if a sample does not show its bound, or if trials do not add up. If the doubts add up to 1 or more, nothing
+    is known: the bound is 1."""
     bound = doubt = Fraction(0)
     trials = {each.trial: leaf.claim for leaf in leaves for each in leaf.strata}
     if Trial.STEP in trials and (Trial.RUN in trials or not at_once):

@@ -1,4 +1,4 @@
-"""A question put to Z3 within a budget of its own steps, and to a second solver if there is one."""
+"""A question to Z3 within a budget of its own steps, and to a second solver if there is one."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 BUDGET = 8_000_000
-"""Z3's steps for one question: a second or two."""
+"""Z3's steps for one question: one or two seconds."""
 
 LOOK = 400_000
-"""Steps to look for a contradiction among premises: it decides nothing but whether a claim is called vacuous."""
+"""Steps to look for a contradiction among premises: it only decides whether a claim is called vacuous."""
 
 NET_MS = 60_000
-"""For what Z3's steps do not count; it is met only by a fault of the solver."""
+"""A limit for work that Z3's steps do not count; it is reached only by a fault of the solver."""
 
 
 class Said(StrEnum):
     UNSAT = "unsat"
     SAT = "sat"
     UNKNOWN = "unknown"
-    LATE = "stopped by the clock"  # and not by its steps: on another day it may be another answer
+    LATE = "stopped by the clock"  # and not by its steps: another run may give another answer
 
 
 def ask_z3(script: str, budget: int) -> Said:
-    """What Z3 says of a script within so many of its own steps; `unknown` of what it cannot read."""
+    """Z3's answer to a script within a number of its own steps; `unknown` if it cannot read the script."""
     import z3
 
     try:
-        solver = z3.Solver(ctx=z3.Context())  # of its own: it sees no other question's declarations
+        solver = z3.Solver(ctx=z3.Context())  # its own: it sees no other question's declarations
         solver.set(rlimit=budget, timeout=NET_MS)
-        solver.set("smt.arith.nl.grobner", False)  # of non-linear integer terms: they cannot be interrupted
+        solver.set("smt.arith.nl.grobner", False)  # for non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
         said = Said(str(solver.check()))
         return Said.LATE if said is Said.UNKNOWN and solver.reason_unknown() == "timeout" else said
@@ -47,7 +47,7 @@ class Solvers:
     known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
     def ask(self, script: str, wanted: Said) -> tuple[Said, int]:
-        """What is said; how many solvers say what is wanted: 0 where Z3 does not, or the second says the opposite."""
+        """The answer; how many solvers give the wanted one: 0 if Z3 does not, or the second says the opposite."""
         if (said := self.first(script, BUDGET)) is not wanted or self.second is None:
             return said, int(said is wanted)
         second = self.second(script)

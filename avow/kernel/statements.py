@@ -1,8 +1,8 @@
-"""The claims of a system: formulas over the values of all ports at a step and at the step before.
+"""The claims of a system: formulas over the values of all ports at a step and at the previous step.
 
-An input *is* the variable of its source: its value now, or, over a delayed edge, that of the step before; so the wiring
-stands in every claim's text. A claim is known by the SHA-256 of that text. Names of clauses play no part: where two
-guarantees swap names nothing changes, and where a wire moves every claim that crosses it does.
+An input *is* the variable of its source: its value now, or, over a delayed edge, that of the previous step; so every
+claim's text contains the wiring. A claim is identified by the SHA-256 of that text. Names of clauses do not matter: if
+two guarantees swap names nothing changes, and if a wire moves every claim that crosses it does.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from avow.language.terms import Role, Term, Variable
 
 
 class Claimed(StrEnum):
-    """What a claim is: a clause of a node; what the plan assumes of the environment; what an output is before the first
-    step, where delayed edges deliver it; of every step of the whole system (requirement); that some values are so, or
-    none (a situation that a guarantee is about); that a loop has first values; what a step leaves in a memory."""
+    """The kinds of claims: a clause of a node; the plan's assumption about the environment; an output before the first
+    step, where delayed edges deliver it; one about every step of the whole system (requirement); that some values, or
+    none, satisfy a formula (a guarantee's situation); that a loop has first values; what a step leaves in a memory."""
 
     ASSUMPTION = "assumption"
     GUARANTEE = "guarantee"
@@ -37,8 +37,8 @@ class Claimed(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A value `back` steps ago. `node`: whose output it is (`name` is ``node.port``); None: the environment's (of one
-    name there is one value; a rigid one never changes); empty: no node's, what is remembered of the environment."""
+    """A value `back` steps ago. `node`: the node whose output it is (`name` is ``node.port``); None: the environment's
+    (one name has one value; a rigid one never changes); empty: no node's, a remembered value of the environment."""
 
     name: str
     node: str | None
@@ -47,15 +47,15 @@ class Place:
     rigid: bool = False
 
     def symbol(self, shift: int = 0) -> str:
-        """The SMT-LIB variable of the value, where a claim is made of a step `shift` steps ago."""
+        """The SMT-LIB variable of the value, if a claim is made about a step `shift` steps ago."""
         when = "" if self.rigid else f"~{self.back + shift}"
         return symbol(f"{'?' if self.node is None else ''}{self.name}{when}")
 
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """A system as the kernel is told of it (trusted): contracts, what each port (role, node, name) is, and the plan's
-    formulas: kind, node, name, formula over the node's ports, or over ``node.port`` where `node` is empty."""
+    """The kernel's view of a system (trusted): contracts, the value of each port (role, node, name), and the plan's
+    formulas: kind, node, name, formula over the node's ports, or over ``node.port`` if `node` is empty."""
 
     nodes: tuple[Node, ...]
     ports: Mapping[tuple[Role, str, str], Place]
@@ -64,7 +64,7 @@ class Wiring:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A claim. `node` and `name` say where it was found, for people; what it says is `digest`."""
+    """A claim. `node` and `name` say where it was found, for people; `digest` identifies its content."""
 
     kind: Claimed
     node: str
@@ -74,7 +74,7 @@ class Statement:
     digest: str = ""
 
     def symbols(self, shift: int = 0) -> Symbols:
-        """Its variables' names where it is made of a step `shift` steps ago."""
+        """Its variables' names if it is made about a step `shift` steps ago."""
         return lambda variable: (self.places[variable].symbol(shift), self.places[variable].sort)
 
     @property
@@ -91,14 +91,14 @@ class Statement:
 
     @property
     def unary(self) -> bool:
-        """Whether it speaks of the state before a step alone: the values before it, and those that never change."""
+        """Whether it refers only to the state before a step: the values before it, and those that never change."""
         return all(place.rigid if place.node is None else place.back == 1 for place in self.places.values())
 
 
 @dataclass(frozen=True)
 class Statements:
-    """All claims of a system as it is now that have a text. `assumptions`: node → digests of all of its assumptions;
-    not of one with an assumption that has no text, so that nothing is concluded from its guarantees."""
+    """All claims of the current system that have a text. `assumptions`: node → digests of all of its assumptions; not
+    for a node with an assumption that has no text, so that nothing is concluded from its guarantees."""
 
     every: tuple[Statement, ...]
     assumptions: Mapping[str, frozenset[str]]
@@ -111,7 +111,7 @@ class Statements:
         return found
 
     def find(self, digest: str, kind: Claimed, node: str | None = None) -> Statement | None:
-        """The claim of this kind (and node) that says so, if there is one."""
+        """The claim of this kind (and node) with this digest, if there is one."""
         same = self.by_digest.get(digest, ())
         return next((s for s in same if s.kind is kind and node in (None, s.node)), None)
 
@@ -144,6 +144,6 @@ def _stated(wiring: Wiring, kind: Claimed, node: str, name: str, term: Term) -> 
         return places[variable].symbol(), found.sort
 
     body = (text := Text()).formula(term, called)
-    # that some values are so is another claim than that all are
+    # a claim about some values differs from one about all
     said = [*text.declarations.values(), *([kind] if kind in (Claimed.POSSIBLE, Claimed.START) else []), body]
     return Statement(kind, node, name, term, places, sha256("\n".join(said)))

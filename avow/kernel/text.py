@@ -1,8 +1,8 @@
-"""A formula as SMT-LIB 2.6 text: the one translation that a certified claim rests on. Nothing is simplified.
+"""A formula as SMT-LIB 2.6 text: the one translation that a certified claim depends on. Nothing is simplified.
 
-NATURAL is Int, with membership said wherever a natural can stand: of free and bound variables, of functions' results,
-of parts of data; an element beyond a sequence's end is some value of its type. Division by zero is some value.
-Free functions are uninterpreted functions; functions under a quantifier are arrays, one argument after the other.
+NATURAL is Int, with membership asserted wherever a natural can occur: for free and bound variables, functions' results,
+parts of data; an element beyond a sequence's end is some value of its type. Division by zero is some value. Free
+functions are uninterpreted functions; functions under a quantifier are arrays, one argument after the other.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FORMS |= {t.Negative: "-", t.Widen: "to_real", t.Length: "seq.len"}
 SORTS: dict[s.Sort, str] = {s.BOOL: "Bool", s.REAL: "Real", s.INTEGER: "Int", s.NATURAL: "Int", s.STRING: "String"}
 BUILTINS: dict[t.Builtin, Callable[..., str]] = {
     t.Builtin.XOR: lambda a, b: f"(xor {a} {b})",
-    t.Builtin.MOD: lambda a, b: f"(mod {a} {b})",  # here and below the divisor is positive and written down
+    t.Builtin.MOD: lambda a, b: f"(mod {a} {b})",  # here and below the divisor is a positive literal
     t.Builtin.DIV: lambda a, b: f"(div {a} {b})",
     t.Builtin.ABS: lambda a: f"(ite (< {a} 0) (- {a}) {a})",
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
@@ -28,7 +28,7 @@ BUILTINS: dict[t.Builtin, Callable[..., str]] = {
 }
 assert BUILTINS.keys() == set(t.Builtin), f"no text in {__file__} for {set(t.Builtin) ^ BUILTINS.keys()}"
 
-# what a free variable is called, with its sort (an INTEGER input may read a NATURAL output); what a bound one is
+# the name of a free variable, with its sort (an INTEGER input may read a NATURAL output); the name of a bound one
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]
 Bound = Mapping[t.Variable, str]
 
@@ -52,7 +52,7 @@ class Text:
             raise Untranslatable("a formula that is too deep") from None
 
     def script(self, assertions: Iterable[str]) -> str:
-        """A question to a solver: can these hold, of values of their types?"""
+        """A question to a solver: can these formulas hold, for values of their types?"""
         facts = [self.member(sort, name) for name, sort in self.free.items()]
         lines = [f"(assert {each})" for each in (*facts, *assertions) if each is not None]
         return "\n".join(["(set-logic ALL)", *self.declarations.values(), *lines, ""])
@@ -69,7 +69,7 @@ class Text:
         return [f"b{k}" for k in range(self._bound - count + 1, self._bound + 1)]
 
     def sort(self, sort: s.Sort) -> str:
-        """The name of a sort, declared with those that it is made of."""
+        """The name of a sort, declared with the sorts that it consists of."""
         match sort:
             case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
                 return SORTS[sort]
@@ -93,7 +93,7 @@ class Text:
         return reduce(lambda found, p: f"(Array {self.sort(p)} {found})", reversed(of), self.sort(to))
 
     def _named(self, own: str, sort: s.Sort) -> str:
-        """The name of a declared type; two types of one name are told apart by a prime, in the order of their use."""
+        """The name of a declared type; two types of one name are distinguished by a prime, in order of use."""
         name = symbol(f"type {own}")
         while self._sorts.setdefault(name, sort) != sort:
             name = f"{name[:-1]}'|"
@@ -107,7 +107,7 @@ class Text:
         return name
 
     def member(self, sort: s.Sort, value: str) -> str | None:
-        """That a value is one of its sort: its naturals are not negative. None where every one is."""
+        """That a value is one of its sort: its naturals are not negative. None if every value is."""
         match sort:
             case s.NaturalSort():
                 return f"(>= {value} 0)"
@@ -179,13 +179,13 @@ class Text:
             case t.Length(sequence=t.SequenceRange(low=low, high=high)):
                 return _how_many(self.say(low, bound), self.say(high, bound))
             case t.Index(sequence=sequence, index=at, sort=sort):
-                found = form("seq.nth", (sequence, at))  # beyond the end it is any value, but one of the sort
+                found = form("seq.nth", (sequence, at))  # beyond the end it is any value of the sort
                 return f"(ite (>= {found} 0) {found} 0)" if isinstance(sort, s.NaturalSort) else found
             case t.Quantified():
                 return self.quantified(term, bound)
             case _ if type(term) in FORMS:
                 return form(FORMS[type(term)], term.children)
-            case _:  # a range or a set in a place for which there is no text
+            case _:  # a range or a set in a place where it has no text
                 raise Untranslatable(f"{type(term).__name__} here")
 
     def name(self, variable: t.Variable, bound: Bound) -> str:
@@ -218,14 +218,14 @@ class Text:
             return self.bound(term.quantifier, names, sorts, body)
         if any(isinstance(sort, s.FunctionSort) for sort in sorts):
             raise Untranslatable("unique existence of a function")
-        others, again = named()  # there is one, and every one is that one
+        others, again = named()  # one exists, and every one equals it
         equal = conjunction(f"(= {other} {name})" for other, name in zip(others, names, strict=True))
         only = self.bound("forall", others, sorts, f"(=> {again} {equal})")
         return self.bound("exists", names, sorts, f"(and {body} {only})")
 
 
 def symbol(name: str) -> str:
-    """A quoted symbol; what may not stand in one, and the dollar sign, is written by its code."""
+    """A quoted symbol; characters that are not allowed in one, and the dollar sign, are written by their code."""
     plain = (c if " " <= c <= "~" and c not in "|\\$" else f"${ord(c):x}$" for c in name)
     return f"|{''.join(plain)}|"
 
@@ -236,7 +236,7 @@ def field(of: str, name: object) -> str:
 
 
 def application(function: str, arguments: Iterable[str]) -> str:
-    """A function of arguments; one that is bound (b1, b2, …) is an array."""
+    """A function applied to arguments; one that is bound (b1, b2, …) is an array."""
     arguments = tuple(arguments)
     if function[0] == "b":
         return reduce(lambda array, argument: f"(select {array} {argument})", arguments, function)
