@@ -1,5 +1,5 @@
-"""The language server: what an editor asks about .rcl files and plans.
+"""The language server: an editor's requests about .rcl files and plans.
 
-Front door: `avow.lsp.server`. It puts in the protocol's words what `features` and its neighbours answer as plain data;
-`project` says what a document belongs to, `background` asks the sanity claims in a process of its own.
+Start reading at `avow.lsp.server`. It converts the plain data of `features` and its neighbours to the protocol's form;
+`project` determines a document's system, `background` evaluates the sanity claims in its own process.
 """

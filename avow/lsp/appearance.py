@@ -1,4 +1,4 @@
-"""How a contract looks: what each word of it is (for colours), and which parts of it fold."""
+"""How a contract looks: the kind of each word (for colours), and the parts that can be folded."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _OF_TOKEN = {"BUILTIN": "type", "STRING": "string", "NUMBER": "number", "UNIT": 
 
 @dataclass(frozen=True, slots=True)
 class Coloured:
-    """A stretch of one line, with what it is: `kind` is of `TOKEN_TYPES`, `modifiers` of `MODIFIERS`."""
+    """A stretch of one line, with its kind: `kind` is one of `TOKEN_TYPES`, `modifiers` of `MODIFIERS`."""
 
     start: int
     end: int
@@ -47,7 +47,7 @@ class Coloured:
 
 
 def coloured(text: Text, found: Sequence[Occurrence]) -> tuple[Coloured, ...]:
-    """Every word of a text that has a colour, in order; what goes over several lines, line by line."""
+    """Every word of a text that has a colour, in order; tokens over several lines, line by line."""
     names = {o.start: o for o in found if o.file == text.file and o.written}
     out: list[Coloured] = []
     for token in sorted((*text.tokens, *text.comments), key=lambda t: t.start):

@@ -1,8 +1,8 @@
-"""Sanity while one writes: a process of its own, which ends when the text has changed.
+"""Sanity during editing: a process of its own, which ends when the text has changed.
 
-``python -m avow.lsp.background PARENT`` reads the texts of a system from its standard input, asks the sanity claims of
-the nodes that are wanted, and writes a line of JSON for each node as soon as it is settled. It opens no file and runs
-nothing of the workspace: what a plan says (scenario, environment, providers) is asked by ``avow sanity``.
+``python -m avow.lsp.background PARENT`` reads the texts of a system from its standard input, evaluates the sanity
+claims of the requested nodes, and writes a line of JSON for each node as soon as it is done. It opens no file and runs
+nothing from the workspace: ``avow sanity`` covers the plan (scenario, environment, providers).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from avow.lsp.names import taken_apart
 from avow.sanity.claims import node_key
 
 _NEUTRAL = "/"
-"""Where it runs: nothing of a workspace is found from there."""
+"""Its working directory: nothing of a workspace is found from there."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of one sanity claim. `subject` is the clause or output that it is about, if it is about one."""
+    """The result of one sanity claim. `subject` is the clause or output that it is about, if it is about one."""
 
     name: str
     subject: str
@@ -42,42 +42,42 @@ class Answer:
 
     @property
     def is_bad(self) -> bool:
-        """Whether it is refuted or broken, and no mere consequence of another."""
+        """Whether it is refuted or broken, and not merely a consequence of another."""
         return self.verdict in ("refuted", "error") and not self.because
 
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """What the process reads: files with their texts, and the keys of the nodes that are wanted."""
+    """The input of the process: files with their texts, and the keys of the requested nodes."""
 
     texts: tuple[tuple[str, str], ...]
     nodes: tuple[str, ...]
 
 
 def askable(sources: Sequence[Source], contract: Contract) -> tuple[Node, ...]:
-    """The nodes of which nothing is missing for an error."""
+    """The nodes of which no part is missing because of an error."""
     return sound_nodes(contract, [taken_apart(s.file, s.text).syntax for s in sources])
 
 
 class Asked:
-    """The answers known, by the meaning of a node; and the process that looks for more. At most one runs."""
+    """The known answers, by the meaning of a node; and the process that computes more. At most one runs."""
 
     def __init__(self, told: Callable[[], None]) -> None:
         self.told = told
         self.answers: dict[str, tuple[Answer, ...]] = {}
         self.wanted: frozenset[str] = frozenset()
-        """The keys of the nodes that are being asked about."""
+        """The keys of the nodes that are being evaluated."""
         self.task: asyncio.Task[None] | None = None
 
     def about(self, node: Node, clause: str | None) -> tuple[Answer, ...]:
-        """What is known of a clause of a node, or (None) of the node and its outputs; nothing while it is not asked."""
+        """The known answers for a clause of a node, or (None) for the node and its outputs; none until computed."""
         others = {each.name for each in node.clauses}
         found = self.answers.get(_key(node), ())
         return tuple(a for a in found if (a.subject not in others if clause is None else a.subject == clause))
 
     def ask(self, systems: Sequence[tuple[Sequence[Source], Contract]]) -> None:
-        """Ask of the nodes of these systems of which nothing is known yet, one system after the other; whatever else is
-        under way is given up."""
+        """Request the answers for the nodes of these systems that have none, one system after the other; any other
+        request under way is cancelled."""
         asked = [(sources, self._missing(sources, contract)) for sources, contract in systems]
         wanted = frozenset(key for _, missing in asked for key in missing)
         if wanted == self.wanted and self.task is not None and not self.task.done():
@@ -96,7 +96,7 @@ class Asked:
                 await self._run(sources, missing)
 
     def give_up(self) -> None:
-        """End the process that is under way, if there is one."""
+        """End the running process, if there is one."""
         if self.task is not None:
             self.task.cancel()
         self.task, self.wanted = None, frozenset()
@@ -125,7 +125,7 @@ class Asked:
                     del self.answers[next(iter(self.answers))]
                 self.told()
         except (OSError, ValueError):
-            pass  # it died: nothing is known of the rest
+            pass  # it died: the rest stays unknown
         finally:
             with suppress(ProcessLookupError):
                 kill_tree(process.pid)
@@ -133,14 +133,14 @@ class Asked:
 
 
 def _key(node: Node) -> str:
-    """Of all that the answers depend on, and of what their sentences say."""
+    """Identifies everything that the answers and their sentences depend on."""
     return f"{node.name} {node_key(node)}"
 
 
 def main(parent: int) -> None:
-    """What the process does."""
+    """The main function of the process."""
     die_with(parent)
-    os.nice(10)  # whoever writes comes first
+    os.nice(10)  # the editor has priority
     from avow.sanity.analysis import analyse
 
     wanted = from_text(_Wanted, sys.stdin.read())

@@ -1,6 +1,6 @@
-"""What may be written at a place of a contract, and what the arguments of an operator or function are.
+"""The completions at a place of a contract, and the arguments of an operator or function.
 
-It works on words, so that it does while a text is being typed.
+It is based on words, so that it works while a text is being typed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """Something that may be written. `template` is a snippet in the protocol's words; empty: the label itself."""
+    """A completion. `template` is a snippet in the protocol's syntax; empty: the label itself."""
 
     label: str
     kind: str
@@ -36,7 +36,7 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """How an operator or function is applied, and which of its arguments the place is in."""
+    """How an operator or function is applied, and which of its arguments contains the place."""
 
     label: str
     parameters: tuple[str, ...]
@@ -64,7 +64,7 @@ class _Place:
 
     @property
     def last(self) -> str:
-        """The kind of the word before; empty where there is none."""
+        """The kind of the word before; empty if there is none."""
         return self.before[-1].type if self.before else ""
 
     @property
@@ -74,13 +74,13 @@ class _Place:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Of a definition."""
+        """The parameters of a definition."""
         pairs = pairwise(self.before) if self.defines else ()
         return tuple(t.text for t, then in pairs if t.type == "NAME" and then.type in ("COLON", "COMMA"))
 
 
 def _place_of(text: Text, offset: int) -> _Place | None:
-    """Where an offset is; None within a comment or a string."""
+    """The context of an offset; None within a comment or a string."""
     if any(c.start < offset and (offset < c.end or _goes_on(c, offset)) for c in text.comments):
         return None
     if any(t.type == "STRING" and t.start < offset < t.end for t in text.tokens):
@@ -90,7 +90,7 @@ def _place_of(text: Text, offset: int) -> _Place | None:
 
 
 def _goes_on(comment: Token, offset: int) -> bool:
-    """Whether what is typed at the end of a comment belongs to it."""
+    """Whether text typed at the end of a comment belongs to it."""
     return comment.text.startswith("//") and offset == comment.end
 
 
@@ -162,7 +162,7 @@ def _bound(part: Sequence[Token]) -> tuple[str, ...]:
 
 
 def offers(text: Text, contract: Contract, offset: int) -> tuple[Offer, ...]:
-    """All that may be written at an offset of a contract."""
+    """All completions at an offset of a contract."""
     place = _place_of(text, offset)
     if place is None:
         return ()
@@ -206,7 +206,7 @@ def _offers(place: _Place, contract: Contract) -> Iterator[Offer]:
                 yield from _types(contract)
         case "NODE", "ASSUME" | "GUARANTEE":
             yield from _of_formula(place, node, contract)
-        case _:  # a name that is yet to be made up
+        case _:  # a new name
             return
 
 
@@ -262,7 +262,7 @@ def _definitions(node: Node | None, contract: Contract) -> tuple[Definition, ...
 
 
 def _fields(place: _Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
-    """Those of the record before the point; where it is none of the node's ports, those of all records."""
+    """The fields of the record before the point; if it is not one of the node's ports, those of all records."""
     ports = (*node.inputs, *node.outputs) if node is not None else ()
     found = _sorts_of(place.before, ports)
     whole = found or [*components(*(sort for _, sort in contract.types), *(p.sort for p in ports))]
@@ -272,7 +272,7 @@ def _fields(place: _Place, node: Node | None, contract: Contract) -> Iterator[Of
 
 
 def _sorts_of(before: Sequence[Token], ports: Sequence[Port]) -> list[Sort]:
-    """The sorts that the port, or the field of one, has whose name ends the words."""
+    """The sorts of the port, or of the field of one, whose name ends the words."""
     chain: list[str] = []
     for token in reversed(before):
         if token.type not in ("NAME", "DOT", "IN", "OUT"):
@@ -286,13 +286,13 @@ def _sorts_of(before: Sequence[Token], ports: Sequence[Port]) -> list[Sort]:
 
 
 def _sort_before(place: _Place, node: Node | None) -> Sort | None:
-    """The sort of the port, or the field of one, that stands before the last word."""
+    """The sort of the port, or of the field of one, before the last word."""
     ports = (*node.inputs, *node.outputs) if node is not None else ()
     return next(iter(_sorts_of(place.before[:-1], ports)), None)
 
 
 def _of_sort(sort: Sort, node: Node | None, contract: Contract) -> Iterator[Offer]:
-    """What has this sort: elements, the truth values, constants and ports."""
+    """The values of this sort: elements, the truth values, constants and ports."""
     elements = of_contract(contract).elements
     yield from (o for o in _values(contract) if o.kind == "element" and elements[o.label] == sort)
     yield from (Offer(name, "constant", show_term(t, "rcl")) for name, t in contract.constants if t.sort == sort)
@@ -332,7 +332,7 @@ def _values(contract: Contract) -> Iterator[Offer]:
 
 
 def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
-    """How what stands before the innermost open parenthesis is applied."""
+    """How the operator or function before the innermost open parenthesis is applied."""
     place = _place_of(text, offset)
     inside = place is not None and (place.section in ("ASSUME", "GUARANTEE") or place.defines)
     if place is None or not inside:

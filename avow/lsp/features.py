@@ -1,4 +1,4 @@
-"""What an editor asks, answered as plain data: the server (`avow.lsp.server`) only puts it in the protocol's words.
+"""The answers to an editor's requests as plain data: the server (`avow.lsp.server`) only converts them to the protocol.
 
 Places are offsets into the text; the server converts them to the protocol's lines and UTF-16 columns.
 """
@@ -27,9 +27,9 @@ from avow.lsp.renaming import all_occurrences
 from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
 
 StatusLookup = Callable[[str, str], str | None]
-"""(node, clause) → what the ledger says of it, in a few words; None where it says nothing."""
+"""(node, clause) → its status in the ledger, in a few words; None if it has none."""
 SanityLookup = Callable[[Node, str | None], tuple[Answer, ...]]
-"""What is known of the sanity of a node's clause, or (None) of the node and its outputs."""
+"""The known answers about the sanity of a node's clause, or (None) of the node and its outputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +46,18 @@ class Symbol:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A text, what there is to say of it, and the system that it belongs to, as far as that can be read."""
+    """A text, its diagnostics, and the system that it belongs to, as far as that can be read."""
 
     file: str
     text: str
     project: Project
     diagnostics: tuple[Diagnostic, ...]
     names: tuple[Occurrence, ...] = field(repr=False)
-    """Every name in every file of the system that stands for something."""
+    """Every name with a meaning in every file of the system."""
 
     @property
     def taken_apart(self) -> Text:
-        """The contract's text; of a plan, that of none."""
+        """The contract's text; for a plan, an empty one."""
         return taken_apart(self.file, "" if is_plan(self.file) else self.text)
 
     @property
@@ -79,7 +79,7 @@ def analyse(text: str, file: str, texts: Mapping[str, str] | None = None) -> Doc
 
 
 def name_at(document: Document, offset: int) -> Occurrence | None:
-    """The name at (or just before) an offset that stands for something."""
+    """The name with a meaning at (or just before) an offset."""
     return at_offset(document.names, document.file, offset)
 
 
@@ -94,7 +94,7 @@ def hover(
     status: StatusLookup = lambda node, clause: None,
     sanity: SanityLookup = lambda node, clause: (),
 ) -> str | None:
-    """Markdown about the thing at an offset: its type, where it comes from, and how its guarantee stands."""
+    """Markdown about the thing at an offset: its type, its origin, and the status of its guarantee."""
     name = name_at(document, offset)
     if name is not None:
         return _about(document, name, status, sanity)
@@ -127,7 +127,7 @@ def definition(document: Document, offset: int) -> tuple[Occurrence, ...]:
 
 
 def references(document: Document, offset: int, declarations: bool = True) -> tuple[Occurrence, ...]:
-    """Every place, in all files of the system, where the thing whose name is at an offset is named."""
+    """Every place, in all files of the system, that names the thing whose name is at an offset."""
     name = name_at(document, offset)
     if name is None:
         return ()
@@ -200,12 +200,12 @@ def _about(document: Document, name: Occurrence, status: StatusLookup, sanity: S
 
 
 def _is_of(definition: Definition, node: Node, meaning: Meaning) -> bool:
-    """Whether a node's definition is the one that is meant; one of a context is the same for each that uses it."""
+    """Whether a node's definition is the intended one; a context's is the same for each node that uses it."""
     return definition.name == meaning.name and meaning.owner in ("", node.name)
 
 
 def _about_variable(document: Document, meaning: Meaning) -> str:
-    """A quantified variable, with its sort where its clause could be read."""
+    """A quantified variable, with its sort if its clause could be read."""
     place = next((o for o in document.names if o.declares and o.meaning == meaning), None)
     source = Source(document.file, document.project.text_of(document.file))
     for clause in (c for node in document.project.contract.nodes for c in node.clauses):
@@ -243,7 +243,7 @@ def _sane(node: Node | None, subject: str | None, sanity: SanityLookup) -> list[
 
 
 def _plain(text: str) -> str:
-    """Text that Markdown leaves as it is."""
+    """Text that Markdown leaves unchanged."""
     return "".join(f"\\{c}" if c in "\\`*_{}[]()#+-.!|<>~&" else c for c in text)
 
 

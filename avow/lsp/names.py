@@ -1,6 +1,6 @@
-"""What every name in the contracts of a system stands for, and where it stands: a table, made from the syntax.
+"""The meaning and position of every name in the contracts of a system: a table, made from the syntax.
 
-It says the same as the checker (`avow.language.check_names`), for every clause that parses. Places are offsets into the
+It agrees with the checker (`avow.language.check_names`) for every clause that parses. Places are offsets into the
 texts.
 """
 
@@ -42,7 +42,7 @@ from avow.language.terms import Role
 
 
 class What(StrEnum):
-    """What a name may stand for."""
+    """The kinds of things that a name can mean."""
 
     NODE = "node"
     INPUT = "input"
@@ -54,20 +54,20 @@ class What(StrEnum):
     DEFINITION = "definition"
     ELEMENT = "element"
     FIELD = "field"
-    """Of all records that have one of the name: their types do not count as different things."""
+    """For all records that have a field of the name: their types do not count as different things."""
     VARIABLE = "variable"
 
 
 PORTS = (What.INPUT, What.OUTPUT)
 CLAUSES = (What.ASSUMPTION, What.GUARANTEE)
 OWNED = (*PORTS, *CLAUSES, What.DEFINITION)
-"""What belongs to a node; a definition may belong to the context."""
+"""The kinds that belong to a node; a definition may belong to the context."""
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """One thing that names stand for. `owner` is the node of a port, a clause or a definition of its own; of what a
-    quantifier or a definition binds, where it is bound."""
+    """The meaning of a name. `owner` is the node of a port, a clause or a definition of its own; for a variable that a
+    quantifier or a definition binds, the place where it is bound."""
 
     what: What
     name: str
@@ -81,7 +81,7 @@ class Meaning:
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """A place where the name of something stands. One that is not `written` is where a clause without a name begins."""
+    """An occurrence of a name. One that is not `written` is where a clause without a name begins."""
 
     meaning: Meaning
     file: str
@@ -93,7 +93,7 @@ class Occurrence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Text:
-    """A contract's text, taken apart; of one text there is one, while it is remembered."""
+    """A contract's text, parsed; cached, so that each text has one."""
 
     file: str
     text: str
@@ -104,7 +104,7 @@ class Text:
 
 @functools.lru_cache(maxsize=64)
 def taken_apart(file: str, text: str) -> Text:
-    """The tokens and clauses of a text; what is wrong in it is not said here."""
+    """The tokens and clauses of a text; its faults are not reported here."""
     reports, comments = Reports(Source(file, text)), list[Token]()
     found = tokens(reports, comments)
     return Text(file, text, read(found, unless_torn(reports)), tuple(found), tuple(comments))
@@ -112,8 +112,8 @@ def taken_apart(file: str, text: str) -> Text:
 
 @functools.lru_cache(maxsize=16)
 def occurrences(texts: tuple[Text, ...], contract: Contract) -> tuple[Occurrence, ...]:
-    """Every name in the texts that stands for something, in each text by its place. `contract` is what they declare, as
-    far as it can be read."""
+    """Every name in the texts that has a meaning, in each text by position. `contract` is what they declare, as far as
+    it can be read."""
     nodes = [node for text in texts for node in text.syntax.nodes]
     own = {node.name.text: frozenset(d.name.text for d in node.definitions) for node in nodes}
     shared = (d.name.text for text in texts for d in text.syntax.declarations if isinstance(d, Define))
@@ -136,7 +136,7 @@ def clause_names(node: NodeSyntax) -> Iterator[tuple[Meaning, int, int, bool]]:
         what = What.ASSUMPTION if clause.kind is ClauseKind.ASSUMPTION else What.GUARANTEE
         name = clause.name.text if clause.name is not None else f"{letter}{counts[clause.kind]}"
         place = clause.name or Token("", "", clause.start, clause.start + 1)
-        own = clause.name is not None and clause.name.start != clause.start  # `steps( … )` is called by its keyword
+        own = clause.name is not None and clause.name.start != clause.start  # `steps( … )` is named by its keyword
         yield Meaning(what, name, node.name.text), place.start, place.end, own
 
 
@@ -148,7 +148,7 @@ class Ports:
     outputs: frozenset[str] = frozenset()
 
     def meaning(self, node: str, name: str, role: str | None = None) -> Meaning | None:
-        """The port of that name; of an input and an output, the input."""
+        """The port of that name; if both an input and an output have it, the input."""
         if role != Role.OUTPUT and name in self.inputs:
             return Meaning(What.INPUT, name, node)
         if role != Role.INPUT and name in self.outputs:
@@ -157,8 +157,8 @@ class Ports:
 
 
 def declared(environment: Environment, name: str) -> Meaning | None:
-    """What a context makes of a name, but for its definitions. An enumeration that is declared as a constant is a type:
-    it may stand for one."""
+    """The meaning of a name in a context, except for its definitions. An enumeration that is declared as a constant is
+    a type: the constant may denote one."""
     of = environment
     kinds = ((What.ELEMENT, of.elements), (What.TYPE, of.types), (What.CONSTANT, of.constants))
     return next((Meaning(what, name) for what, names in kinds if name in names), None)
@@ -174,7 +174,7 @@ class _Reader:
     environment: Environment
     nodes: Mapping[str, Ports]
     defined: Mapping[str, frozenset[str]]
-    """The definitions of each node; of the contexts under no name."""
+    """The definitions of each node; those of the contexts under the empty name."""
     node: str = ""
     text_: Text = field(default_factory=lambda: Text("", "", FileSyntax(), (), ()))
 
@@ -183,7 +183,7 @@ class _Reader:
             yield Occurrence(meaning, self.text_.file, start, end, declares)
 
     def global_name(self, name: str) -> Meaning | None:
-        """What a name means wherever it stands."""
+        """The meaning of a name wherever it occurs."""
         owner = next((each for each in (self.node, "") if name in self.defined.get(each, ())), None)
         return declared(self.environment, name) if owner is None else Meaning(What.DEFINITION, name, owner)
 
@@ -265,7 +265,7 @@ class _Reader:
                 case PortName(role=role, name=name):
                     ports = self.nodes.get(self.node, Ports())
                     yield from self.at(ports.meaning(self.node, name, role), part.end - len(name), part.end)
-                case NodePort(node=name):  # a field of a record; a contract speaks of its own ports only
+                case NodePort(node=name):  # a field of a record; a contract refers only to its own ports
                     yield from self.at(scope.get(name) or self.meaning(name), part.start, part.start + len(name))
                     yield from self.at(Meaning(What.FIELD, part.name), part.end - len(part.name), part.end)
                 case FieldOf(body=body, name=token):
@@ -280,7 +280,7 @@ class _Reader:
                             inner[token.text] = Meaning(What.VARIABLE, token.text, place)
                             yield from self.at(inner[token.text], token.start, token.end, True)
                     stack.append((body, inner))
-                case _:  # whatever else has parts
+                case _:  # any other term with parts
                     stack.extend((each, scope) for each in children(part))
 
     def meaning(self, name: str) -> Meaning | None:
@@ -288,7 +288,7 @@ class _Reader:
         return ports.meaning(self.node, name) or self.global_name(name)
 
     def in_words(self, found: Sequence[Token]) -> Iterator[Occurrence]:
-        """The names of a clause that does not parse, but for those that it binds."""
+        """The names of a clause that does not parse, except for those that it binds."""
         for at, token in enumerate(found):
             role = found[at - 2].text if at > 1 and found[at - 1].type == "DOT" else None
             if token.type == "NAME" and role in (None, *Role):

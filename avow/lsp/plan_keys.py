@@ -1,5 +1,5 @@
-"""What may be written at a place of a plan, and what its keys are: by the plan's schema, the backends' options, and the
-names of the contract. It works on lines, so that it does while a text is being typed."""
+"""The completions at a place of a plan, and the documentation of its keys: by the plan's schema, the backends' options,
+and the names of the contract. It is based on lines, so that it works while a text is being typed."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _NAMED = ("nodes", "compound", "external")
 
 
 def plan_offers(text: str, contract: Contract, offset: int) -> tuple[Offer, ...]:
-    """All that may be written at an offset of a plan.
+    """All completions at an offset of a plan.
 
-    After ``node.`` its ports and guarantees; at the start of a line the
-    keys of the schema, and nodes where these are keys; elsewhere nodes."""
+    After ``node.`` its ports and guarantees; at the start of a line the keys of the schema, and nodes where these are
+    keys; elsewhere nodes."""
     begin = text.rfind("\n", 0, offset) + 1
     line = text[begin:offset]
     if _in_comment(line):
@@ -68,12 +68,12 @@ def _path(lines: Sequence[str], indent: int) -> tuple[str, ...]:
             found.append(match["key"])
             indent = len(match["indent"])
             if match["dashes"]:
-                indent += 1  # what holds the list may stand in the column of its dashes
+                indent += 1  # the list's parent may be in the column of its dashes
     return tuple(reversed(found))
 
 
 def about_key(text: str, offset: int) -> str | None:
-    """Markdown about the key at an offset: what the schema says of it, or of a method, or of a method's option."""
+    """Markdown about the key at an offset: the schema's description of it, or of a method, or of a method's option."""
     begin = text.rfind("\n", 0, offset) + 1
     line = text[begin:].split("\n", 1)[0]
     match = _KEY.match(line) or _METHOD.match(line)
@@ -86,7 +86,7 @@ def about_key(text: str, offset: int) -> str | None:
 
 
 def _keys(path: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The keys that may stand at a path, with what they are."""
+    """The keys that are allowed at a path, with their descriptions."""
     if _among_methods(path):
         yield from ((name, _about_backend(name)) for name in names())
     here: list[Mapping[str, Any]] = [plan_schema()]
@@ -114,7 +114,7 @@ def _under(schema: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
 
 
 def _resolved(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The schema, or what it refers to, or chooses among, or lists."""
+    """The schema, or those that it refers to, chooses among, or lists."""
     if "$ref" in schema:
         yield from _resolved(plan_schema()["$defs"][schema["$ref"].rsplit("/", 1)[-1]])
         return

@@ -1,8 +1,8 @@
-"""What the names in a plan stand for: nodes, ports and clauses of the contract, elements and types in its formulas.
+"""The meaning of the names in a plan: nodes, ports and clauses of the contract, elements and types in its formulas.
 
-Keys and values that the plan's schema gives a meaning are read as that. In a method's options, which its backend
+Keys and values with a meaning in the plan's schema are read accordingly. In a method's options, which its backend
 knows, ``in.v`` and ``out.v`` are read as ports of the method's node and ``guarantee:`` as names of its guarantees;
-other words of a text that names a port so are looked up as in a formula. All else is left alone.
+other words of a text that names a port so are looked up as in a formula. Everything else is ignored.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class PlanText:
 
 
 def plan_occurrences(plan: PlanText, contract: Contract) -> tuple[Occurrence, ...]:
-    """Every name in a plan that stands for something in the contract; none where the text is no YAML."""
+    """Every name in a plan with a meaning in the contract; none if the text is not YAML."""
     root = _document(plan)
     if root is None:
         return ()
@@ -94,7 +94,7 @@ class _Reader:
             yield Occurrence(meaning, self.plan.file, start, start + len(meaning.name))
 
     def scalar(self, piece: Piece | None, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
-        """A scalar, or each of a list, that is one name."""
+        """A scalar, or each of a list, that is a single name."""
         for item in piece.each() if piece is not None else ():
             region = self.region(item.span)
             if self.plan.text[region.start : region.end] == item.text:
@@ -120,7 +120,7 @@ class _Reader:
         return declared(self.environment, name)
 
     def port(self, node: str, name: str, role: str | None = None) -> Meaning | None:
-        """A port of a node; of any node that has it, where no node is named."""
+        """A port of a node; of any node that has it, if no node is named."""
         nodes = [node] if node else list(self.ports)
         return next((m for n in nodes if n in self.ports and (m := self.ports[n].meaning(n, name, role))), None)
 
@@ -128,7 +128,7 @@ class _Reader:
 
     def words(self, region: _Region, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
         """The names of a formula, or of a path such as ``node.port``. `node`: whose ports ``in.v`` and ``v`` are;
-        empty: those of any node; None: it has to be named. `side`: which port ``node.v`` is, where there are two."""
+        empty: those of any node; None: it has to be named. `side`: which port ``node.v`` is, if there are two."""
         before: list[tuple[str, int]] = []
         for match in _WORD.finditer(self.plan.text, region.start, region.end):
             word, at = match.group(), match.start()

@@ -1,4 +1,4 @@
-"""What a document belongs to: the system's contract files and its plan, with the texts that are open and not saved."""
+"""The system of a document: its contract files and its plan, with the texts that are open and not saved."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from avow.system.plan_file import read_plan
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """The texts of a system, and what they declare as far as it can be read. `off`: lints that are not wanted."""
+    """The texts of a system, and what they declare as far as it can be read. `off`: lints that are switched off."""
 
     sources: tuple[Source, ...]
     contract: Contract
@@ -36,7 +36,7 @@ class Project:
 
 
 def file_of(uri: str) -> str:
-    """The file that a URI names; of what is no file (``untitled:1``, ``git:…``), the URI itself."""
+    """The file that a URI names; if it is not a file (``untitled:1``, ``git:…``), the URI itself."""
     path = to_fs_path(uri)
     return path if path and "\0" not in path else uri.replace("\0", "\ufffd")
 
@@ -50,7 +50,7 @@ def is_plan(file: str) -> bool:
 
 
 def project_of(file: str, texts: Mapping[str, str]) -> Project:
-    """The system that a contract or a plan belongs to: that of the plan in its folder, if this names it, else the
+    """The system that a contract or a plan belongs to: that of the plan in its folder, if this names it, otherwise the
     file alone. `texts` are documents that are open, by file; the others are read from the disk."""
     path = Path(file)
     by_path = {Path(name).resolve(): (name, text) for name, text in texts.items() if is_file(name)}
@@ -79,7 +79,7 @@ def _project(sources: tuple[Source, ...], off: frozenset[str], plan: PlanText | 
 
 
 def faults_of_plan(project: Project) -> tuple[Diagnostic, ...]:
-    """What keeps a plan, with the text that it has here, from being loaded; empty where nothing does."""
+    """The faults that prevent a plan, with its current text, from being loaded; empty if there are none."""
     if project.plan is None:
         return ()
     try:
@@ -90,7 +90,7 @@ def faults_of_plan(project: Project) -> tuple[Diagnostic, ...]:
 
 
 def about_plan(file: str) -> tuple[Diagnostic, ...]:
-    """What there is to say of a plan, as it is on the disk."""
+    """The diagnostics of a plan, as it is on the disk."""
     if not is_file(file) or not Path(file).is_file():
         return ()
     try:

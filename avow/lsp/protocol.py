@@ -1,4 +1,4 @@
-"""Answers in the protocol's words: lines and UTF-16 columns for offsets, and the protocol's kinds for ours."""
+"""Answers in the protocol's form: lines and UTF-16 columns for offsets, and the protocol's kinds for ours."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Lines:
         return types.Position(line - 1, units(self.text[offset - column + 1 : offset]))
 
     def offset(self, position: types.Position) -> int:
-        """The offset of a position; what is beyond a line's end is that end."""
+        """The offset of a position; a position beyond a line's end is that end."""
         at, end = self._line(position.line + 1)
         left: int = position.character
         while at < end and left > 0:
@@ -79,7 +79,7 @@ class Lines:
         return types.Position(max(line - 1, 0), units(self.text[start : min(start + max(column - 1, 0), end)]))
 
     def _line(self, line: int) -> tuple[int, int]:
-        """Where a line begins and ends, counted from 1; the text's end for one behind it."""
+        """The start and end of a line, counted from 1; the text's end for a line after the last."""
         start = self.source.offset(line, 1)
         end = self.text.find("\n", start)
         return start, len(self.text) if end < 0 else end
@@ -146,7 +146,7 @@ def completion_item(offer: Offer, number: int, snippets: bool) -> types.Completi
 
 
 def signature_help(found: Signature) -> types.SignatureHelp:
-    """Each parameter as the stretch of the label where it stands."""
+    """Each parameter as the stretch of the label that contains it."""
     parameters, at = [], found.label.find("(") + 1
     for name in found.parameters:
         start = max(found.label.find(name, at), 0)
@@ -157,7 +157,7 @@ def signature_help(found: Signature) -> types.SignatureHelp:
 
 
 def semantic_tokens(found: Sequence[Coloured], lines: Lines) -> types.SemanticTokens:
-    """The protocol's five numbers for each stretch, each place relative to the one before."""
+    """The protocol's five numbers for each stretch, each position relative to the previous one."""
     return types.SemanticTokens(list(_numbers(found, lines)))
 
 

@@ -1,8 +1,8 @@
-"""Quick fixes: the hint that a message carries, done.
+"""Quick fixes: the hint of a message, applied.
 
-What a hint proposes is read from its words (``did you mean `red`?``, ``write `==` …``, ``remove it``, ``close it with
-`}` ``). It is proposed as a fix only where it helps: the text with the change is checked again, the message is gone and
-no error has come instead.
+The proposal of a hint is read from its words (``did you mean `red`?``, ``write `==` …``, ``remove it``, ``close it with
+`}` ``). It is proposed as a fix only if it helps: the text with the change is checked again, the message is gone and no
+new error has appeared.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_']*")
 
 Check = Callable[[str], tuple[Diagnostic, ...]]
-"""A text → what there is to say of it."""
+"""A text → its diagnostics."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A change of a text that does what a message's hint says."""
+    """A change of a text that applies a message's hint."""
 
     title: str
     start: int
@@ -35,7 +35,7 @@ class Fix:
 
 
 def fixes(diagnostic: Diagnostic, text: str, check: Check, most: int = 3) -> tuple[Fix, ...]:
-    """The fixes of one message about a text; none where its hint proposes nothing that helps."""
+    """The fixes of one message about a text; none if its hint proposes nothing that helps."""
     if diagnostic.span is None or not diagnostic.hint:
         return ()
     source, span = Source("", text), diagnostic.span
@@ -51,7 +51,7 @@ def fixes(diagnostic: Diagnostic, text: str, check: Check, most: int = 3) -> tup
 
 
 def _helps(fix: Fix, diagnostic: Diagnostic, text: str, before: tuple[Diagnostic, ...], check: Check) -> bool:
-    """Whether the message is gone, and nothing has come instead that is as bad."""
+    """Whether the message is gone, and nothing equally bad has appeared."""
     after = check(text[: fix.start] + fix.text + text[fix.end :])
     errors, were = (sum(d.is_error for d in each) for each in (after, before))
     codes, had = (Counter(d.code for d in each) for each in (after, before))

@@ -1,9 +1,8 @@
 """Renaming in all files of a system: the contracts and the plan.
 
-The new texts are checked before any edit is proposed: they have no new errors, no name in them means anything else than
-it did, and the plan names nothing that is not there. What does not come out so
-is refused with the reason. Ports that share a name are one thing to a system (they link, or the environment gives them
-one value), so they are renamed together.
+The new texts are checked before any edit is proposed: they have no new errors, no name in them changes its meaning, and
+the plan names nothing that does not exist. Otherwise the rename is refused with the reason. Ports that share a name are
+one thing to a system (they link, or the environment gives them one value), so they are renamed together.
 """
 
 from __future__ import annotations
@@ -31,16 +30,16 @@ from avow.lsp.project import Project, faults_of_plan
 from avow.system.load import PLAN_FILE
 
 _WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices"}
-"""Words of the language, operators among them that a name may shadow: a name that is one of these is read twice."""
+"""Words of the language, including operators that a name may shadow: such a name would have two readings."""
 
 
 class Refused(Exception):  # noqa: N818 - it reads as what happened
-    """A rename that would not leave everything as it is; the text says why."""
+    """A rename that would change more than the name; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A stretch of a file's text, and what is to stand there."""
+    """A stretch of a file's text, and its replacement."""
 
     file: str
     start: int
@@ -49,7 +48,7 @@ class Edit:
 
 
 def all_occurrences(project: Project) -> tuple[Occurrence, ...]:
-    """Every name in every file of the system that stands for something."""
+    """Every name with a meaning in every file of the system."""
     found = occurrences(tuple(taken_apart(s.file, s.text) for s in project.sources), project.contract)
     return (*found, *(plan_occurrences(project.plan, project.contract) if project.plan is not None else ()))
 
@@ -62,12 +61,12 @@ def renamed_with(meaning: Meaning, other: Meaning) -> bool:
 
 
 def is_renameable(project: Project, meaning: Meaning) -> bool:
-    """Whether a name is written anywhere: that of a clause without one is not."""
+    """Whether a name is written anywhere: that of a clause without a name is not."""
     return any(o.declares and o.written and o.meaning == meaning for o in all_occurrences(project))
 
 
 def rename(project: Project, meaning: Meaning, new: str) -> tuple[Edit, ...]:
-    """The edits that give something another name. Raises Refused."""
+    """The edits that rename something. Raises Refused."""
     _check_name(new)
     if any(d.is_error for d in project.diagnostics):
         raise Refused("the contract has errors: a name is changed where all that it stands for is known")
@@ -87,8 +86,8 @@ def rename(project: Project, meaning: Meaning, new: str) -> tuple[Edit, ...]:
 
 
 def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
-    """Where else the name stands as a word: lines of the plan, other files of the system's folder (programs, tables,
-    traces), plans beside it that speak of this system. What it means there is not known here."""
+    """Where else the name occurs as a word: lines of the plan, other files of the system's folder (programs, tables,
+    traces), plans beside it that refer to this system. Its meaning there is not known here."""
     if project.plan is None or meaning.what is What.VARIABLE:
         return ()
     folder, word = Path(project.plan.file).parent, re.compile(rf"(?<!\w){re.escape(meaning.name)}(?!\w)")
@@ -103,7 +102,7 @@ def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
         try:
             text = read_text(path, "utf-8") if path.parent.resolve() != folder.resolve() else ""
         except (OSError, UnicodeError):
-            continue  # no text
+            continue  # not text
         if folder.resolve().name in text and word.search(text):
             found.append(f"../{path.parent.name}/{PLAN_FILE}")
     for path in islice(sorted(folder.rglob("*")), FILES_LOOKED_THROUGH):
@@ -113,7 +112,7 @@ def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
             if path.stat().st_size <= BYTES_LOOKED_THROUGH and word.search(read_text(path, "utf-8")):
                 found.append(str(path.relative_to(folder)))
         except (OSError, UnicodeError):
-            continue  # no text
+            continue  # not text
     return tuple(found)
 
 
@@ -169,7 +168,7 @@ def _clauses(contract: Contract) -> Iterator[Any]:
 
 
 def _new_faults(project: Project, after: Project) -> list[Diagnostic]:
-    """What is wrong with the plan and was not before."""
+    """The faults of the plan that are new."""
     old, new = faults_of_plan(project), faults_of_plan(after)
     more = Counter(d.code for d in new) - Counter(d.code for d in old)
     return [d for d in new if more[d.code]]

@@ -1,4 +1,4 @@
-"""The language server over pygls: which answer (`avow.lsp.features` and its neighbours) goes with which question."""
+"""The language server over pygls: connects each request with its answer (`avow.lsp.features` and its neighbours)."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def _nothing(file: str) -> StatusLookup:
 
 
 class Server:
-    """What is open, what is known of it, and an answer to every question. `status` gives, for a file, how the clauses
-    in it stand in the ledger."""
+    """The open documents, the known results about them, and the answer to each request. `status` gives, for a file, the
+    status of its clauses in the ledger."""
 
     def __init__(self, language_server: LanguageServer, status: Callable[[str], StatusLookup]) -> None:
         self.server = language_server
@@ -46,14 +46,14 @@ class Server:
         self.documents: dict[str, Document] = {}
         self.open_now: set[str] = set()
         self.later: dict[str, asyncio.TimerHandle] = {}
-        """Documents that have changed and are read again in a moment, if nothing more comes in before."""
+        """Documents that have changed and are read again shortly, unless another change arrives first."""
         self.asked = Asked(self.settled)
         self.soon: asyncio.TimerHandle | None = None
 
     # -- texts ---------------------------------------------------------------------------------------------------------
 
     def text(self, uri: str) -> str:
-        """A document's text; of one that is not open, the file's; nothing where there is none."""
+        """A document's text; for one that is not open, the file's; empty if there is none."""
         try:
             text: str = self.server.workspace.get_text_document(uri).source
         except (OSError, ValueError):
@@ -61,7 +61,7 @@ class Server:
         return text
 
     def refresh(self, uri: str) -> tuple[str, ...]:
-        """Reads a document again; the files of its system."""
+        """Reads a document again; returns the files of its system."""
         file = file_of(uri)
         waiting = self.later.pop(uri, None)
         if waiting is not None:
@@ -73,7 +73,7 @@ class Server:
         return (*(source.file for source in document.project.sources), *plan)
 
     def refresh_all(self, uri: str) -> None:
-        """Reads a document again, and those open beside it that belong to the same system."""
+        """Reads a document again, and the open ones of the same system."""
         files = {Path(f).resolve() for f in self.refresh(uri)}
         folder = Path(file_of(uri)).parent if is_plan(file_of(uri)) else None
         for other, document in list(self.documents.items()):
@@ -125,14 +125,14 @@ class Server:
     # -- sanity --------------------------------------------------------------------------------------------------------
 
     def ask(self, uri: str) -> None:
-        """Ask of the sanity of the nodes of the systems that are open, first of that of the document changed last."""
+        """Request the sanity of the nodes of the open systems, first those of the document changed last."""
         self.soon = None
         open_now = sorted(self.open_now & self.documents.keys(), key=lambda each: each != uri)
         projects = [self.documents[each].project for each in open_now]
         self.asked.ask([(project.sources, project.contract) for project in projects])
 
     def settled(self) -> None:
-        """Something more is known: the messages and hints of every open document are shown again."""
+        """More is known: the messages and hints of every open document are shown again."""
         for uri in self.open_now & self.documents.keys():
             self.publish(uri)
         workspace = self.server.client_capabilities.workspace
@@ -140,7 +140,7 @@ class Server:
             self.server.workspace_inlay_hint_refresh(None)
 
     def sane(self, document: Document) -> Iterator[tuple[Occurrence, tuple[Answer, ...]]]:
-        """What is known of each node and clause of a document, at its name."""
+        """The known answers about each node and clause of a document, at its name."""
         nodes = {node.name: node for node in askable(document.project.sources, document.project.contract)}
         for name in document.names:
             if name.file != document.file or not name.declares or name.meaning.what not in (*CLAUSES, What.NODE):
@@ -153,7 +153,7 @@ class Server:
 
     def publish(self, uri: str) -> None:
         if uri not in self.open_now:
-            return  # asked about, but not open
+            return  # requested, but not open
         document = self.documents[uri]
         lines = Lines(document.text)
         found = [protocol.diagnostic(d, document, lines) for d in document.diagnostics]
@@ -199,13 +199,13 @@ class Server:
         return [types.DocumentHighlight(lines.range(o.start, o.end)) for o in found if o.file == document.file]
 
     def places(self, document: Document, found: Sequence[Occurrence | Edit]) -> Iterator[tuple[str, types.Range]]:
-        """Where in which document of a system each of these is."""
+        """The document and range of each of these places in a system."""
         lines = {file: Lines(document.project.text_of(file)) for file in {o.file for o in found}}
         for one in found:
             yield self.uri_of(one.file), lines[one.file].range(one.start, one.end)
 
     def uri_of(self, file: str) -> str:
-        """The URI by which an editor knows a file."""
+        """The URI of a file in the editor."""
         open_ = next((uri for uri, d in self.documents.items() if d.file == file), None)
         return open_ if open_ is not None else Path(file).resolve().as_uri()
 
@@ -300,9 +300,9 @@ class Server:
 
 
 def _mark(answered: Sequence[Answer]) -> str:
-    """What a hint shows: the claims that do not hold, or are open, by name; else that all do.
+    """The text of a hint: the claims that do not hold, or are open, by name; otherwise that all hold.
 
-    What is only worth knowing stands in its tooltip.
+    Notes are only in its tooltip.
     """
     bad = [a.name for a in answered if a.is_bad and a.severity != "note"]
     unsettled = [a.name for a in answered if a.verdict == "unknown"]
@@ -324,7 +324,7 @@ def _takes_snippets(capabilities: types.ClientCapabilities) -> bool:
 
 
 def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
-    """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
+    """A server with every answer registered; `status` gives, for a file, the status of its clauses in the ledger."""
     language_server = LanguageServer(
         "avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental
     )
@@ -361,7 +361,7 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
         (types.TEXT_DOCUMENT_FORMATTING, server.formatting, None),
     )
     for feature, told in heard:
-        language_server.feature(feature)(functools.partial(told))  # a method cannot bear the library's marks
+        language_server.feature(feature)(functools.partial(told))  # a method cannot have the library's attributes
     for feature, answer, options in asked:
 
         def answering(params: Any, answer: Callable[[Document, Lines, Any], Any] = answer) -> Any:
@@ -373,5 +373,5 @@ def _make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSe
 
 
 def serve(status: Callable[[str], StatusLookup] = _nothing) -> None:
-    """Run on standard input and output until the editor leaves."""
+    """Run on standard input and output until the editor disconnects."""
     _make_server(status).start_io()

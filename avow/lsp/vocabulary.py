@@ -1,6 +1,6 @@
 """The words of RCL as an editor offers them: how each is used, and what it means.
 
-Operators come from the table of operators and from the list of those that speak of other steps; a word of these lists
+Operators come from the table of operators and from the list of those that refer to other steps; a word of these lists
 that has no entry here is an error at import.
 """
 
@@ -15,13 +15,13 @@ from avow.language.terms import Builtin, Past
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A word with its operands: what it looks like, with a place for each."""
+    """A word with its operands: its syntax, with a place for each."""
 
     name: str
     parameters: tuple[str, ...]
     meaning: str
     limit: str = ""
-    """The limit that stands between the word and the parenthesis; in brackets of its own, where it may be left out."""
+    """The limit between the word and the parenthesis; in brackets of its own, if it is optional."""
     infix: bool = False
 
     @property
@@ -33,7 +33,7 @@ class Form:
 
     @property
     def template(self) -> str:
-        """As a snippet of the protocol, with a stop at each operand."""
+        """As a snippet of the protocol, with a tab stop at each operand."""
         limit = "[${9:5} steps]" if self.limit else ""
         stops = [f"${{{k}:{name}}}" for k, name in enumerate(self.parameters, 1)]
         if self.infix:
