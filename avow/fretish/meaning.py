@@ -1,8 +1,8 @@
-"""What a FRETish sentence demands, as clauses.
+"""The meaning of a FRETish sentence, as clauses.
 
 FRET's semantics (scopes, triggers and responses of `Sentence`'s fields) over the steps of a run: a scope is an interval
-of steps, a requirement is triggered in it, and what it demands is over where the interval ends. Held in the tests
-against FRET's published formulas of past time, template by template.
+of steps, a requirement is triggered in it, and its demand ends with the interval. Compared in the tests with FRET's
+published past-time formulas, template by template.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from .sentence import Condition, Denied, Duration, Expression, Scope, Sentence, 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A clause in RCL, and what follows its requirement's name in its own."""
+    """A clause in RCL, and the suffix of its name after its requirement's."""
 
     formula: str
     suffix: str = ""
 
 
 Sayer = Callable[[Expression], str]
-"""Writes an expression in RCL, in parentheses where it needs them."""
+"""Writes an expression in RCL, in parentheses if needed."""
 
 
 class Unsaid(Exception):  # noqa: N818 - it names what happened
-    """A sentence that no clause says; the text is the reason."""
+    """A sentence that no clause can express; the text is the reason."""
 
 
 def demands(sentence: Sentence, say: Sayer) -> list[Demand]:
@@ -82,7 +82,7 @@ _EVER = "TRUE"
 
 
 def _scope(sentence: Sentence, say: Sayer) -> tuple[str, bool]:
-    """Where the requirement is in force, and whether what it says must not come about there (`only`)."""
+    """Where the requirement is in force, and whether its response must not occur there (`only`)."""
     if sentence.scope is Scope.ALWAYS:
         return _EVER, False
     mode = say(_the(sentence.mode))
@@ -113,7 +113,7 @@ _DENIALS = {
     Timing.UNTIL: Timing.BEFORE,
     Timing.BEFORE: Timing.UNTIL,
 }
-"""What is demanded of the denied response where a requirement's response must not come about so."""
+"""The timing demanded of the negated response, if a requirement's response must not occur with this timing."""
 
 
 def _denied(sentence: Sentence) -> Sentence:
@@ -148,7 +148,7 @@ def _limit(duration: Duration | None, more: int = 0) -> str:
 
 
 def remarks(sentence: Sentence) -> list[str]:
-    """Where FRET's meaning is often not what the sentence was meant to say: in words, with what would say that."""
+    """Where FRET's meaning often differs from the intended one: in words, with an alternative."""
     found = []
     if sentence.scope in (Scope.IN, Scope.NOT_IN) and sentence.timing is Timing.NEXT:
         found.append("where the scope ends at the next step, nothing is demanded there")

@@ -1,8 +1,8 @@
 """Sentences of a file as nodes of a contract: a node for each component, its ports from FRET's variables.
 
-A file is what FRET exports (JSON: requirements, with or without variables) or text with a sentence on a line, each with
-its name and a colon before it, or without. What FRET does not say is taken from use: a name is an output where a
-response speaks of it (behind its last ``=>``), BOOL where it stands for a truth, else REAL.
+A file is an export from FRET (JSON: requirements, with or without variables) or text with one sentence per line, with
+or without its name and a colon before it. Information that FRET lacks is inferred from use: a name is an output if a
+response mentions it (after its last ``=>``), BOOL if it is used as a truth value, otherwise REAL.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What FRET's variables say of a name: its kind (``Input``), its type, and what it stands for."""
+    """FRET's entry for a variable: its kind (``Input``), its type, and its definition."""
 
     kind: str = ""
     type: str = ""
@@ -65,10 +65,10 @@ class Given:
 class Project:
     requirements: tuple[Requirement, ...]
     variables: tuple[tuple[tuple[str, str, str], Given], ...] = ()
-    """With project (empty where the file does not say it), component and name of each."""
+    """With project (empty if the file does not give it), component and name of each."""
 
     def of(self, project: str, component: str) -> dict[str, Given]:
-        """What is said of a component's names. Raises Rejected where two things are said of one."""
+        """The entries for a component's names. Raises Rejected if one has two different entries."""
         found: dict[str, Given] = {}
         for (where, owner, name), given in self.variables:
             here = owner == component and (where == project or not where or not project)
@@ -120,7 +120,7 @@ class _Variable(codec.Foreign):
 
 @dataclass(frozen=True, slots=True)
 class _Export(codec.Foreign):
-    """What FRET exports; of some versions the requirements alone."""
+    """An export from FRET; in some versions only the requirements."""
 
     requirements: tuple[_Requirement, ...]
     variables: tuple[_Variable, ...] = ()
@@ -164,14 +164,14 @@ _TYPES = {
 
 @dataclass(frozen=True, slots=True)
 class Nodes:
-    """The contract's text, and what is to be said of sentences that it does not have, or that mean what few expect."""
+    """The contract's text, and diagnostics for sentences that it does not contain, or whose meaning few expect."""
 
     text: str
     faults: tuple[Diagnostic, ...]
 
 
 def nodes(project: Project, outputs: frozenset[str] = frozenset()) -> Nodes:
-    """The nodes; of the names that FRET says nothing of, `outputs` are outputs, if any are given. Raises Rejected."""
+    """The nodes; among the names without an entry in FRET, `outputs` are outputs, if any are given. Raises Rejected."""
     faults: list[Diagnostic] = []
     components: dict[str, tuple[str, str, list[tuple[Requirement, Sentence]]]] = {}
     if not project.requirements:
@@ -237,10 +237,10 @@ class _Node:
         self.types: dict[str, str] = {}
         self.same: list[tuple[str, str]] = []
         self.ports: dict[str, str] = {}
-        """Names that clauses speak of, each with `in` or `out`."""
+        """The names that clauses use, each with `in` or `out`."""
         self.constants = constants
         self.words = words
-        """RCL's names, each with FRET's. These two are of all nodes: outputs feed inputs of their name."""
+        """RCL's names, each with FRET's. These two are shared by all nodes: outputs feed inputs of their name."""
         self.scoped = False
         self.within: tuple[str, ...] = ()
 
@@ -271,7 +271,7 @@ class _Node:
         return f"  {'assume' if is_assumption(requirement.name) else 'guarantee'} {name} {said} ( {formula} )"
 
     def _sound(self, clause: str, source: Requirement) -> bool:
-        """Whether the checker takes the clause; what it says is the reason why it is left out."""
+        """Whether the checker accepts the clause; otherwise its error is the reason why the clause is left out."""
         besides = [] if clause.lstrip().startswith("guarantee") else ["  guarantee ( TRUE )"]
         found, diagnostics = check_text(self.context() + self._written([clause, *besides]), "fretish.rcl")
         if found is not None:
@@ -324,7 +324,7 @@ class _Node:
             self.types.setdefault(name, "REAL")
 
     def _spread(self) -> None:
-        """Names that are compared are of one type."""
+        """Names that are compared have one type."""
         for _ in self.same:
             for left, right in (pair for one, other in self.same for pair in ((one, other), (other, one))):
                 if left not in self.types and (known := self.given.get(right, Given()).type or self.types.get(right)):
@@ -372,7 +372,7 @@ class _Node:
                 return f"abs({arguments[0]})"
             case (("min" | "minInt" | "minReal" | "max" | "maxInt" | "maxReal"), [_, _]):
                 return f"{name[:3]}({', '.join(arguments)})"
-            case _:  # a function that only FRET's user knows, or one that looks ahead
+            case _:  # a function known only to FRET's user, or one that looks ahead
                 raise Unsaid(f"Avow does not know the function `{name}` of {len(arguments)} arguments")
 
     def _named(self, name: str) -> str:
@@ -391,7 +391,7 @@ class _Node:
         return f"{side}.{_word(name)}"
 
     def _meant(self, name: str, means: str) -> str:
-        """What a name stands for, which FRET has as an expression of Lustre."""
+        """The definition of a name, which FRET has as an expression of Lustre."""
         if name in self.within:
             raise Unsaid(f"`{name}` is defined by itself")
         if len(self.within) > _DEEPEST:
@@ -418,13 +418,13 @@ def _context(constants: Mapping[str, str]) -> str:
 
 
 _DEEPEST = 20
-"""Definitions within one another that are followed."""
+"""The depth of nested definitions that are followed."""
 
 _SIGNS = {"=>": "->", "&": "and", "|": "or", "=": "=="}
 
 
 def _answered(response: Expression) -> Expression:
-    """What a response demands, without the condition that it has itself."""
+    """The demand of a response, without its own condition."""
     while isinstance(response, Sign) and response.operator == "=>":
         response = response.right
     return response
@@ -442,14 +442,14 @@ def _clash(one: str, other: str, word: str) -> str:
 
 
 def _word(name: str) -> str:
-    """A name of FRET's as one of RCL's."""
+    """A FRET name as an RCL name."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII)
     word = word if re.match(r"[A-Za-z]", word) else f"r{word}"
     return f"{word}_" if word in KEYWORDS or word in _OPERATORS else word
 
 
 _OPERATORS = {*Past, *Builtin, "length", "implies", "true", "false", "topics"}
-"""Words that mean something to RCL in some places."""
+"""Words that have a meaning in RCL in some places."""
 
 
 def _unused(name: str, taken: set[str]) -> str:

@@ -59,7 +59,7 @@ Expression = Name | Number | Truth | Denied | Minus | Sign | Call
 
 
 def parts(expression: Expression) -> tuple[Expression, ...]:
-    """What an expression is directly made of."""
+    """The direct parts of an expression."""
     match expression:
         case Denied(body=body) | Minus(body=body):
             return (body,)
@@ -87,7 +87,7 @@ class Scope(StrEnum):
 
 
 class Condition(StrEnum):
-    """What triggers it: the scope's beginning, the condition's becoming true, its being so."""
+    """The trigger: the beginning of the scope, the condition becoming true, or the condition being true."""
 
     NONE = "null"
     REGULAR = "regular"
@@ -95,7 +95,7 @@ class Condition(StrEnum):
 
 
 class Timing(StrEnum):
-    """When the response has to be there."""
+    """When the response has to occur."""
 
     IMMEDIATELY = "immediately"
     NEXT = "next"
@@ -120,7 +120,7 @@ class Duration:
 
 @dataclass(frozen=True, slots=True)
 class Sentence:
-    """The fields. `trigger` is there with a condition, `stop` with `until` and `before`, `duration` with `within`,
+    """The fields. `trigger` is present with a condition, `stop` with `until` and `before`, `duration` with `within`,
     `for` and `after`, `mode` with every scope but the whole run."""
 
     component: str
@@ -138,12 +138,12 @@ _Read = TypeVar("_Read")
 
 
 def is_assumption(name: str) -> bool:
-    """Whether FRET's tools take a requirement of that name as an assumption."""
+    """Whether FRET's tools treat a requirement of that name as an assumption."""
     return "assum" in name.lower()
 
 
 class Unreadable(Exception):  # noqa: N818 - it names what happened
-    """No FRETish: what was found, and the column, counted from 1."""
+    """Not FRETish: what was found, and the column, counted from 1."""
 
     def __init__(self, message: str, column: int) -> None:
         super().__init__(message)
@@ -182,7 +182,7 @@ def _tree(text: str, start: str) -> Any:
 
 
 def _without_commas(text: str) -> str:
-    """Commas outside parentheses mean nothing; places stay."""
+    """Replaces commas outside parentheses, which have no meaning; positions are unchanged."""
     depth, out = 0, []
     for sign in text:
         depth += (sign == "(") - (sign == ")")
@@ -277,7 +277,7 @@ def _expression(tree: Any) -> Expression:
 
 
 def _alone(arrow: Token, left: Any) -> None:
-    """FRET's grammar takes a chain of arrows from the left, and the tools that it hands the text to from the right."""
+    """FRET's grammar groups a chain of arrows from the left, and the tools that receive the text from the right."""
     if arrow.type in _ARROWS and left.data == "sign" and left.children[1].type in _ARROWS:
         raise Unreadable(
             f"a chain of arrows is read in two ways: write parentheses before this `{arrow}`", arrow.column or 1
@@ -287,7 +287,7 @@ def _alone(arrow: Token, left: Any) -> None:
 _ARROWS = ("IMPLIES", "IFF")
 
 FIRST = "FTP"
-"""FRET's own name for: this is the first step of the run."""
+"""FRET's name for the predicate: this is the first step of the run."""
 
 
 _SIGNS = {"->": "=>", "<->": "<=>", "xor": "xor", "mod": "mod"}

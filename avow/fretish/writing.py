@@ -1,4 +1,4 @@
-"""Clauses as FRETish sentences: the shapes that `meaning` makes of sentences, the other way."""
+"""Clauses as FRETish sentences: the inverse of `meaning`, for the forms of clauses that it produces."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .sentence import FIRST, is_assumption
 
 
 class _Beyond(Exception):  # noqa: N818 - it names what happened
-    """What FRETish has no counterpart for."""
+    """A construct without a counterpart in FRETish."""
 
 
 def to_fretish(contract: Contract) -> Partial:
-    """A line for each clause, its name before it."""
+    """A line for each clause, starting with its name."""
     lines: list[str] = []
     missing: list[Diagnostic] = []
     for node in contract.nodes:
@@ -35,7 +35,7 @@ def to_fretish(contract: Contract) -> Partial:
 
 
 def _named(node: Node, clause: Clause) -> str:
-    """The name tells assumptions from guarantees."""
+    """The name distinguishes assumptions from guarantees."""
     if clause in node.assumptions:
         return clause.name if is_assumption(clause.name) else f"{clause.name}_assumption"
     if is_assumption(clause.name):
@@ -65,7 +65,7 @@ def _condition(trigger: t.Term) -> str:
             return ""
         case t.History(operator=t.Past.ROSE, arguments=(inner,)):
             return f"upon {_say(inner)} "
-        case _:  # whatever is so at a step
+        case _:  # at every step where it holds
             return f"whenever {_say(trigger)} "
 
 
@@ -100,7 +100,7 @@ _SIGNS = {"==": "="}
 
 
 def _say(term: t.Term) -> str:
-    """In parentheses where it has parts of its own."""
+    """In parentheses if it has parts of its own."""
     match term:
         case t.Literal(value=bool(value)):
             return "true" if value else "false"
