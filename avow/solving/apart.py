@@ -1,9 +1,8 @@
-"""Solvers in processes of their own: a crash of one, or one that does not keep its time, is an unknown answer.
+"""Solvers in processes of their own: a crash, or a solver that exceeds its time, is an unknown answer.
 
 ``python -P -m avow.solving.apart PARENT`` reads questions as lines of JSON, ``[solver, script, limit]``, and writes a
-line for each, ``[answer, steps]``: to start Python and a solver costs more than most questions. There are scripts on
-which cvc5 does not keep its own limits (seen: sequences of tuples), and no call into a library can be ended from
-Python.
+line for each, ``[answer, steps]``: starting Python and a solver costs more than most questions. On some scripts cvc5
+does not keep its own limits (seen: sequences of tuples), and a call into a library cannot be ended from Python.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ class NoAnswer(Exception):  # noqa: N818 - it says what it is
 
 @dataclass(slots=True)
 class Apart:
-    """A solver (`z3` or `cvc5`). Its process is started at the first question, and anew after a question that it did
-    not answer and in a fork of this process. Safe to use from several threads. `steps`: its own, for all questions
-    together; what is asked later is `unknown`."""
+    """A solver (`z3` or `cvc5`). Its process is started at the first question, and again after a question that it did
+    not answer and in a fork of this process. Thread-safe. `steps`: its own, for all questions together; the answer to
+    later ones is `unknown`."""
 
     solver: str
     steps: float = math.inf
@@ -66,9 +65,9 @@ class Apart:
             return Said.UNKNOWN, limit
 
     def ask(self, script: str, limit: int, seconds: float) -> tuple[str, int]:
-        """The answer to a script (empty where it cannot be read), and the steps that it took, of `limit`. Raises
-        NoAnswer, and TimeoutError after so many seconds."""
-        if self._owner != os.getpid():  # the process, and the lock, of the process that this one is a fork of
+        """The answer to a script (empty if it cannot be read), and the steps that it took, of `limit`. Raises NoAnswer,
+        and TimeoutError after so many seconds."""
+        if self._owner != os.getpid():  # the process, and the lock, belong to the parent of this fork
             self._process, self._lock, self._owner = None, threading.Lock(), os.getpid()
         with self._lock:
             try:
@@ -121,7 +120,7 @@ class Apart:
         self._process.wait()
         process.unwatch(self._process.pid)
         for stream in (self._process.stdin, self._process.stdout):
-            with contextlib.suppress(OSError):  # what it was to read can no longer be written
+            with contextlib.suppress(OSError):  # its input can no longer be written
                 stream.close() if stream is not None else None
         self._process = None
 
@@ -132,8 +131,8 @@ def _line(message: object) -> bytes:
 
 @dataclass(slots=True)
 class Both:
-    """Z3 and, where it is installed, cvc5, each in a process of its own, for as long as a ``with`` lasts. `steps`: of
-    cvc5, for all questions together. `known`: answers of Z3 to be used and added to."""
+    """Z3 and, if it is installed, cvc5, each in a process of its own, for the duration of a ``with``. `steps`: of cvc5,
+    for all questions together. `known`: answers of Z3 to be used and extended."""
 
     steps: float = math.inf
     known: dict[tuple[str, int], Said] = field(default_factory=dict)
@@ -149,7 +148,7 @@ class Both:
 
 
 def versions() -> dict[str, str]:
-    """The solvers that are here, with their versions."""
+    """The installed solvers, with their versions."""
     found = {"z3": metadata.version("z3-solver")}
     if util.find_spec("cvc5") is not None:
         found["cvc5"] = metadata.version("cvc5")
@@ -157,12 +156,12 @@ def versions() -> dict[str, str]:
 
 
 _PRODUCT = re.compile(r"\(\* (?!\(?[-/]? ?\d)(?!\S+ \(?[-/]? ?\d)")
-"""Of what are not numbers."""
+"""A product of factors that are not literals."""
 
 
 def _ask_cvc5(script: str, limit: int) -> tuple[str, int]:
-    """``sat``, ``unsat`` or ``unknown``, nothing where cvc5 cannot read the script; and how many of its own steps it
-    took, of so many that it has."""
+    """``sat``, ``unsat`` or ``unknown``, empty if cvc5 cannot read the script; and the number of its own steps that it
+    took, of `limit`."""
     import cvc5
 
     terms = cvc5.TermManager()
@@ -195,7 +194,7 @@ def _steps(solver: Any) -> int:
 
 
 def _serve() -> None:
-    """The far end, until there are no more questions."""
+    """The main loop of the process, until there are no more questions."""
     process.die_with(int(sys.argv[1]))
     for asked in sys.stdin.buffer:
         solver, script, limit = json.loads(asked)

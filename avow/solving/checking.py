@@ -46,9 +46,9 @@ def check(
     engine: Engine = "smt",
 ) -> Answer:
     """Are the assertions satisfiable together? With `unsat`, `core` is a minimal set of tracked labels (each is needed,
-    as far as the solver can tell with a like effort). Crashes of the solver are `unknown`.
+    as far as the solver can tell with similar effort). A crash of the solver is `unknown`.
 
-    The engine `qsat` decides quantified linear arithmetic, where the usual one mostly gives up; it knows no functions.
+    The engine `qsat` decides quantified linear arithmetic, where the usual one mostly gives up; it has no functions.
     """
     start = time.monotonic()
     assertions, tracked = list(assertions), list(tracked)
@@ -58,7 +58,7 @@ def check(
             core = _minimal(translator, assertions, tracked, core, effort, seed, engine)
     except z3.Z3Exception as error:
         if "unknown parameter" in str(error):
-            raise RuntimeError(f"Z3: {error}") from error  # a fault of ours: as an answer it would stay unseen
+            raise RuntimeError(f"Z3: {error}") from error  # a fault of ours: as an answer it would go unnoticed
         status, model, core, reason = "unknown", None, (), f"Z3: {error}"
     found = Model(translator, model) if model is not None else None
     order = [label for label, _ in tracked if label in core]
@@ -68,8 +68,8 @@ def check(
 def with_small_numbers(
     translator: Translator, assertions: Iterable[Expr], numbers: Iterable[Expr], answer: Answer, *, seed: int = 0
 ) -> Answer:
-    """The answer, or the same with a model whose numbers are small, if there is one and it is found at once: people
-    are to read it, and 21238 looks as if it meant something."""
+    """The answer, or the same with a model whose numbers are small, if one exists and is found at once: people read it,
+    and 21238 looks as if it meant something."""
     numbers = [number for number in numbers if z3.is_arith(number)]
     if answer.model is None or all(map(_is_small, map(answer.model.evaluate, numbers))):
         return answer
@@ -117,8 +117,8 @@ def _ask(
 
 
 def _granted(effort: int) -> int:
-    """What a question may take of its effort; one that may take nothing is written down all the same, so that a loop of
-    refused questions comes to an end."""
+    """The part of its effort that a question may use; one that may use nothing is counted all the same, so that a loop
+    of refused questions ends."""
     granted = allowed(effort)
     if granted <= 0:
         spend(QUESTION_STEPS)
@@ -127,11 +127,11 @@ def _granted(effort: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Loaded:
-    """A solver that holds assertions, and tracked ones each under a switch."""
+    """A solver that holds assertions, and tracked ones each behind a switch."""
 
     solver: Any
     switches: tuple[tuple[Expr, str], ...]
-    """Each with its label."""
+    """Each switch with its label."""
 
     @classmethod
     def of(cls, translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]]) -> _Loaded:
@@ -155,7 +155,7 @@ class _Loaded:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What a solver answered, and why it gave up, for people."""
+    """A solver's answer, and the reason why it gave up, for people."""
 
     status: Status
     reason: str = ""
@@ -165,8 +165,8 @@ HANGS = "the solver hangs"
 
 
 def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *assumptions: Expr) -> Said:
-    """Put what a solver holds to it: every question to Z3 goes through here. Its steps bound it and are counted
-    (`avow.solving.limits`); the clock only ends what hangs. Raises Z3Exception."""
+    """Check what a solver holds: every question to Z3 goes through here. Its steps bound it and are counted
+    (`avow.solving.limits`); the clock only ends a call that hangs. Raises Z3Exception."""
     configured(solver, effort, seed)
     result = solver.check(*assumptions)
     charge(translator, solver)
@@ -178,7 +178,7 @@ def put(translator: Sorts, solver: Any, effort: float, seed: int | None = 0, *as
 
 
 def configured(solver: Any, effort: float, seed: int | None) -> None:
-    """Set a solver's limit and seed; None for one that has no seed."""
+    """Set a solver's limit and seed; None for a solver without a seed."""
     options: dict[str, object] = {"rlimit": steps(effort), "timeout": net(effort)}
     if isinstance(solver, z3.Solver) and seed is not None:
         # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
@@ -187,8 +187,8 @@ def configured(solver: Any, effort: float, seed: int | None) -> None:
 
 
 def charge(translator: Sorts, solver: Any = None) -> int:
-    """Count what was done in the translator's context since it was last asked; any solver of the context can tell. How
-    many steps that were."""
+    """Count the steps in the translator's context since the last call; any solver of the context can be used. Returns
+    their number."""
     before = translator.session.steps
     count = translator.session.steps = _steps_of(solver or z3.Solver(ctx=translator.context))
     used = max(0, count - before)
@@ -197,7 +197,7 @@ def charge(translator: Sorts, solver: Any = None) -> int:
 
 
 def _steps_of(solver: Any) -> int:
-    """What the solver's context has counted so far."""
+    """The number of steps that the solver's context has counted so far."""
     found = solver.statistics()
     for k in range(len(found)):
         if z3.Z3_stats_get_key(found.ctx.ref(), found.stats, k) == "rlimit count":
@@ -206,7 +206,7 @@ def _steps_of(solver: Any) -> int:
 
 
 def _reason(solver: Any) -> str:
-    """Why it gave up, for people."""
+    """The reason why it gave up, for people."""
     reason = str(solver.reason_unknown()).strip("()")
     if reason == "timeout":
         return HANGS
@@ -232,12 +232,12 @@ def _ask_qsat(
 
 
 def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
-    """Whether only numbers and truth values occur: where qsat is complete, and its `unsat` taken."""
+    """Whether only numbers and truth values occur: qsat is complete there, and its `unsat` is accepted."""
     return all(z3.is_bool(e) or z3.is_arith(e) for e in _parts(exprs)) and not any(map(_is_applied, _parts(exprs)))
 
 
 def _real_polynomials(exprs: Iterable[Expr]) -> bool:
-    """Whether only reals and truth values occur, and reals are multiplied: another engine knows about these."""
+    """Whether only reals and truth values occur, and reals are multiplied: another engine supports these."""
     parts = list(_parts(exprs))
     plain = all(z3.is_bool(e) or z3.is_real(e) for e in parts) and not any(map(_is_applied, parts))
     divided = any(z3.is_div(e) and not z3.is_rational_value(e.arg(1)) for e in parts)
@@ -277,8 +277,8 @@ def _minimal(
     seed: int,
     engine: Engine,
 ) -> tuple[str, ...]:
-    """Drop what is not needed, one label at a time. One solver is asked about all of them, as it learns; another is
-    asked afresh only where it gives up."""
+    """Drop unneeded labels, one at a time. One solver is used for all of them, as it learns; a new one only if it gives
+    up."""
     kept, effort = list(core), min(effort, 2_000)
     loaded: _Loaded | None = None
     for label in core:

@@ -1,7 +1,7 @@
-"""An invariant of a transition system, looked for by Z3's Spacer (Komuravelli, Gurfinkel and Chaki, 2016).
+"""An invariant of a transition system, found by Z3's Spacer (Komuravelli, Gurfinkel and Chaki, 2016).
 
-What is found is a guess like any other: who uses it has to ask whether it holds first, is kept by every step, and
-implies what it was looked for. So whatever cannot be said to Spacer is left out.
+The result is only a guess: the caller has to check that it holds initially, is preserved by every step, and implies the
+claim. Anything that Spacer cannot express is therefore left out.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from avow.solving.z3_module import z3
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """`invariant`: over the variables after a step; None where none was found. `broken`: because there is a run at the
-    end of which the claim is false, as far as Spacer was told."""
+    """`invariant`: over the variables after a step; None if none was found. `broken`: a run exists at the end of which
+    the claim is false, as far as Spacer can express it."""
 
     invariant: Term | None = None
     broken: bool = False
@@ -36,9 +36,9 @@ def invariant(
     state: Mapping[Variable, Variable],
     effort: int,
 ) -> Found:
-    """What holds after every step, and excludes the `last` one. `state`: variables as a step finds them → as it leaves
-    them. `begins` and `goes_on` are what is known of a first step and of a later one, `last` of one that breaks the
-    claim. The answer is the same wherever it is asked: Spacer's steps bound it."""
+    """A formula that holds after every step, and excludes the `last` one. `state`: variables before a step → after it.
+    `begins` and `goes_on` describe a first step and a later one, `last` one that violates the claim. The answer is the
+    same on every machine: Spacer's steps bound it."""
     kept = {
         v: after
         for v, after in sorted(state.items(), key=lambda item: item[1].qualified)
@@ -46,7 +46,7 @@ def invariant(
     }
     if not kept or not all(map(_sayable, last)):
         return Found()
-    # with global guidance over its lemmas it finds what it never ends on without, and the other way round
+    # each setting of global guidance over lemmas finds invariants where the other does not end
     for guided in (True, False):
         try:
             found = _asked(begins, goes_on, last, kept, guided, effort)
@@ -100,7 +100,7 @@ def _asked(
 
 
 def _sayable(term: Term) -> bool:
-    """Whether it has no quantifier, and no function or sequence in it."""
+    """Whether it has no quantifier, function or sequence."""
     unsaid = (Quantified, Apply, Index, Length, History)
     return all(map(_sayable_sort, free_variables(term))) and not any(isinstance(t, unsaid) for t in subterms(term))
 

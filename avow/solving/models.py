@@ -1,7 +1,7 @@
 """Z3's models as values of the contract's sorts.
 
-Z3 gives a function as a list of points and an expression for the rest; here it becomes a table and a default. Where
-that cannot be done exactly the value is a best reading of it: whoever shows a model replays it first.
+Z3 gives a function as a list of points and an expression for the rest; here it becomes a table and a default. If that
+is not possible exactly, the value is an approximation: a model is replayed before it is shown.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ class Model:
         return FunctionValue({point: value for point, value in table.items() if value != default}, default)
 
     def _otherwise(self, rest: Expr, sort: s.FunctionSort, table: dict[tuple[Value, ...], Value]) -> Value:
-        """The default. Where the rest tells arguments apart (``x == 1``, ``2 <= x``), its values at the points that are
-        named there are added to the table, and what its last branch yields is taken for the default."""
+        """The default. If the rest distinguishes arguments (``x == 1``, ``2 <= x``), its values at the points named
+        there are added to the table, and the value of its last branch is used as the default."""
         if rest is None:
             return default_value(sort.result)
         places = _compared(rest, len(sort.parameters))
@@ -144,7 +144,7 @@ def _is_closed(expr: Expr) -> bool:
 
 
 def default_value(sort: s.Sort) -> Value:
-    """Some value of a sort: its simplest. Raises Unsupported."""
+    """The simplest value of a sort. Raises Unsupported."""
     match sort:
         case s.BoolSort():
             return False
@@ -179,7 +179,7 @@ def _integer(expr: Expr) -> int:
 
 def _fraction(expr: Expr) -> Fraction:
     if z3.is_algebraic_value(expr):
-        expr = expr.approx(12)  # an irrational number: near enough to show, and replayed before it counts
+        expr = expr.approx(12)  # an irrational number: close enough to show, and replayed before it counts
     if not z3.is_rational_value(expr):
         raise Unsupported(f"a number that the solver left open: {expr}")
     return Fraction(expr.numerator_as_long(), expr.denominator_as_long())

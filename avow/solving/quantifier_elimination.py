@@ -1,8 +1,8 @@
-"""What would make it hold? The weakest further assumption under which hypotheses imply a goal.
+"""The weakest further assumption under which hypotheses imply a goal.
 
-Where an entailment fails, `remedy` eliminates all variables but those that one may assume something about (a node's
-inputs, say) from "the hypotheses imply the goal", and reads the result back as a term of the contract. It works where
-quantifier elimination does: linear arithmetic, enumerations and truth values; no functions, no strings.
+If an entailment fails, `remedy` eliminates all variables except those that may be constrained (a node's inputs, say)
+from "the hypotheses imply the goal", and reads the result back as a term of the contract. It works where quantifier
+elimination does: linear arithmetic, enumerations and truth values; no functions, no strings.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from avow.solving.z3_module import z3
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """An assumption with which the goal follows. `weakest` says that no weaker one about these variables would do."""
+    """An assumption with which the goal follows. `weakest` says that no weaker one about these variables suffices."""
 
     assumption: t.Term
     weakest: bool
@@ -38,8 +38,8 @@ def remedy(
 ) -> Remedy | None:
     """The weakest assumption about the variables `about` that makes the hypotheses imply the goal.
 
-    None where there is none (it would contradict the hypotheses), or none can be found or read back in time. What is
-    returned has been checked: with it the goal is proved, and it can hold together with the hypotheses.
+    None if there is none (it would contradict the hypotheses), or if none can be found or read back in time. The result
+    has been checked: with it the goal is proved, and it is consistent with the hypotheses.
     """
     whole = t.Implies(conjunction(hypotheses.values()), goal)
     others = sorted(free_variables(whole) - frozenset(about), key=lambda v: (v.qualified, repr(v.sort)))
@@ -50,7 +50,7 @@ def remedy(
     exact: t.Term = t.Quantified(t.Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
     try:
         raw = _eliminate(exact)
-    except (Unsupported, z3.Z3Exception, RecursionError):  # what is too deep to be read back is no use to anyone
+    except (Unsupported, z3.Z3Exception, RecursionError):  # terms too deep to be read back are useless to people
         return None
     if raw is None:
         return None
@@ -60,7 +60,7 @@ def remedy(
         return None
     if entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
         return None
-    # Weaker than every assumption that would do, as far as the hypotheses leave a difference.
+    # Weaker than every sufficient assumption, as far as the hypotheses leave a difference.
     context = [h for h in hypotheses.values() if free_variables(h) <= frozenset(about)]
     weakest = entails([*context, exact], found, effort=effort).verdict is Verdict.PROVED
     return Remedy(found, weakest)
@@ -70,13 +70,13 @@ ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
 
 
 def eliminable(term: t.Term) -> bool:
-    """Whether all the term's free variables have sorts that `remedy` can do something with."""
+    """Whether all the term's free variables have sorts that `remedy` supports."""
     return all(isinstance(v.sort, ELIMINABLE) for v in free_variables(term))
 
 
 def eliminated(formula: t.Term) -> t.Term | None:
-    """A formula without quantifiers that should say the same; None where none is found. It is for the caller to have
-    that confirmed: Z3's tactics have lost parts of a formula before."""
+    """A formula without quantifiers that should be equivalent; None if none is found. The caller has to confirm that:
+    Z3's tactics have lost parts of a formula before."""
     try:
         return _eliminate(formula)
     except (Unsupported, z3.Z3Exception, RecursionError):
@@ -95,7 +95,7 @@ def _eliminate(formula: t.Term) -> t.Term | None:
     )
     solver, before = chain.solver(), translator.session.steps
     solver.add(goal.as_expr())
-    put(translator, solver, ELIMINATION_STEPS / STEPS, None)  # to apply it has no limit of its own
+    put(translator, solver, ELIMINATION_STEPS / STEPS, None)  # applying it has no limit of its own
     if translator.session.steps - before >= ELIMINATION_STEPS:
         return None
     result = z3.TryFor(chain, 1000 * ELIMINATION_SECONDS, ctx=translator.context).apply(goal)
@@ -119,7 +119,7 @@ def _simplified(term: t.Term, hypotheses: Mapping[str, t.Term], goal: t.Term, ef
             continue
         for part in tuple(parts):
             rest = [p for p in parts if p is not part]
-            # Weaken an alternative as far as it still does its work.
+            # Weaken an alternative as far as it still suffices.
             if entails([*known, *rest], goal, effort=limit).verdict is Verdict.PROVED:
                 parts = rest
         kept.append(conjunction(parts))
@@ -131,7 +131,7 @@ def _simplified(term: t.Term, hypotheses: Mapping[str, t.Term], goal: t.Term, ef
 
 
 class TermReader:
-    """Z3 expressions, back to terms. Raises Unsupported for what has no counterpart."""
+    """Z3 expressions, back to terms. Raises Unsupported for an expression without counterpart."""
 
     def __init__(self, translator: Translator, free: Mapping[str, t.Variable]) -> None:
         self.free = free

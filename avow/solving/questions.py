@@ -1,11 +1,11 @@
-"""Questions to the solver: satisfiable? entailed? Every answer is bounded in effort, none taken on trust.
+"""Questions to the solver: satisfiable? entailed? Every answer is bounded in effort, and checked.
 
 `solve` asks whether some formulas hold together, `entails` whether some imply another. A model is shown, and a
-refutation reported, only after it has been replayed: its values put into the formulas, and the result proved true under
-every interpretation of what lies outside partial operations. What cannot be replayed is `unknown`.
+refutation reported, only after it has been replayed: its values substituted, and the formulas proved true under every
+interpretation of partial operations outside their domains. A model that is not replayed is `unknown`.
 
 A total function over an infinite domain has no finite description in general; where the solver finds no model,
-functions with finitely many exceptions (a table and a default) are tried: what is found among them is a model.
+functions with finitely many exceptions (a table and a default) are tried: a solution among them is a model.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Entailment:
-    """Whether hypotheses imply a goal. `needed` are the labels of the hypotheses that a proof rests on: without any,
-    the goal is true by itself; `vacuous` says that the hypotheses contradict each other."""
+    """Whether hypotheses imply a goal. `needed` are the labels of the hypotheses that a proof depends on: without any,
+    the goal is valid; `vacuous` says that the hypotheses contradict each other."""
 
     verdict: Verdict
     counterexample: Counterexample | None = None
@@ -76,14 +76,14 @@ class Entailment:
 
 
 Values = OneOf["shown", "if any", "unused"]
-"""Of a solution: shown to people, with small numbers; the same, but they may be missing (polynomials can be solved by
-numbers that have no exact decimal); or not looked at."""
+"""The use of a solution's values: shown to people, with small numbers; the same, but they may be missing (polynomials
+can have solutions without an exact decimal); or not used."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """A question: see `solve`. `free`: the variables whose values are wanted; `small`: with small numbers, where there
-    are such values."""
+    """A question: see `solve`. `free`: the variables whose values are wanted; `small`: with small numbers, if such
+    values exist."""
 
     labelled: Mapping[str, Term]
     free: frozenset[Variable]
@@ -93,7 +93,7 @@ class _Asked:
     small: bool
 
     def fixed(self, translator: Translator) -> dict[Variable, Meaning]:
-        """What is given, as meanings."""
+        """The given values, as meanings."""
         return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
 
 
@@ -112,8 +112,8 @@ def solve(
     """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
 
     `variables` are further variables whose values are wanted; `given` fixes the values of some. Unsupported constructs,
-    time-outs and models that cannot be replayed are `unknown`, with the reason. `values` says what is made of a
-    solution: see `Values`.
+    time-outs and models that cannot be replayed are `unknown`, with the reason. `values`: how a solution is used, see
+    `Values`.
     """
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
@@ -199,7 +199,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
         return None
 
     def asked(effort: float, seed: int, engine: Engine = "smt") -> tuple[Answer, Solution | None]:
-        """An engine's answer, and the solution that it is, if it counts."""
+        """An engine's answer, and its solution, if it counts."""
         answer = check(translator, background, effort=max(1, int(effort)), seed=seed, tracked=tracked, engine=engine)
         name = "z3" if engine == "smt" else "z3, qsat"
         if answer.status == "unsat":
@@ -209,7 +209,7 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
     reason = ""
     for plain, tables in ROUNDS:
         if functions and (plain, tables) == ROUNDS[-1]:
-            for another in range(seed + 1, seed + 1 + RESTARTS):  # other seeds, each for a short while
+            for another in range(seed + 1, seed + 1 + RESTARTS):  # other seeds, each for a short time
                 answer, solution = asked(effort * RESTART, another)
                 if solution is not None:
                     return solution
@@ -234,8 +234,8 @@ def _solve(translator: Translator, question: _Asked) -> Solution:
 
 
 def _within_bounds(asked: _Asked) -> Solution | None:
-    """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
-    zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
+    """If there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
+    zero. Sequences are encoded as functions; if these formulas are contradictory, so are the original ones."""
     labelled = asked.labelled
     if not any(is_partial(formula) for formula in labelled.values()):
         return None
@@ -260,8 +260,8 @@ _INSIDE = "within the bounds"
 
 
 def _has_solution(asked: _Asked) -> bool:
-    """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
-    finds is a solution even if it cannot be written down."""
+    """Whether formulas without quantifiers, functions and partial operations hold together: for these, the solver's
+    answer is right even if the solution cannot be written down."""
     formulas = asked.labelled.values()
     parts = [part for formula in formulas for part in subterms(formula)]
     if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(is_partial, formulas)):
@@ -283,7 +283,7 @@ def _is_simple(value: Value) -> bool:
 
 
 _TABLES = ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False))
-"""How many exceptions the functions may have, and whether relations are false elsewhere: the simplest first."""
+"""The number of exceptions of the functions, and whether relations are false elsewhere: the simplest first."""
 
 
 def search_tables(
@@ -295,8 +295,8 @@ def search_tables(
     effort: int,
     seed: int = 0,
 ) -> dict[Variable, Value] | None:
-    """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
-    that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
+    """Values of the variables for which the result of `build` is satisfiable, with functions that are tables of few
+    entries. A best effort: None proves nothing, and a result has to be replayed."""
     ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
     deadline = until(effort)
     for number, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
@@ -327,7 +327,7 @@ def _with_tables(
     effort: int,
     seed: int,
 ) -> dict[Variable, Value] | None:
-    """A model in which every function has at most `size` exceptions; a `sparse` relation is false but at these."""
+    """A model in which every function has at most `size` exceptions; a `sparse` relation is false everywhere else."""
     meanings: dict[Variable, Meaning] = {}
     parts: dict[Variable, tuple[list[tuple[list[Expr], Expr]], Expr]] = {}
     facts: list[Expr] = []

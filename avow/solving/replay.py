@@ -1,4 +1,4 @@
-"""Do formulas hold of values? What a model or a search says counts only once this has said so."""
+"""Do formulas hold for given values? The result of a model or a search counts only if this confirms it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def replay(
     *,
     effort: int = 5_000,
 ) -> bool | None:
-    """Do the formulas hold of these values, whatever partial operations yield outside their domains?
+    """Do the formulas hold for these values, whatever partial operations yield outside their domains?
 
-    True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
+    True only if that is proved; False if some formula is proved false; None if neither can be shown. An unspecified
     sort has the elements that the values name, and up to three more if the formulas hold only then.
     """
     if not allowed(effort):
@@ -44,7 +44,7 @@ def replay(
 
 
 def _is_seen(translator: Translator, formulas: Sequence[Term], values: Mapping[Variable, Value]) -> bool:
-    """Whether total formulas are true with these values by calculation alone: no quantifier is left then. Raises
+    """Whether total formulas are true for these values by calculation only: no quantifier is left then. Raises
     Unsupported."""
     if any(isinstance(v.sort, FunctionSort) for v in values) or any(map(is_partial, formulas)):
         return False
@@ -86,7 +86,7 @@ def _replay(
 
 @by_identity(500)
 def opaque_sorts(formula: Term) -> frozenset[OpaqueSort]:
-    """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
+    """The unspecified sorts that a formula's terms and bound variables have, or contain."""
     sorts: dict[Sort, None] = {}
     for part in subterms(formula):
         sorts[part.sort] = None

@@ -1,7 +1,7 @@
-"""A second solver on what the first has settled: where cvc5 is installed and says otherwise, one of the two is wrong.
+"""A second solver's check of the first one's answers: if cvc5 is installed and disagrees, one of the two is wrong.
 
-Such an answer is neither of the two: whoever asked gives `error`, and says so. What cvc5 does not know, or does not
-read, says nothing.
+Such an answer is neither of the two: the caller gives `error`, and reports the disagreement. An `unknown` of cvc5, or a
+script that it does not read, has no effect.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CONTRADICTED = "two solvers contradict each other: Z3 says that there are no suc
 
 
 def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFFORT) -> bool:
-    """Whether cvc5 says that one of these formulas, of which Z3 said that none can hold, can."""
+    """Whether cvc5 finds one of these formulas satisfiable, all of which Z3 found unsatisfiable."""
     questions = [formula for formula in impossible if formula != FALSE]
     if not questions or importlib.util.find_spec("cvc5") is None:
         return False
@@ -32,8 +32,8 @@ def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFF
 
 
 def doubted(answer: Solution, formulas: Mapping[str, Term]) -> bool:
-    """Whether cvc5 says that the labelled formulas which an `unsat` names can hold together. What is `unsat` by cvc5's
-    own word is not asked again."""
+    """Whether cvc5 finds the labelled formulas named by an `unsat` satisfiable together. An `unsat` from cvc5 itself is
+    not checked again."""
     if answer.status != "unsat" or answer.engine == "cvc5":
         return False
     conflicting = [formula for label, formula in formulas.items() if label in answer.core]

@@ -1,8 +1,8 @@
-"""Many questions of one kind, put cheaply: do these hypotheses imply this goal, yes or no?
+"""Many questions of one kind, asked cheaply: do these hypotheses imply this goal, yes or no?
 
 A proof needs no core, no model and no replay, so that a verification condition is one check: one context, each formula
-translated once, and one solver in which a question is pushed and popped. Where a partial operation occurs, nothing is
-said, and the whole question (`avow.solving.questions.entails`) has to be asked.
+translated once, and one solver in which a question is pushed and popped. If a partial operation occurs, there is no
+answer, and the whole question (`avow.solving.questions.entails`) has to be asked.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from avow.solving.z3_module import z3
 
 @dataclass(slots=True)
 class Settler:
-    """The solver of one program, or of one node. Not to be shared between threads."""
+    """The solver of one program, or of one node. Not thread-safe."""
 
     seed: int = 0
     checks: int = 0
-    """How often the solver was asked."""
+    """The number of calls of the solver."""
     _translator: Translator = field(default_factory=Translator)
     _exprs: dict[Term, tuple[Expr, ...] | None] = field(default_factory=dict)
     _solver: Any = None
 
     def settles(self, hypotheses: Iterable[Term], goal: Term, *, effort: int) -> Status:
         """`unsat`: the hypotheses imply the goal, for all values of the free variables; that is proved. `sat`: it
-        cannot be proved (the model is not looked at, so that nothing is refuted). `unknown` says nothing."""
+        cannot be proved (the model is not used, so that nothing is refuted). `unknown` means nothing."""
         try:
             facts = [self._facts(term) for term in (*hypotheses, negation(goal))]
             exprs = [expr for fact in facts if fact is not None for expr in fact]
@@ -46,18 +46,18 @@ class Settler:
             return "unknown"
 
     def proves(self, hypotheses: Sequence[Term], goal: Term, *, effort: int) -> bool:
-        """Whether the hypotheses imply the goal; where the short question does not say, by the whole one."""
+        """Whether the hypotheses imply the goal; by the whole question, if the short one is not conclusive."""
         match self.settles(hypotheses, goal, effort=effort):
             case "unsat":
                 return True
             case "sat":
                 return False
-            case _:  # not settled: asked in full
+            case _:  # not decided: asked in full
                 answer = entails(hypotheses, goal, effort=effort, seed=self.seed)
                 return answer.verdict is Verdict.PROVED
 
     def _facts(self, term: Term) -> tuple[Expr, ...] | None:
-        """A formula, and what its variables' types say; None where a partial operation occurs. Raises Unsupported."""
+        """A formula, and its variables' type constraints; None if a partial operation occurs. Raises Unsupported."""
         if term not in self._exprs:
             if is_partial(term):
                 self._exprs[term] = None
@@ -75,7 +75,7 @@ class Settler:
             self._solver = z3.Solver(ctx=self._translator.context)
         status = self._check(self._solver, [*known, *exprs], limit, pop=True)
         if status == "unknown":
-            # pushed questions are not simplified first, and a solver that gave up once may go on doing so
+            # pushed questions are not simplified first, and a solver that has given up once may do so again
             self._solver = None
             status = self._check(z3.Solver(ctx=self._translator.context), [*known, *exprs], allowed(limit), pop=False)
         return status

@@ -1,9 +1,9 @@
-"""Unspecified types: some set that is not empty, of which nothing else is known, how many elements it has neither.
+"""Unspecified types: some non-empty set of which nothing else is known, nor its number of elements.
 
-What follows from formulas follows whatever the set (a solver's `unsat` speaks of all of them). But a solver that finds
-values chooses how many elements a type ``{}`` has, and whoever keeps the contract may not: that there are such values
-counts only if there are whatever the number of elements. That is asked of few elements and of many: of each number that
-`avow.base.tuning` names, and of more than these, in different types alike and apart.
+A consequence of formulas holds for any such set (a solver's `unsat` covers all of them). But a solver that finds values
+chooses the number of elements of a type ``{}``, and an implementation of the contract may not: the existence of such
+values counts only if they exist for any number of elements. That is checked for few elements and for many: for each
+number that `avow.base.tuning` names, and for more than these, in different types alike and independently.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from avow.solving.replay import opaque_sorts
 from avow.solving.second import CONTRADICTED, doubted
 
 _MORE = max(SIZES_TRIED) + 1
-"""Stands for at least so many."""
+"""Represents at least so many."""
 
 
 def in_every_size(
     assumptions: Mapping[str, Term], wanted: Mapping[str, Term], *, what: str, effort: int, seed: int = 0
 ) -> tuple[Verdict, str]:
-    """Whether values meet all formulas whatever number of elements the unspecified types have, of those numbers that
-    the assumptions allow. `what` they are, for people: `refuted`, `unknown` and `error` (two solvers contradict each
-    other) come with the reason; `proved` where no such type occurs."""
+    """Whether values satisfy all formulas for any number of elements of the unspecified types, among the numbers that
+    the assumptions allow. `what` describes the values, for people: `refuted`, `unknown` and `error` (two solvers
+    contradict each other) come with the reason; `proved` if no such type occurs."""
     together = {**assumptions, **wanted}
     sorts = sorted({sort for f in together.values() for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     verdict, reason = Verdict.PROVED, ""
@@ -50,7 +50,7 @@ def in_every_size(
 
 
 def _sizes(sorts: int) -> Iterator[tuple[int, ...]]:
-    """How many elements each of the types has: all alike, then each way of mixing them; of many types, one that differs
+    """The number of elements of each type: all equal, then each way of mixing them; for many types, one that differs
     from the rest."""
     if not sorts:
         return
@@ -64,7 +64,7 @@ def _sizes(sorts: int) -> Iterator[tuple[int, ...]]:
 
 
 def _has(sort: OpaqueSort, size: int) -> Term:
-    """That the type has so many elements."""
+    """The claim that the type has so many elements."""
     some = tuple(Variable(Role.BOUND, f"{sort.name} no {k}", sort) for k in range(size))
     other = Variable(Role.BOUND, f"{sort.name} any", sort)
     apart = [Not(Compare("==", a, b)) for k, a in enumerate(some) for b in some[:k]]

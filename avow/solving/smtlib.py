@@ -1,6 +1,6 @@
-"""Questions as SMT-LIB 2.6 text, for another solver, for a reader, and for the archive.
+"""Questions as SMT-LIB 2.6 text, for another solver, for readers, and for the archive.
 
-The text is Z3's own printing of the one translation, with what is Z3's dialect in it put in the standard's words.
+The text is Z3's own printing of the one translation, with Z3's dialect replaced by the standard's syntax.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: s
     named = [(label, translator.term(formula)) for label, formula in labelled.items()]
     solver = z3.Tactic("skip", translator.context).solver()  # it only prints: one that solves costs six times as much
     solver.add(*background, *(expr for _, expr in named))
-    # Z3 prints declarations first; the assertions are printed one by one, so that each can bear its name.
+    # Z3 prints declarations first; the assertions are printed one by one, so that each can have its name.
     declarations = _ASSERTION.split(solver.sexpr(), maxsplit=1)[0].strip()
     lines = [f"; {_harmless(line)}" for line in comment.splitlines()]
     lines += ["(set-logic ALL)", *_in_order(declarations)]
@@ -43,7 +43,7 @@ def formulas_script(formulas: Mapping[str, Term] | Iterable[Term], *, comment: s
     return f"; cvc5 reads sequences with --strings-exp\n{script}" if "(seq." in script else script
 
 
-_ASSERTION = re.compile(r"^\(assert\s", re.MULTILINE)  # not the element of a type that is called `assert`
+_ASSERTION = re.compile(r"^\(assert\s", re.MULTILINE)  # not the element of a type named `assert`
 _PIECE = re.compile(r'\|[^|]*\||"(?:[^"]|"")*"|;[^\n]*|[^\s()|";]+')
 
 
@@ -52,7 +52,7 @@ _DECLARED = re.compile(r"\(declare-(?:sort |datatypes \(\()(\|[^|]*\||[^\s()]+)"
 
 
 def _in_order(declarations: str) -> list[str]:
-    """The declarations, each after those of the sorts that it speaks of. (Z3 forgets sequences of sequences.)"""
+    """The declarations, each after those of the sorts that it uses. (Z3 omits sequences of sequences.)"""
     text = _quoted(declarations)
     starts = [m.start() for m in _COMMAND.finditer(text)]
     waiting = [text[a:b].strip() for a, b in pairwise([*starts, len(text)])]
@@ -61,13 +61,13 @@ def _in_order(declarations: str) -> list[str]:
     while waiting:
         missing = {names[line] for line in waiting if line in names}
         ready = [line for line in waiting if not (missing - {names.get(line)}) & set(_PIECE.findall(line))]
-        made += ready or waiting  # in a circle there is no order; RCL's types have none
+        made += ready or waiting  # a cycle has no order; RCL's types have none
         waiting = [line for line in waiting if line not in ready] if ready else []
     return made
 
 
 def _quoted(script: str) -> str:
-    """The script with bars around each symbol that needs them. (Z3 prints what a datatype declares without.)"""
+    """The script with bars around each symbol that needs them. (Z3 prints a datatype's symbols without.)"""
     return _PIECE.sub(lambda m: f"|{m[0]}|" if "'" in m[0] and m[0][0] not in '|";' else m[0], script)
 
 
@@ -77,12 +77,12 @@ def _harmless(text: str) -> str:
 
 
 def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
-    """cvc5's answer to a script (``unknown`` where it takes more effort), or None where the package is not installed or
-    cannot read the script. Its own steps are counted, as Z3's are; the clock only ends what hangs."""
+    """cvc5's answer to a script (``unknown`` if it needs more effort), or None if the package is not installed or
+    cannot read the script. Its own steps are counted, as Z3's are; the clock only ends a call that hangs."""
     if importlib.util.find_spec("cvc5") is None:
         return None
     seconds = CVC5_SECONDS + effort / CVC5_EFFORT_A_SECOND
-    for _ in range(2):  # another process may have been ended by somebody else
+    for _ in range(2):  # another process may have been ended by something else
         try:
             return CVC5.ask(script, max(1, effort * CVC5_STEPS), seconds)[0] or None
         except TimeoutError:
@@ -96,10 +96,10 @@ CVC5 = Apart("cvc5")
 
 
 def to_smtlib(contract: Contract) -> Partial:
-    """One script, which asks of each node whether its assumptions and guarantees can hold together; between nodes the
-    solver is reset. Of clauses that speak of other steps it is one step, whatever was before: what is remembered are
-    constants, and what the step leaves is said by an equation for each; first values are told in the comment. A clause
-    that SMT-LIB cannot say is left out, and named."""
+    """One script, which checks for each node whether its assumptions and guarantees can hold together; the solver is
+    reset between nodes. Clauses about other steps are given for one step, with any past: remembered values are
+    constants, and an equation for each gives the value after the step; first values are in the comment. A clause that
+    SMT-LIB cannot express is left out, and named."""
     scripts: list[str] = []
     missing: list[Diagnostic] = []
     for node in contract.nodes:
@@ -127,7 +127,7 @@ def to_smtlib(contract: Contract) -> Partial:
 
 
 def _unsaid(formula: Term) -> str:
-    """Why SMT-LIB cannot say a formula; empty where it can."""
+    """Why SMT-LIB cannot express a formula; empty if it can."""
     try:
         formulas_script([formula])
     except Unsupported as unsupported:

@@ -1,11 +1,10 @@
-"""THE translation of typed terms to Z3: everything that asks Z3 a question goes through here.
+"""THE translation of typed terms to Z3: every question to Z3 goes through here.
 
-Threads do not meet: each has Z3 contexts of its own (`avow.solving.z3_sorts.Session`). NATURAL is Int, relativised: a
-quantifier over it (or over a sort that contains it) ranges over its members only, and `background` says so of free
-variables. A free function-typed variable is an uninterpreted function; a bound one an array. What lies outside a
-partial operation (division by zero, an element beyond a sequence's end) is unspecified: no interpretation of it is
-chosen here, so that what is proved holds under each (`avow.solving.questions` takes care that satisfiability is judged
-likewise).
+Threads share nothing: each has Z3 contexts of its own (`avow.solving.z3_sorts.Session`). NATURAL is Int, relativised: a
+quantifier over it (or over a sort that contains it) ranges over its members only, and `background` asserts membership
+of free variables. A free function-typed variable is an uninterpreted function; a bound one an array. Partial operations
+outside their domain (division by zero, an element beyond a sequence's end) are unspecified: no interpretation is chosen
+here, so that proofs hold under each (`avow.solving.questions` ensures the same for satisfiability).
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ class Translator(Sorts):
     # -- variables -----------------------------------------------------------------------------------------------------
 
     def variable(self, variable: t.Variable) -> Expr:
-        """The constant that stands for a free variable that is not a function."""
+        """The constant for a free variable that is not a function."""
         constants = self.session.constants
         if variable not in constants:
             constants[variable] = z3.Const(variable.qualified, self.sort(variable.sort))
         return constants[variable]
 
     def function(self, variable: t.Variable) -> Any:
-        """The uninterpreted function that stands for a free function-typed variable."""
+        """The uninterpreted function for a free function-typed variable."""
         constants = self.session.constants
         if variable not in constants:
             sort = variable.sort
@@ -52,7 +51,7 @@ class Translator(Sorts):
     def background(
         self, variables: Iterable[t.Variable], meanings: Mapping[t.Variable, Meaning] | None = None
     ) -> list[Expr]:
-        """What is true by typing of free variables: naturals are not negative, wherever they occur."""
+        """Facts from the types of free variables: naturals are not negative, wherever they occur."""
         facts = []
         for variable in sorted(variables, key=lambda v: (v.qualified, repr(v.sort))):
             if isinstance(variable.sort, s.FunctionSort):
@@ -108,7 +107,7 @@ class Translator(Sorts):
             case t.Length(sequence=t.SequenceRange(low=low, high=high)):
                 one, other = yield self._terms((low, high), bound, meanings)
                 return z3.If(other >= one, other - one + 1, z3.IntVal(0, self.context))
-            case _:  # what it is follows from what its parts are
+            case _:  # determined by its parts
                 parts = yield self._terms(term.children, bound, meanings)
                 return self._made(term, parts)
 
@@ -136,7 +135,7 @@ class Translator(Sorts):
             case t.Length():
                 return z3.Length(*parts)
             case t.Index():
-                # Z3's element outside a sequence may be no value of the sort: a negative number for a natural.
+                # Z3's element outside a sequence may not be a value of the sort: a negative number for a natural.
                 return self.clamped(parts[0][parts[1]], term.sort)
             case t.Widen():
                 return self._real(*parts)
@@ -236,7 +235,7 @@ class Translator(Sorts):
         bound: Mapping[t.Variable, Expr],
         meanings: Mapping[t.Variable, Meaning],
     ) -> Steps[Expr]:
-        """That a range, which is no value of its own for the solver, is another sequence: the same length, and the
+        """The equality of a range, which the solver has no value for, and another sequence: the same length, and the
         same number at every position."""
         low, high = yield self._terms((one.low, one.high), bound, meanings)
         if isinstance(other, t.SequenceRange):

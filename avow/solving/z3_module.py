@@ -1,4 +1,4 @@
-"""Z3, imported when it is first used: most of what reads obligations never asks it, and its import takes a while."""
+"""Z3, imported at first use: most readers of obligations never use it, and its import is slow."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
 
 def _keep_memory() -> None:
-    """Have the C library keep what is freed, up to 256 MB, for what is asked for next.
+    """Have the C library keep freed memory, up to 256 MB, for later requests.
 
-    Every Z3 context takes 16 MB for its tables and frees them. glibc would give them back to the system each time, and
-    the fresh, zeroed pages of the next context would cost several times what the context itself does.
+    Every Z3 context takes 16 MB for its tables and frees them. glibc would return them to the system each time, and the
+    fresh, zeroed pages of the next context would cost several times as much as the context itself.
     """
     if sys.platform != "linux":
         return

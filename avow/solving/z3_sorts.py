@@ -21,7 +21,7 @@ Expr = Any
 """A Z3 expression (the z3 package is not typed)."""
 
 Meaning = Any
-"""What a free variable stands for, if not for itself: an expression, or for a function a callable on expressions."""
+"""The meaning of a free variable that does not represent itself: an expression, or for a function a callable."""
 
 _MAX_CHARACTER = 0x2FFFF
 """The largest code point of an SMT-LIB string."""
@@ -38,7 +38,7 @@ class Unsupported(Exception):  # noqa: N818 - it names what happened
 
 def _whole(sort: s.Sort) -> s.Sort:
     """The sort with INTEGER for NATURAL inside tuples and sequences: RCL compares ``(1, n)`` with ``(1, i)``, so that
-    both must be of one Z3 sort. Which of its values are naturals, `member` says. A record is the tuple of its items."""
+    both must have one Z3 sort. `member` tests which of its values are naturals. A record is the tuple of its items."""
     match sort:
         case s.NaturalSort():
             return s.INTEGER
@@ -51,7 +51,7 @@ def _whole(sort: s.Sort) -> s.Sort:
 
 @dataclass(slots=True, eq=False)
 class Session:
-    """A Z3 context, with the sorts, constants and formulas that were made in it: each is made once."""
+    """A Z3 context, with its sorts, constants and formulas: each is made once."""
 
     context: Any = field(default_factory=lambda: z3.Context())
     sorts: dict[s.Sort, Any] = field(default_factory=dict)
@@ -69,11 +69,11 @@ _session: ContextVar[Session | None] = ContextVar("session", default=None)
 
 @contextmanager
 def new_session() -> Iterator[None]:
-    """Within the block all questions of this thread are asked in one new Z3 context, each of a solver of its own.
+    """Within the block all questions of this thread are asked in one new Z3 context, each with its own solver.
 
-    A context takes 16 MB and 8 ms, more than most questions. What a solver does depends a little on what else its
-    context holds. So a session is for questions that are always asked together, in the same order (the claims of a
-    node), and no longer: else an answer could depend on what was asked before it.
+    A context takes 16 MB and 8 ms, more than most questions. A solver's behaviour depends a little on the other
+    contents of its context. A session is therefore for questions that are always asked together, in the same order (the
+    claims of a node), and no longer: otherwise an answer could depend on earlier questions.
     """
     before = _session.set(Session())
     try:
@@ -84,7 +84,7 @@ def new_session() -> Iterator[None]:
 
 @contextmanager
 def same_session() -> Iterator[None]:
-    """The session that there is, or a new one for the block."""
+    """The current session, or a new one for the block."""
     if _session.get() is not None:
         yield
         return
@@ -93,7 +93,7 @@ def same_session() -> Iterator[None]:
 
 
 class _Kept(threading.local):
-    """A session of each thread."""
+    """Each thread's session."""
 
     session: Session | None = None
     questions = 0
@@ -104,7 +104,7 @@ _kept = _Kept()
 
 @contextmanager
 def kept_session() -> Iterator[None]:
-    """A session that lasts for many blocks: for questions in any number of which each has one answer, and is easy."""
+    """A session that lasts for many blocks: for any number of easy questions, each with a single answer."""
     if _kept.session is None or _kept.questions >= QUESTIONS_KEPT:
         _kept.session, _kept.questions = Session(), 0
     _kept.questions += 1
@@ -116,7 +116,7 @@ def kept_session() -> Iterator[None]:
 
 
 class Sorts:
-    """The Z3 sorts of a session, which of their values are members of RCL's sorts, and concrete values."""
+    """The Z3 sorts of a session, membership of their values in RCL's sorts, and concrete values."""
 
     def __init__(self) -> None:
         self.session = _session.get() or Session()
@@ -127,7 +127,7 @@ class Sorts:
     # -- sorts ---------------------------------------------------------------------------------------------------------
 
     def sort(self, sort: s.Sort) -> Any:
-        """The Z3 sort of values of `sort`; of a function sort, an array sort. Raises Unsupported."""
+        """The Z3 sort of values of `sort`; for a function sort, an array sort. Raises Unsupported."""
         sort = _whole(sort)
         if sort not in self.session.sorts:
             self.session.sorts[sort] = self._make_sort(sort)
@@ -187,7 +187,7 @@ class Sorts:
         return candidate
 
     def member(self, sort: s.Sort, expr: Expr) -> Expr | None:
-        """That a Z3 value is a value of the sort (its naturals are not negative); None where every one is."""
+        """That a Z3 value is a value of the sort (its naturals are not negative); None if every one is."""
         match sort:
             case s.NaturalSort():
                 return expr >= 0
@@ -228,7 +228,7 @@ class Sorts:
                 assert_never(sort)
 
     def clamped(self, expr: Expr, sort: s.Sort) -> Expr:
-        """The expression where it is a value of the sort, else some value of the sort that depends on it alone."""
+        """The expression if it is a value of the sort, otherwise some value of the sort that depends only on it."""
         match sort:
             case s.NaturalSort():
                 return z3.If(expr >= 0, expr, z3.IntVal(0, self.context))
@@ -273,7 +273,7 @@ class Sorts:
         return z3.BoolVal(True, self.context)
 
     def fresh(self, name: str, sort: s.Sort) -> Expr:
-        """A new constant that no other question knows."""
+        """A new constant that occurs in no other question."""
         self._count += 1
         return z3.Const(f"{name}!{self._count}", self.sort(sort))
 
@@ -281,7 +281,7 @@ class Sorts:
         return z3.RealVal(f"{value.numerator}/{value.denominator}", self.context)
 
     def string(self, value: str, span: Span | None = None) -> Expr:
-        # Z3 reads \u{…} in its literals: everything that is not plain is written so, the backslash too.
+        # Z3 reads \u{…} in its literals: all other than plain characters are written so, including the backslash.
         if any(ord(character) > _MAX_CHARACTER for character in value):
             raise Unsupported("a string with a character beyond U+2FFFF", span)
         plain = (c if " " <= c <= "~" and c != "\\" else f"\\u{{{ord(c):x}}}" for c in value)
@@ -330,9 +330,9 @@ class Sorts:
             self.value(Opaque(sort.name, index), sort)
 
     def opaque_facts(self) -> list[Expr]:
-        """That the elements of unspecified sorts named by `value` are different, and all that there are.
+        """The claim that the elements of unspecified sorts named by `value` are different, and the only ones.
 
-        An unspecified sort may have any elements: a concrete situation fixes which.
+        An unspecified sort may have any elements: a concrete situation determines which.
         """
         by_sort: dict[str, list[Expr]] = {}
         for (name, _), constant in self._opaque.items():
@@ -355,7 +355,7 @@ class Sorts:
         return self.table(points, default)
 
     def table(self, points: Sequence[tuple[Sequence[Expr], Expr]], default: Expr) -> Callable[..., Expr]:
-        """The function with these results at these points (the first that fits) and the default elsewhere."""
+        """The function with these results at these points (the first that matches) and the default elsewhere."""
 
         def function(*arguments: Expr) -> Expr:
             result = default
