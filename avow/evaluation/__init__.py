@@ -1,4 +1,4 @@
-"""The exact truth of a formula over concrete values; where a quantifier cannot be made finite exactly, it says so.
+"""The exact truth of a formula over concrete values; a quantifier that cannot be made finite exactly is reported.
 
-Front doors: `avow.evaluation.evaluate`, and `avow.evaluation.truth` where a solver may help.
+Start reading at: `avow.evaluation.evaluate`, and `avow.evaluation.truth`, where a solver may help.
 """

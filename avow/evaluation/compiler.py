@@ -1,4 +1,4 @@
-"""Typed terms as closures over a list of slots, quantifiers apart (`Quantifiers`): evaluation then walks no syntax."""
+"""Typed terms as closures over a list of slots, quantifiers excluded (`Quantifiers`): evaluation walks no syntax."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
 
 
 def finite_values(sort: s.Sort, domains: Domains | None = None) -> tuple[Value, ...] | None:
-    """Every value of a sort, or None where they are infinitely many, unspecified or too many to enumerate."""
+    """Every value of a sort, or None if they are infinitely many, unspecified or too many to enumerate."""
     if domains and sort in domains:
         return tuple(domains[sort])
     match sort:
@@ -61,13 +61,13 @@ def finite_values(sort: s.Sort, domains: Domains | None = None) -> tuple[Value, 
 def combinations(
     sorts: Sequence[s.Sort], domains: Domains | None = None, most: int = VALUES_ENUMERATED
 ) -> tuple[tuple[Value, ...], ...] | None:
-    """Every combination of values of some sorts, or None where one has no end of values, or there are too many."""
+    """Every combination of values of some sorts, or None if one has infinitely many values, or there are too many."""
     ranges = complete(finite_values(sort, domains) for sort in sorts)
     return None if ranges is None or math.prod(map(len, ranges)) > most else tuple(product(*ranges))
 
 
 class Candidates(Protocol):
-    """The assignments to some variables that conjoined parts leave possible."""
+    """The assignments to some variables that a conjunction of parts allows."""
 
     @property
     def bound(self) -> Set[str]:
@@ -75,13 +75,13 @@ class Candidates(Protocol):
         ...
 
     def solutions(self, env: Env) -> Iterator[NotEvaluable | None]:
-        """Binds the variables in `env` before each yield: None, or why it is open whether the parts hold there."""
+        """Binds the variables in `env` before each yield: None, or why it is unknown whether the parts hold there."""
         ...
 
 
 class Quantifiers(Protocol):
-    """How quantifiers are decided. It is handed to the compiler, since the two recurse: a quantifier's body is a term,
-    and a term may hold quantifiers."""
+    """The decision procedure for quantifiers. It is passed to the compiler, since the two recurse: a quantifier's body
+    is a term, and a term may contain quantifiers."""
 
     def code(self, compiler: Compiler, term: t.Quantified) -> Code:
         """The closure for a quantified formula, whose variables have slots."""
@@ -100,10 +100,10 @@ class Compiler:
     bound: dict[str, int] = field(default_factory=dict)
     size: int = 0
     known: dict[int, tuple[t.Term, Code]] = field(default_factory=dict)
-    """By identity; a term is kept with its closure, so that no other has its place."""
+    """Keyed by identity; a term is kept with its closure, so that its id is not reused."""
 
     def slot(self, variable: t.Variable) -> int:
-        """Where the environment holds the variable; a bound name that no quantifier binds is a free one."""
+        """The variable's index in the environment; a bound name that no quantifier binds is a free one."""
         name = variable.qualified
         if name in self.bound:
             return self.bound[name]
@@ -122,7 +122,7 @@ class Compiler:
 
     def code(self, term: t.Term) -> Code:
         """The closure for a term, the same for the same object: planning asks for a part more than once, and clauses
-        with memory share parts. To compare what terms say would cost their whole size at each of their parts."""
+        with memory share parts. Comparing terms by structure would cost their whole size at each of their parts."""
         found = self.known.get(id(term))
         if found is None:
             found = self.known[id(term)] = (term, self._code(term))
@@ -288,7 +288,7 @@ class Compiler:
 
 
 def _all(codes: tuple[Code, ...]) -> Code:
-    """Conjunction: false as soon as one part is, even where another cannot be evaluated."""
+    """Conjunction: false as soon as one part is, even if another cannot be evaluated."""
 
     def run(env: Env) -> bool:
         doubt: NotEvaluable | None = None
@@ -306,7 +306,7 @@ def _all(codes: tuple[Code, ...]) -> Code:
 
 
 def _any(codes: tuple[Code, ...]) -> Code:
-    """Disjunction: true as soon as one part is, even where another cannot be evaluated."""
+    """Disjunction: true as soon as one part is, even if another cannot be evaluated."""
 
     def run(env: Env) -> bool:
         doubt: NotEvaluable | None = None
@@ -324,7 +324,7 @@ def _any(codes: tuple[Code, ...]) -> Code:
 
 
 def _same_function(left: FunctionValue, right: FunctionValue, size: int | None) -> bool:
-    """Extensional equality; `size` is how many points there are, None if infinitely many."""
+    """Extensional equality; `size` is the number of points, None if infinite."""
     points = left.table.keys() | right.table.keys()
     if any(left.table.get(p, left.default) != right.table.get(p, right.default) for p in points):
         return False
@@ -332,7 +332,7 @@ def _same_function(left: FunctionValue, right: FunctionValue, size: int | None) 
 
 
 def member_of(sort: s.Sort, domains: Domains) -> Callable[[Any], bool] | None:
-    """The test that a value found elsewhere lies in a variable's range, or None where every found value does."""
+    """The test that a value found elsewhere is in a variable's range, or None if every such value is."""
     if sort in domains:
         known = frozenset(domains[sort])
         return lambda value: value in known
@@ -358,7 +358,7 @@ def member_of(sort: s.Sort, domains: Domains) -> Callable[[Any], bool] | None:
             | s.FunctionSort()
             | s.SetSort()
         ):
-            return None  # what is found for such a variable is of its sort
+            return None  # a value found for such a variable has its sort
         case _:
             assert_never(sort)
 

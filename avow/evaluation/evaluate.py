@@ -1,8 +1,8 @@
 """Exact evaluation of typed terms over concrete values (`avow.formulas.values`).
 
-Nothing is approximated: either the value is the one that the logic gives, or `NotEvaluable` says why it cannot be had
-this way. A term is compiled once into closures over a list of slots; evaluation then walks no syntax. Quantifiers over
-finite sorts are enumerated; over infinite ones they are reduced to finitely many values by
+Nothing is approximated: either the value is the one that the logic defines, or `NotEvaluable` says why it cannot be
+computed this way. A term is compiled once into closures over a list of slots; evaluation then walks no syntax.
+Quantifiers over finite sorts are enumerated; over infinite ones they are reduced to finitely many values by
 `avow.evaluation.quantifier_search`.
 """
 
@@ -35,8 +35,8 @@ Evaluator = Callable[[Mapping[str, Value]], Value]
 def evaluate(term: Term, valuation: Mapping[str, Value], *, domains: Domains | None = None) -> Value:
     """The value of a term; `valuation` maps qualified names (``in.r``, or a free bound variable's name) to values.
 
-    `domains` replaces the infinite range of a sort's quantified variables by the given values: the answer is then about
-    that finite scenario. Raises NotEvaluable.
+    `domains` replaces the infinite range of a sort's quantified variables by the given values: the answer then applies
+    to that finite scenario. Raises NotEvaluable.
     """
     return compile_term(term, domains=domains)(valuation)
 
@@ -44,7 +44,7 @@ def evaluate(term: Term, valuation: Mapping[str, Value], *, domains: Domains | N
 def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
     """Compile once, evaluate often. The result raises NotEvaluable; so does compiling a term nested too deeply.
 
-    A function's table must not be changed after it was given: an index of it may be kept.
+    A function's table must not be changed after it was passed: an index of it may be kept.
     """
     compiler = Compiler(domains or {}, SEARCHES)
     code = guarded(lambda: compiler.code(rename_apart(term)))
@@ -117,7 +117,7 @@ def guarded(action: Callable[[], Any]) -> Any:
 
 
 def free_names(term: Term) -> frozenset[str]:
-    """The qualified names that a valuation must hold for the term."""
+    """The qualified names that a valuation must contain for the term."""
     compiler = Compiler({}, SEARCHES)
     compiler.code(rename_apart(term))
     return frozenset(compiler.free)

@@ -14,11 +14,11 @@ from avow.language.sorts import IntegerSort, NaturalSort
 from avow.language.terms import Arithmetic, Construct, Negative, SequenceTerm, Term, TupleTerm, Variable, Widen
 
 Match = Callable[[Env, Any], bool]
-"""Whether the value fits the pattern; binds the pattern's variables where it does."""
+"""Whether the value matches the pattern; if so, binds the pattern's variables."""
 
 
 def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
-    """How to match a value, or None where the term has no unique inverse. Takes what it binds out of `unbound`."""
+    """How to match a value, or None if the term has no unique inverse. Removes names that it binds from `unbound`."""
     open_names = bound_names(term) & unbound
     if not open_names:
         code = compiler.code(term)
@@ -58,12 +58,12 @@ def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
             return lambda env, value: plain(env, -value)
         case Arithmetic():
             return _arithmetic(compiler, term, unbound)
-        case _:  # no unique inverse: nothing is bound by it
+        case _:  # no unique inverse: it binds nothing
             return None
 
 
 def patterns(compiler: Compiler, terms: Sequence[Term], unbound: set[str]) -> Match | None:
-    """Match a tuple against several patterns; one that binds a variable goes before one that uses it."""
+    """Match a tuple against several patterns; one that binds a variable precedes one that uses it."""
     left = list(enumerate(terms))
     order: list[tuple[int, Match]] = []
     free = set(unbound)

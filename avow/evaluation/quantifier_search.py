@@ -1,10 +1,10 @@
-"""Quantifiers over infinite sorts, made finite where that is exact (the safe-range fragment, as in MonPoly).
+"""Quantifiers over infinite sorts, made finite if that is exact (the safe-range fragment, as in MonPoly).
 
 ``exists(x, y in REAL | in.at(x, y) and …)`` can only hold at a point of the table ``in.at``; ``out.c == move(x, y)``
 fixes x and y; ``0 <= i < n`` leaves n values. A `Search` turns the body into alternatives of conjunctions, finds for
 each an order in which its parts bind the variables, and checks every candidate against all parts. ``forall`` is the
-search for a counterexample. For a variable that no part restricts a solver is asked
-(`avow.evaluation.solved_variables`); where it finds no answer, `NotEvaluable` says which variable it is.
+search for a counterexample. For a variable that no part restricts a solver is used
+(`avow.evaluation.solved_variables`); if it finds no answer, `NotEvaluable` names the variable.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
 
 Doubt = NotEvaluable | None
-"""What comes with a candidate: None where it surely satisfies the body, else why that could not be found out."""
+"""The status of a candidate: None if it certainly satisfies the body, otherwise why that could not be determined."""
 
 
 class Incomplete(NotEvaluable):
-    """Candidates could not all be enumerated; those that were are not all there are."""
+    """Candidates could not all be enumerated; those enumerated are not all that exist."""
 
 
 class Search:
-    """The assignments to `variables` under which `body` is `positive`."""
+    """The assignments to `variables` for which `body` has the truth value `positive`."""
 
     def __init__(
         self, compiler: Compiler, variables: Sequence[t.Variable], body: t.Term, positive: bool, *, unique: bool = False
@@ -75,7 +75,7 @@ class Search:
         return len(found) == 1
 
     def witnesses(self, env: Env) -> Iterator[tuple[Any, ...]]:
-        """Values of `variables` that surely satisfy the body (perhaps not all of them, and perhaps repeated)."""
+        """Values of `variables` that certainly satisfy the body (perhaps not all of them, and perhaps repeated)."""
         for reason in self._solutions(env):
             if reason is None:
                 yield tuple([env[s] for s in self._slots])
@@ -95,7 +95,7 @@ class Search:
                 tried = next(fallbacks, None) if unrestricted else None
 
     def all(self, env: Env) -> dict[tuple[Any, ...], None]:
-        """All assignments, each once; of values that nothing names, one stands for the others. Raises NotEvaluable."""
+        """All assignments, each once; values that nothing names are represented by one of them. Raises NotEvaluable."""
         found: dict[tuple[Any, ...], None] = {}
         for reason in self._solutions(env):
             if reason is not None:
@@ -104,7 +104,7 @@ class Search:
         return found
 
     def _fallback(self, at: int, defaults: tuple[bool, ...], *, tables: bool) -> Plan:
-        """For values of functions under which what they have elsewhere (no table at all) restricts nothing."""
+        """For functions whose default values (or whose lack of a table) restrict nothing."""
         key = at, defaults if tables else None
         if key not in self._fallbacks:
             parts, variables = self._branches[at]
@@ -131,7 +131,7 @@ class Search:
 
 
 class Plan:
-    """An order of steps for one conjunction, with the checks that can be made after each."""
+    """An order of steps for one conjunction, with the checks that are possible after each."""
 
     def __init__(
         self,
@@ -146,9 +146,9 @@ class Plan:
         rows: bool = True,
         depth: int = 0,
     ) -> None:
-        """`complete`: bind every variable, else only those that parts restrict. `unique`: bind also variables that no
-        part mentions, since it matters how many values they have. `tables`: functions'
-        tables restrict variables; `rows`: also where something is not so elsewhere."""
+        """`complete`: bind every variable, otherwise only those that parts restrict. `unique`: bind also variables that
+        no part mentions, since the number of their values matters. `tables`: functions' tables restrict variables;
+        `rows`: also if something is false for all default values."""
         self._compiler = compiler
         self._depth = depth
         self._tables, self._rows = tables, rows
@@ -196,7 +196,7 @@ class Plan:
             yield reason if isinstance(reason, Unrestricted) else Incomplete(reason.reason)
 
     def _ready(self, pending: list[Part], unbound: set[str]) -> tuple[Code, ...]:
-        """Take out the parts that are fully bound by now; their checks."""
+        """Remove the parts that are now fully bound; returns their checks."""
         ready = [p for p in pending if not p.names & unbound]
         pending[:] = [p for p in pending if p.names & unbound]
         return tuple(_truth(self._compiler, p) for p in ready)
@@ -243,14 +243,14 @@ class Plan:
                 found = self._equation(term.left, term.right, unbound) or self._equation(term.right, term.left, unbound)
             case t.In() if positive:
                 found = self._membership(term, unbound)
-            case _:  # only by what functions have elsewhere
+            case _:  # only by functions' default values
                 found = None
         return found or (table_rows(self._compiler, part, unbound) if self._rows else None)
 
     def _cover(
         self, options: Sequence[tuple[t.Term, bool]], unbound: set[str], variables: Sequence[t.Variable] = ()
     ) -> Step | None:
-        """A disjunction restricts what every one of its sides restricts."""
+        """A disjunction restricts the variables that all of its sides restrict."""
         if self._depth >= DISJUNCTION_DEPTH:
             return None
         plans: list[Plan] = []
@@ -278,7 +278,7 @@ class Plan:
         slots = tuple(self._compiler.bound[name] for name in sorted(common))
 
         def run(env: Env) -> Iterator[None]:
-            # All candidates first: a check that runs between two of them may use the slots of the inner variables.
+            # First all candidates: a check that runs between two of them may use the slots of the inner variables.
             found: dict[tuple[Any, ...], None] = {}
             for plan in plans:
                 for reason in plan.solutions(env):
@@ -314,7 +314,7 @@ class Plan:
         return Step(1, frozenset(unbound - left), run)
 
     def _equation(self, left: t.Term, right: t.Term, unbound: set[str]) -> Step | None:
-        """``left == right`` where the left side is known."""
+        """``left == right`` with a known left side."""
         if bound_names(left) & unbound:
             return None
         known = self._compiler.code(left)
@@ -436,7 +436,7 @@ def _one_of(compiler: Compiler, variable: t.Variable, finite: Sequence[Any]) -> 
 
 
 def _bound(part: Part, name: str) -> tuple[str, t.Term] | None:
-    """``("<", t)`` where the part says that the variable is less than t."""
+    """``("<", t)`` if the part says that the variable is less than t."""
     if not isinstance(part.term, t.Compare) or part.term.operator not in FLIPPED:
         return None
     operator = part.term.operator if part.positive else OPPOSITE[part.term.operator]

@@ -1,4 +1,4 @@
-"""Cells along a run: what a node's clauses with history remember, step after step, exactly."""
+"""Cells along a run: the values that a node's clauses with history remember, step after step, exactly."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from avow.language.terms import Apply, Conditional, Role, Term, Variable
 
 
 class Keeper:
-    """The cells of some formulas over a run, of which only the last step is kept. A value that cannot be had (by a
-    division by zero, say) is none for whatever reads it later; neither is a table with more than so many `instances`.
-    Raises NotEvaluable."""
+    """The cells of some formulas over a run, of which only the last step is kept. A value that cannot be computed
+    (because of a division by zero, say) is missing for every later reader; so is a table with more than `instances`
+    points. Raises NotEvaluable."""
 
     def __init__(self, cells: Sequence[Cell], instances: int = INSTANCES) -> None:
         self._cells = {
@@ -43,15 +43,15 @@ class Keeper:
         self.restart()
 
     def restart(self) -> None:
-        """A new run."""
+        """Starts a new run."""
         self.memory = dict(self._initial)
 
     def at(self, ports: Mapping[str, Value]) -> dict[str, Value]:
-        """A step's valuation: its ports, and what the steps before have left."""
+        """A step's valuation: its ports, and the values left by earlier steps."""
         return {**self.memory, **ports}
 
     def advance(self, ports: Mapping[str, Value]) -> None:
-        """The step is over."""
+        """Ends the step."""
         valuation, left = self.at(ports), dict[str, Value]()
         for name, now in self._cells.items():
             try:
@@ -66,13 +66,13 @@ def _plain(now: Evaluator) -> Callable[[Mapping[str, Value], Value | None], Valu
 
 
 Table = Callable[[Mapping[str, Value], Value | None], FunctionValue]
-"""From a valuation, and the function's value before (a guess at its points), to its value."""
+"""From a valuation, and the function's previous value (a guess at its points), to its value."""
 
 
 def _compile_table(term: Term, parameters: Sequence[Variable], instances: int) -> Table:
-    """The function from the parameters to the term, of at most so many points. A guess (the term at the points before,
-    and at values that nothing names) is held against the term, exactly, until no argument tells them apart. The result
-    raises NotEvaluable: where there are more points, or infinitely many."""
+    """The function from the parameters to the term, with at most `instances` points. A guess (the term at the previous
+    points, and at values that nothing names) is compared with the term, exactly, until no argument distinguishes them.
+    The result raises NotEvaluable if there are more points, or infinitely many."""
     kept = Variable(Role.INPUT, "kept#", s.FunctionSort(tuple(v.sort for v in parameters), term.sort))
     now = compile_term(term)
     body = rename_apart(_differ(term, Apply(kept, tuple(parameters), term.sort)), [v.name for v in parameters])
@@ -103,7 +103,7 @@ def _compile_table(term: Term, parameters: Sequence[Variable], instances: int) -
 
 
 def _differ(term: Term, kept: Term) -> Term:
-    """That two terms are not the same; a conditional's branches apart, so that its condition restricts them."""
+    """That two terms differ; for each branch of a conditional separately, so that its condition restricts them."""
     if isinstance(term, Conditional):
         met = conjunction((term.condition, _differ(term.then, kept)))
         return disjunction((met, conjunction((negation(term.condition), _differ(term.otherwise, kept)))))
@@ -111,7 +111,7 @@ def _differ(term: Term, kept: Term) -> Term:
 
 
 def unnamed(sort: s.Sort) -> Value:
-    """A value that nothing names, as far as one can guess; of a finite sort, any: all are looked at."""
+    """A value that nothing is likely to name; for a finite sort any, since all are examined."""
     finite = finite_values(sort)
     if finite:
         return finite[0]

@@ -1,7 +1,7 @@
 """Variables that no part of a conjunction restricts to finitely many values: a solver finds values for them.
 
-``exists(a in REAL | forall(x in REAL | in.p(x) -> a - 1 <= x and x <= a + 1))``: what it finds is held against the
-parts as any other candidate; that there is nothing is the solver's word.
+``exists(a in REAL | forall(x in REAL | in.p(x) -> a - 1 <= x and x <= a + 1))``: a solution is checked against the
+parts like any other candidate; that none exists relies on the solver.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from avow.solving.translation import kept_session
 def solved_step(
     compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable], *, unique: bool
 ) -> Callable[[Env], Iterator[None]]:
-    """Binds the variables to values that meet every part, if there are any; with `unique`, to others after these."""
+    """Binds the variables to values that satisfy every part, if any exist; with `unique`, then to different ones."""
     formula = conjunction(p.term if p.positive else negation(p.term) for p in parts)
     bound = (v for part in subterms(formula) if isinstance(part, Quantified) for v in part.variables)
-    # elements of unspecified types, and the values of a scenario, are others to a solver than to the evaluation
+    # a solver treats elements of unspecified types, and the values of a scenario, differently from the evaluation
     refused = opaque_sorts(formula) or any(v.sort in compiler.domains for v in (*variables, *bound))
     known = {v: compiler.slot(v) for v in free_variables(formula) - frozenset(variables)}
     slots = {v: compiler.bind(v) for v in variables}
@@ -55,11 +55,11 @@ def solved_step(
 
 
 def _is_open(value: Any) -> bool:
-    """Whether it is a table, or has one, of which not all is known."""
+    """Whether it is, or contains, a table that is only partly known."""
     match value:
         case FunctionValue(table=table):
             return table.__class__ is not dict
         case SequenceValue(items=items) | tuple(items):
             return any(map(_is_open, items))
-        case _:  # all of it is known
+        case _:  # it is known completely
             return False

@@ -1,5 +1,4 @@
-"""The points of functions' tables: where a part holds at none of the values that functions have elsewhere, only they
-are left."""
+"""The points of functions' tables: if a part is false for the functions' default values, only these points remain."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from avow.language.terms import Apply, Not, Quantified, Role, Term, Variable
 
 
 class Unrestricted(NotEvaluable):
-    """Met at run time: a table's default makes infinitely many points satisfy a part."""
+    """Found at run time: a table's default makes infinitely many points satisfy a part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +29,9 @@ class Step:
 
 
 class Lookup:
-    """The points of a table that agree with the arguments already known: by an index, where that pays.
+    """The points of a table that agree with the arguments already known: by an index, if that pays.
 
-    The index of the last table is kept: a map stays the same from one evaluation to the next. Tables do not change.
+    The index of the last table is kept: a map is the same from one evaluation to the next. Tables do not change.
     """
 
     def __init__(self, known: tuple[int, ...], codes: tuple[Code, ...]) -> None:
@@ -53,7 +52,7 @@ class Lookup:
 
 
 def table_rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None:
-    """Of a part in which the variables are arguments of functions only: at a point of one of these, it can hold."""
+    """For a part in which the variables are arguments of functions only: it can hold at a point of one of these."""
     elsewhere: dict[Term, Variable] = {}
     term = _elsewhere(part.term, unbound, elsewhere)
     if not elsewhere or bound_names(term) & unbound:
@@ -75,9 +74,9 @@ def table_rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None
 
     def run(env: Env) -> Iterator[None]:
         found = [(function(env), match) for function, match in tables]
-        if any(value.table.__class__ is not dict for value, _ in found):  # not all of it is known
+        if any(value.table.__class__ is not dict for value, _ in found):  # it is only partly known
             raise Unrestricted("a function's table is open")
-        away = [*env, *[None] * (compiler.size - len(env))]  # a plan may be made when the environment has been
+        away = [*env, *[None] * (compiler.size - len(env))]  # a plan may be made after the environment
         for slot, (value, _) in zip(slots, found, strict=True):
             away[slot] = value.default
         try:
@@ -94,7 +93,7 @@ def table_rows(compiler: Compiler, part: Part, unbound: set[str]) -> Step | None
 
 
 def _elsewhere(term: Term, unbound: set[str], found: dict[Term, Variable]) -> Term:
-    """The part with a variable for the value of each function that is given one of the variables."""
+    """The part with each application of a function to one of the variables replaced by a new variable."""
     if isinstance(term, Quantified) or not bound_names(term) & unbound:
         return term
     if isinstance(term, Apply) and not bound_names(term.function):

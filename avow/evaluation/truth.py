@@ -1,4 +1,4 @@
-"""Truth of a formula over concrete values: exact evaluation, and where that cannot answer, the solver."""
+"""Truth of a formula over concrete values: exact evaluation, and if that gives no answer, the solver."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from avow.solving.replay import opaque_sorts, replay
 
 
 def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
-    """Whether the formula holds of the values; None where neither evaluation nor Z3 can tell.
+    """Whether the formula holds for the values; None if neither evaluation nor Z3 can decide it.
 
-    What lies outside a partial operation (division by zero) is unspecified: True and False hold whatever it yields.
+    Partial operations outside their domain (division by zero) are unspecified: True and False hold for any result.
     """
     try:
         return bool(evaluate(term, valuation))
@@ -27,9 +27,9 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
 
 
 def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
-    """Whether the formula holds of the values, whatever those are that the valuation leaves out; None where that
-    depends on them, or where Z3 cannot tell."""
-    if opaque_sorts(term):  # how many elements they have is not known
+    """Whether the formula holds for the values, whatever the values that the valuation omits; None if that depends on
+    them, or if Z3 cannot decide it."""
+    if opaque_sorts(term):  # the number of their elements is not known
         return None
     known = {v: valuation[v.qualified] for v in _free_sorts(term).values() if v.qualified in valuation}
     return replay([term], known, effort=effort)
